@@ -1,0 +1,85 @@
+"""A station file: what is wired where, and the hard limits that no policy can widen."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from orchestrator.keys import Range, Source, key
+from orchestrator.config.policy import Policy
+from orchestrator.model import ControlMode
+from orchestrator.protocol.objects import ObjectMap
+
+
+class Rs485(StrEnum):
+    """How the line's direction is switched."""
+
+    OFF = "off"  #: RS-232, or an RS-485 adapter that switches by itself
+    KERNEL = "kernel"  #: the serial driver switches RTS (TIOCSRS485)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChargerConfig:
+    port: str = key("the serial port, best a stable name below /dev/serial/by-path")
+    control: ControlMode = key("manual (rotary switch on 1) or automatic (2 … 5: only stop and resume)")
+    steps_a: tuple[float, ...] = key(
+        "what the five current-limit steps mean on this charger, lowest first", unit="A", gt=0
+    )
+    rs485: Rs485 = key("off, or kernel for a driver that switches the direction", default=Rs485.OFF)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatteryConfig:
+    can: str = key("the name of one of the station's CAN buses")
+    node_id: int = key("the BMU's CANopen node id: its board switch + 0x10", ge=1, le=127)
+    map: ObjectMap = key("the object map: a shipped name or a path")
+    sweep_s: float = key(
+        "how often volts, amps, status and temperature are read", unit="s", ge=0.02, le=0.5, default=0.05
+    )
+    sdo_timeout_s: float = key("an SDO answer that takes longer counts as none", unit="s", ge=0.05, le=0.5, default=0.3)
+    heartbeat_s: float | None = key(
+        "heartbeat period asked of the BMU; null: none", unit="s", ge=0.1, le=2, default=0.5
+    )
+    tpdo_s: float | None = key(
+        "TPDO event period asked of the BMU; null: SDO only", unit="s", ge=0.05, le=1, default=None
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Hard limits of the bay's hardware; the interlock reads these and nothing else."""
+
+    voltage_v: float = key("no current above this voltage, at the charger or at the pack", unit="V", gt=0, le=120)
+    current_a: float = key("no step above this current", unit="A", gt=0, le=100)
+    temperature_c: Range = key("no current outside of it", unit="°C")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bay:
+    name: str = key("what people call it")
+    charger: ChargerConfig = key("the charger")
+    battery: BatteryConfig = key("the battery's BMU")
+    limits: Limits = key("hard limits; a policy may only be stricter")
+    policy: Policy = key("the charging policy: a shipped name or a path")
+    source: Source = field(default=Source("<station>"), compare=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    socket: Path = key("the Unix socket for status and commands; only its owner can open it")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JournalConfig:
+    directory: Path = key("where the journal is kept")
+    max_mb: float = key("the most that it may take; the oldest goes first", unit="MB", ge=1, default=256.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Station:
+    station: str = key("the station's name")
+    can: Mapping[str, Mapping[str, object]] = key("CAN buses by name; the keys of each are python-can's own")
+    bays: tuple[Bay, ...] = key("one for each charger")
+    control: Control = key("the control socket")
+    journal: JournalConfig = key("the journal")
+    source: Source = field(default=Source("<station>"), compare=False)

@@ -1,0 +1,1 @@
+"""The decisions, and nothing else: pure functions of their arguments."""

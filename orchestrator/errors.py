@@ -1,0 +1,44 @@
+"""Everything this package raises on purpose.
+
+One tree, so that a caller can catch by what must happen next: a configuration is mended by a person, a link comes back by
+itself, a protocol error is counted, a programming error stops the bay.
+"""
+
+from dataclasses import dataclass
+
+
+class OrchestratorError(Exception):
+    """Root of every error that is raised on purpose; its text is written for the person who must act."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Finding:
+    """One thing wrong in a file that a person wrote: where it is, what it is and what is allowed there."""
+
+    file: str
+    line: int
+    column: int
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}: error: {self.text}"
+
+
+class ConfigError(OrchestratorError):
+    """A station, policy or object-map file cannot be used; `findings` has every reason, not only the first."""
+
+    def __init__(self, findings: tuple[Finding, ...]) -> None:
+        super().__init__("\n".join(map(str, findings)))
+        self.findings = findings
+
+
+class LinkError(OrchestratorError):
+    """A port or a bus cannot be used now: unplugged, stalled, busy, down. It may come back."""
+
+
+class RefusedError(OrchestratorError):
+    """The interlock or the state machine did not let something through; the text names the reason."""
+
+
+class ServiceError(OrchestratorError):
+    """The service cannot be reached or answered with an error."""

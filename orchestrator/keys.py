@@ -1,0 +1,66 @@
+"""How a key of a YAML file is described: once, beside the field that holds it.
+
+The strict reader, `orchestrator check`, and whatever else needs to know what is allowed where, all read this description.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """What a key means and which values it may have; bounds are inclusive (`ge`, `le`) or exclusive (`gt`, `lt`)."""
+
+    about: str
+    unit: str = ""
+    ge: float | None = None
+    le: float | None = None
+    gt: float | None = None
+    lt: float | None = None
+
+
+def key(
+    about: str,
+    *,
+    unit: str = "",
+    ge: float | None = None,
+    le: float | None = None,
+    gt: float | None = None,
+    lt: float | None = None,
+    default: Any = MISSING,
+    default_factory: Callable[[], Any] | None = None,
+) -> Any:
+    """A dataclass field that a YAML key fills. Without a default the key is required."""
+    metadata = {"key": Key(about, unit, ge, le, gt, lt)}
+    if default_factory is not None:
+        return field(default_factory=default_factory, metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """A closed interval, written `[low, high]` in YAML; low < high."""
+
+    low: float
+    high: float
+
+    def __contains__(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+    def __str__(self) -> str:
+        return f"{self.low:g} … {self.high:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The file that a configuration came from, and the line of each of its keys (`current.soc_pct[1]` → 41)."""
+
+    file: str
+    lines: Mapping[str, int] = field(default_factory=dict, hash=False)
+
+    def at(self, path: str) -> str:
+        """`FILE:LINE` of the key at `path`, or of its nearest written parent."""
+        while path and path not in self.lines:
+            path = path[: max(path.rfind("."), path.rfind("["), 0)]
+        return f"{self.file}:{self.lines[path]}" if path else self.file

@@ -1,0 +1,1 @@
+"""The devices' languages, without I/O: bytes in, records out, and back."""

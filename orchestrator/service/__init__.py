@@ -1,0 +1,1 @@
+"""The running process: threads, clock, socket, journal."""
