@@ -1,7 +1,7 @@
 """Everything this package raises on purpose.
 
-One tree, so that a caller can catch by what must happen next: a configuration is mended by a person, a link comes back by
-itself, a protocol error is counted, a programming error stops the bay.
+One tree, so that a caller can catch by what must happen next: a configuration is mended by a person, a link comes back
+by itself, a refusal is answered.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """How a key of a YAML file is described: once, beside the field that holds it.
 
-The strict reader, `orchestrator check`, and whatever else needs to know what is allowed where, all read this description.
+The strict reader, `orchestrator check`, and whatever else needs to know what is allowed where, read this.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,9 +28,9 @@ def key(
     le: float | None = None,
     gt: float | None = None,
     lt: float | None = None,
-    default: Any = MISSING,
+    default: Any = MISSING,  # noqa: ANN401 - as in dataclasses.field
     default_factory: Callable[[], Any] | None = None,
-) -> Any:
+) -> Any:  # noqa: ANN401 - as dataclasses.field, so that the field keeps its own type
     """A dataclass field that a YAML key fills. Without a default the key is required."""
     metadata = {"key": Key(about, unit, ge, le, gt, lt)}
     if default_factory is not None:

@@ -6,7 +6,7 @@ computed from them is never too young. Unknown is `None`, never a number.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum, IntEnum, StrEnum
+from enum import IntEnum, StrEnum
 
 # --- the charger, in its document's own values (protocol 2/2, §4.1.1 and §4.2) ---------------------------------------
 
@@ -19,11 +19,15 @@ class ControlMode(IntEnum):
 
 
 class Operation(IntEnum):
+    """Whether the charger says that it runs."""
+
     STOPPED = 0
     RUNNING = 1
 
 
 class ChargeMode(IntEnum):
+    """What the charger says that it is doing; 3, 4 and 5 can be commanded."""
+
     BATTERY_SEARCH = 1
     BATTERY_RECOVERY = 2
     PRECHARGE = 3
@@ -35,12 +39,16 @@ class ChargeMode(IntEnum):
 
 
 class Precharge(IntEnum):
+    """The precharge function."""
+
     OFF = 0
     PULSE = 1
     CONTINUOUS = 2
 
 
 class Connection(IntEnum):
+    """How the battery is connected to the charger."""
+
     REVERSED = 0
     NORMAL = 1
 

@@ -1,4 +1,4 @@
-"""A charging policy: what people tune. Frozen, checked, each key with its meaning; the defaults are the documented ones."""
+"""A charging policy: what people tune, each key with its meaning and its bounds."""
 
 from dataclasses import dataclass, field
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-from orchestrator.keys import Range, Source, key
 from orchestrator.config.policy import Policy
+from orchestrator.keys import Range, Source, key
 from orchestrator.model import ControlMode
 from orchestrator.protocol.objects import ObjectMap
 
@@ -20,6 +20,8 @@ class Rs485(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChargerConfig:
+    """One charger on one serial port (its address is always 0x90)."""
+
     port: str = key("the serial port, best a stable name below /dev/serial/by-path")
     control: ControlMode = key("manual (rotary switch on 1) or automatic (2 … 5: only stop and resume)")
     steps_a: tuple[float, ...] = key(
@@ -30,6 +32,8 @@ class ChargerConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatteryConfig:
+    """Where the bay's BMU is found and how it is read."""
+
     can: str = key("the name of one of the station's CAN buses")
     node_id: int = key("the BMU's CANopen node id: its board switch + 0x10", ge=1, le=127)
     map: ObjectMap = key("the object map: a shipped name or a path")
@@ -56,6 +60,8 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bay:
+    """One charging place: a charger, the battery that comes to it, their limits and a policy."""
+
     name: str = key("what people call it")
     charger: ChargerConfig = key("the charger")
     battery: BatteryConfig = key("the battery's BMU")
@@ -66,17 +72,23 @@ class Bay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
+    """Where commands and questions come in."""
+
     socket: Path = key("the Unix socket for status and commands; only its owner can open it")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JournalConfig:
+    """Where the journal goes and how large it may grow."""
+
     directory: Path = key("where the journal is kept")
     max_mb: float = key("the most that it may take; the oldest goes first", unit="MB", ge=1, default=256.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Station:
+    """One station file."""
+
     station: str = key("the station's name")
     can: Mapping[str, Mapping[str, object]] = key("CAN buses by name; the keys of each are python-can's own")
     bays: tuple[Bay, ...] = key("one for each charger")

@@ -1,4 +1,4 @@
-"""The BMU's object map: which CANopen object holds which field, in which bits. Data, not code: the document leaves it open.
+"""The BMU's object map: which CANopen object holds which field, in which bits. Data: the document leaves it open.
 
 Source: CANopen manual §1.5 (names and order of the fields), §4.1 (the only sample). Words are little-endian on the wire
 (§3); here a word is already an unsigned integer.
