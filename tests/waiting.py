@@ -1,0 +1,14 @@
+"""Wait for something that another thread or process is about to do, with a deadline."""
+
+import time
+from collections.abc import Callable
+from threading import Event
+
+
+def wait_until(condition: Callable[[], object], timeout_s: float = 5.0, what: str = "the condition") -> None:
+    """Return as soon as `condition()` is true; fail the test when it is not within `timeout_s` seconds."""
+    deadline_s = time.monotonic() + timeout_s
+    pause = Event()
+    while not condition():
+        assert time.monotonic() < deadline_s, f"{what} did not come true within {timeout_s} s"
+        pause.wait(0.005)
