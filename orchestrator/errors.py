@@ -36,6 +36,14 @@ class LinkError(OrchestratorError):
     """A port or a bus cannot be used now: unplugged, stalled, busy, down. It may come back."""
 
 
+class ProtocolError(OrchestratorError):
+    """An answer came whole and with a good checksum, but it is not what was asked for: expected and got."""
+
+
+class HexError(OrchestratorError):
+    """Text that a person gave is not hexadecimal: which characters, and where."""
+
+
 class RefusedError(OrchestratorError):
     """The interlock or the state machine did not let something through; the text names the reason."""
 

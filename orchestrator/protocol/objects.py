@@ -4,10 +4,14 @@ Source: CANopen manual §1.5 (names and order of the fields), §4.1 (the only sa
 (§3); here a word is already an unsigned integer.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
 from orchestrator.keys import Range, Source, key
+from orchestrator.model import BatteryReading
+
+#: The names that a map may give to its fields.
+READING_FIELDS = tuple(each.name for each in fields(BatteryReading))
 
 
 class Evidence(StrEnum):

@@ -1,0 +1,242 @@
+"""The charger's messages: what its frames mean (protocol 2/2, §3.3, §4.1.1 and §4.2)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from functools import lru_cache
+from typing import Any
+
+from orchestrator.errors import ProtocolError
+from orchestrator.model import (
+    Action,
+    ChargeMode,
+    ChargerReading,
+    Command,
+    Connection,
+    ControlMode,
+    Operation,
+    Precharge,
+)
+from orchestrator.protocol.frame import ADDRESS, OVERHEAD, Frame
+
+
+class Code(IntEnum):
+    """The commands (§3.2.5)."""
+
+    STATUS_REQUEST = 0x01
+    SET = 0x02  #: acted on in manual mode only
+    STATUS_REPLY = 0x03
+    REST = 0x10  #: stop (to standby, whatever it is doing) and resume; acted on in both modes
+    ERROR = 0x1F
+
+
+class Kind1(IntFlag):
+    """The basic values that a status request asks for (§3.3.1)."""
+
+    VOLTAGE = 0x01
+    CURRENT = 0x02
+    TEMPERATURE_1 = 0x04
+    TEMPERATURE_2 = 0x08
+    CONTROL_MODE = 0x10
+
+
+class Kind2(IntFlag):
+    """The extended values that a status request asks for (§3.3.1)."""
+
+    OPERATION = 0x01
+    CURRENT_LIMIT = 0x02
+    CHARGE_MODE = 0x04
+    PRECHARGE = 0x08
+    CONNECTION = 0x10
+
+
+class Push(IntFlag):
+    """Which value a 0x02 frame sets (§3.3.2). The document lists single bits only: one value a frame."""
+
+    OPERATION = 0x01
+    CURRENT_LIMIT = 0x02
+    CHARGE_MODE = 0x04
+    PRECHARGE = 0x08
+
+
+class ErrorBit(IntFlag):
+    """What the charger found wrong with the frame it received (§3.3.5)."""
+
+    LENGTH = 0x01
+    COMMAND = 0x02
+    ORDER = 0x04
+    CHECKSUM = 0x08
+
+
+# --- to the charger --------------------------------------------------------------------------------------------------
+
+Kinds = tuple[int, int]  #: kind 1, kind 2
+
+#: What the service asks for: all but the two temperatures, which hold no information since 2022-01.
+STATUS_KINDS: Kinds = (0x13, 0x1F)
+
+
+def status_request(kind1: int = STATUS_KINDS[0], kind2: int = STATUS_KINDS[1]) -> bytes:
+    """The frame that asks for these values."""
+    return Frame(Code.STATUS_REQUEST, ADDRESS, bytes((kind1, kind2))).encode()
+
+
+def _rest(rest: int) -> bytes:
+    return Frame(Code.REST, ADDRESS, bytes((rest,))).encode()
+
+
+def _push(push: Push, value: int) -> bytes:
+    return Frame(Code.SET, ADDRESS, bytes((push, value))).encode()
+
+
+STATUS_REQUEST = status_request()
+STOP_FRAME = _rest(0)  #: to standby, in manual and automatic mode; always the first frame of a stop
+OPERATION_STOP_FRAME = _push(Push.OPERATION, 0)  #: the second, in manual mode
+
+#: Every command that there is, with its frame: what is not in here cannot be sent (§4.2.1).
+_FRAMES: dict[Command, bytes] = {
+    Command(Action.RESUME): _rest(1),
+    Command(Action.RUN): _push(Push.OPERATION, 1),
+    **{Command(Action.SET_LIMIT, value): _push(Push.CURRENT_LIMIT, value) for value in range(5)},
+    **{Command(Action.SET_MODE, value): _push(Push.CHARGE_MODE, value) for value in (3, 4, 5)},
+    **{Command(Action.SET_PRECHARGE, value): _push(Push.PRECHARGE, value) for value in range(3)},
+}
+
+
+def encode(command: Command) -> bytes:
+    """The frame that carries a command out; ValueError if its value is outside the list of §4.2.1.
+
+    A stop is never refused, whatever value it carries. In manual mode `OPERATION_STOP_FRAME` follows it.
+    """
+    if command.action is Action.STOP:
+        return STOP_FRAME
+    frame = _FRAMES.get(command)
+    if frame is None:
+        allowed = ", ".join(str(known.value) for known in _FRAMES if known.action is command.action)
+        raise ValueError(f"{command.action} {command.value}: the charger takes {allowed}")
+    return frame
+
+
+# --- from the charger ------------------------------------------------------------------------------------------------
+
+
+def _hundredths(raw: int) -> float:
+    return raw / 100
+
+
+def _signed_tenths(raw: int) -> float:
+    # Scale 0.1 and range ±327.67 contradict each other in §4.1.1; taken as 0.1 and never relied on.
+    return (raw - 0x10000 if raw & 0x8000 else raw) / 10
+
+
+def _step(raw: int) -> int:
+    if raw > 4:
+        raise ValueError(raw)
+    return raw
+
+
+@dataclass(frozen=True, slots=True)
+class StatusValue:
+    """One row of §4.1.1: a value that a status reply can hold."""
+
+    name: str  #: as in `ChargerReading`
+    title: str  #: as a person calls it
+    kind1: int
+    kind2: int
+    decode: Callable[[int], float]  #: of the 16 raw bits; ValueError if they are not documented
+    documented: str = ""  #: the values that are
+
+    def value(self, raw: int) -> float | str:
+        """The value, or why it is none: "charge mode 9 (documented: 1 … 8)"."""
+        try:
+            return self.decode(raw)
+        except ValueError:
+            return f"{self.title} {raw} (documented: {self.documented})"
+
+
+def _void(kind1: int, kind2: int) -> StatusValue:
+    return StatusValue(f"void_{kind1:02x}{kind2:02x}", f"void {kind1:02X} {kind2:02X}", kind1, kind2, int)
+
+
+#: In the order of a reply. The document numbers the data of the ten defined values 1 to 20 without a gap, so the six
+#: void ones, which it mentions (§3.3.3) but does not list, can only follow them. Nobody needs to ask for those.
+STATUS_VALUES = (
+    StatusValue("voltage_v", "voltage", Kind1.VOLTAGE, 0, _hundredths),
+    StatusValue("current_a", "current", Kind1.CURRENT, 0, _hundredths),
+    StatusValue("temperature_1_c", "temperature 1", Kind1.TEMPERATURE_1, 0, _signed_tenths),
+    StatusValue("temperature_2_c", "temperature 2", Kind1.TEMPERATURE_2, 0, _signed_tenths),
+    StatusValue("control_mode", "control mode", Kind1.CONTROL_MODE, 0, ControlMode, "0, 1"),
+    StatusValue("operation", "operation", 0, Kind2.OPERATION, Operation, "0, 1"),
+    StatusValue("current_limit", "current limit", 0, Kind2.CURRENT_LIMIT, _step, "0 … 4"),
+    StatusValue("charge_mode", "charge mode", 0, Kind2.CHARGE_MODE, ChargeMode, "1 … 8"),
+    StatusValue("precharge", "precharge function", 0, Kind2.PRECHARGE, Precharge, "0 … 2"),
+    StatusValue("connection", "battery connection", 0, Kind2.CONNECTION, Connection, "0, 1"),
+    *(_void(1 << bit, 0) for bit in (5, 6, 7)),
+    *(_void(0, 1 << bit) for bit in (5, 6, 7)),
+)
+
+
+@lru_cache(maxsize=64)
+def status_values(kind1: int, kind2: int) -> tuple[StatusValue, ...]:
+    """The rows that a request for these kinds is answered with, in order."""
+    return tuple(row for row in STATUS_VALUES if row.kind1 & kind1 or row.kind2 & kind2)
+
+
+def reply_bytes(kind1: int, kind2: int) -> int:
+    """The length of the whole reply frame to a request for these kinds."""
+    return 2 * len(status_values(kind1, kind2)) + OVERHEAD
+
+
+STATUS_REPLY_BYTES = reply_bytes(*STATUS_KINDS)
+
+
+def _expect(frame: Frame, code: Code, size: int, order: int) -> None:
+    got = (frame.command, frame.order, len(frame.data))
+    if got != (code, order, size):
+        raise ProtocolError(
+            f"expected command 0x{code:02X}, order 0x{order:02X}, {size} data bytes; "
+            f"got command 0x{frame.command:02X}, order 0x{frame.order:02X}, {len(frame.data)} data bytes in {frame}"
+        )
+
+
+def parse_values(frame: Frame, kind1: int, kind2: int) -> dict[str, float | str]:
+    """The values of a reply to a request for any kinds, by name; a str says why a value is none of the documented ones.
+
+    ProtocolError if the frame cannot be that reply.
+    """
+    rows = status_values(kind1, kind2)
+    data = frame.data
+    _expect(frame, Code.STATUS_REPLY, 2 * len(rows), ADDRESS)
+    return {row.name: row.value(data[at] << 8 | data[at + 1]) for row, at in zip(rows, range(0, 32, 2), strict=False)}
+
+
+def parse_status(frame: Frame, kinds: Kinds, t_s: float) -> ChargerReading:
+    """The reading in a reply to a request for `kinds`, which must hold `STATUS_KINDS`, sent at `t_s`.
+
+    A value outside its documented list is None and has its sentence in `illegal`. ProtocolError as in `parse_values`.
+    """
+    if any(needed & ~asked for needed, asked in zip(STATUS_KINDS, kinds, strict=True)):
+        raise ValueError(f"kinds {kinds[0]:#04x} {kinds[1]:#04x} do not fill a reading")
+    values = parse_values(frame, *kinds)
+    illegal = tuple(value for value in values.values() if isinstance(value, str))
+    reading: dict[str, Any] = {row.name: values[row.name] for row in status_values(*STATUS_KINDS)}
+    if illegal:
+        reading = {name: None if isinstance(value, str) else value for name, value in reading.items()}
+    return ChargerReading(t_s=t_s, illegal=illegal, **reading)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorReply:
+    """A 0x1F frame: the charger refuses the frame that it received, and repeats parts of it."""
+
+    bits: ErrorBit
+    length: int
+    command: int
+    order: int
+    checksum: int
+
+
+def parse_error(frame: Frame) -> ErrorReply:
+    """The charger's complaint. The order's place holds the error bits (§3.3.5). ProtocolError if it is none."""
+    _expect(frame, Code.ERROR, 4, frame.order)
+    return ErrorReply(ErrorBit(frame.order), *frame.data)

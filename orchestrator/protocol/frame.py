@@ -1,0 +1,159 @@
+"""The charger's frames, without I/O: bytes in, frames out, and back (protocol 2/2, §3.1 and §3.2).
+
+    AF FA | address | length | command | order | data … | checksum | AF A0
+
+Nothing is escaped, so `AF FA` and `AF A0` may occur inside data: a decoder goes by the length, checks everything, and
+after anything wrong resumes its hunt one byte past the false start.
+"""
+
+from dataclasses import dataclass
+
+START = b"\xaf\xfa"
+END = b"\xaf\xa0"
+ADDRESS = 0x90  #: every charger's, for good (§3.2.3)
+MAX_DATA = 32  #: 16 values of 2 bytes (§3.3.3); the "at most 20" of §3.2.7 is the ten defined ones
+COUNTED = 3  #: command, order and checksum are counted in the length (§3.2.4)
+OVERHEAD = 9  #: bytes of a frame without its data
+MAX_FRAME = MAX_DATA + OVERHEAD
+
+_HEADER = 4  # start, address, length
+_UNCOUNTED = OVERHEAD - COUNTED
+_MAX_LENGTH = MAX_DATA + COUNTED
+
+_BAD = -1
+_INCOMPLETE = 0
+
+
+def checksum(counted: bytes) -> int:
+    """The low byte of the sum of these bytes: address, length, command, order and data (§3.2.6)."""
+    return sum(counted) & 0xFF
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What a frame carries. ValueError if it could not be sent: a byte outside 0 … 255, more than 32 data bytes."""
+
+    command: int
+    order: int  #: the address of the charger meant; in a 0x1F frame the error bits
+    data: bytes
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.command <= 0xFF and 0 <= self.order <= 0xFF and len(self.data) <= MAX_DATA):
+            raise ValueError(f"no frame can carry command {self.command}, order {self.order}, {len(self.data)} bytes")
+
+    def encode(self) -> bytes:
+        """The frame as it goes over the wire."""
+        counted = bytes((ADDRESS, len(self.data) + COUNTED, self.command, self.order)) + self.data
+        return START + counted + bytes((checksum(counted),)) + END
+
+    def __str__(self) -> str:
+        return self.encode().hex(" ").upper()
+
+
+def declared_size(candidate: bytes) -> int | None:
+    """How long the frame says that it is, in bytes from its start; None while (or if) its length makes no sense."""
+    if len(candidate) >= _HEADER and COUNTED <= candidate[3] <= _MAX_LENGTH:
+        return candidate[3] + _UNCOUNTED
+    return None
+
+
+def why_bad(candidate: bytes) -> str:
+    """Everything that is wrong with bytes that begin with AF FA, expected beside got; "" for a good frame."""
+    if len(candidate) > len(START) and candidate[2] != ADDRESS:
+        return f"address 0x{candidate[2]:02X}, expected 0x{ADDRESS:02X}"
+    size = declared_size(candidate)
+    if size is None:
+        if len(candidate) < _HEADER:
+            return f"incomplete: {len(candidate)} bytes, the smallest frame has {OVERHEAD}"
+        return f"length 0x{candidate[3]:02X}, expected 0x{COUNTED:02X} … 0x{_MAX_LENGTH:02X}"
+    if len(candidate) < size:
+        return f"incomplete: {len(candidate)} bytes, its length 0x{candidate[3]:02X} makes it {size}"
+    wrong = []
+    end, said, summed = candidate[size - 2 : size], candidate[size - 3], checksum(candidate[2 : size - 3])
+    if said != summed:
+        wrong.append(f"checksum 0x{said:02X}, expected 0x{summed:02X}")
+    if end != END:
+        wrong.append(f"end {end.hex(' ').upper()}, expected {END.hex(' ').upper()}")
+    return "; ".join(wrong)
+
+
+def frame_size(data: bytes, at: int) -> int:
+    """Look at the start found at `at`: the size of the good frame there, 0 if it is incomplete, -1 if it is none."""
+    here = len(data) - at
+    if here < _HEADER:
+        return _BAD if here > len(START) and data[at + 2] != ADDRESS else _INCOMPLETE
+    length = data[at + 3]
+    if data[at + 2] != ADDRESS or not COUNTED <= length <= _MAX_LENGTH:
+        return _BAD
+    size = length + _UNCOUNTED
+    if here < size:
+        return _INCOMPLETE
+    last = at + size
+    if data[last - 2 : last] != END or sum(data[at + 2 : last - 3]) & 0xFF != data[last - 3]:
+        return _BAD
+    return size
+
+
+class FrameDecoder:
+    """Finds the good frames in any stream of bytes, however it is cut up; holds less than one largest frame.
+
+    A false start can declare a length and so wait for bytes that never come, with a good frame already among those that
+    came. When the line has fallen quiet (a gap, or the reply deadline), the caller says so with `flush()`.
+    """
+
+    __slots__ = ("_pending", "_rejected", "bad_frames", "skipped_bytes")
+
+    def __init__(self) -> None:
+        self._pending = b""
+        self._rejected = b""
+        self.bad_frames = 0  #: starts that turned out to begin no good frame
+        self.skipped_bytes = 0  #: bytes that belonged to no good frame
+
+    @property
+    def pending(self) -> int:
+        """How many bytes wait for the rest of their frame: at most one byte less than the largest frame."""
+        return len(self._pending)
+
+    @property
+    def last_reject(self) -> str:
+        """Why the newest start was none, with its bytes; "" if there was none."""
+        if not self._rejected:
+            return ""
+        shown = self._rejected[: declared_size(self._rejected) or _HEADER]
+        return f"{why_bad(self._rejected)} in {shown.hex(' ').upper()}"
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """The frames that these bytes complete, in order."""
+        return self._hunt(self._pending + data, final=False)
+
+    def flush(self) -> list[Frame]:
+        """Wait no longer for the rest of what came: the good frames inside it. Nothing is pending afterwards."""
+        return self._hunt(self._pending, final=True)
+
+    def reset(self) -> None:
+        """Forget what is pending, as after reopening a port. The counters go on."""
+        self._pending = b""
+
+    def _hunt(self, data: bytes, *, final: bool) -> list[Frame]:
+        frames: list[Frame] = []
+        done = 0  # everything before is framed or skipped
+        at = data.find(START)
+        while at >= 0:
+            size = frame_size(data, at)
+            if size > 0:
+                frames.append(Frame(data[at + 4], data[at + 5], data[at + 6 : at + size - 3]))
+                self.skipped_bytes += at - done
+                done = at + size
+                at = data.find(START, done)
+            elif size == _INCOMPLETE and not final:
+                break
+            else:
+                self.bad_frames += 1
+                self._rejected = data[at : at + MAX_FRAME]
+                at = data.find(START, at + 1)
+        keep = at
+        if at < 0:  # the last byte may be the first half of a start
+            keep = len(data) - (not final and data.endswith(START[:1], done))
+        self.skipped_bytes += keep - done
+        self._pending = data[keep:]
+        return frames

@@ -1,0 +1,178 @@
+"""CANopen's expedited SDO exchange and the few other frames that the BMU speaks, without I/O (CANopen manual §2, §3).
+
+An object is read or written with one frame each way; segmented and block transfers, which could go on for ever, are not
+understood on purpose. Everything is little-endian (§3).
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+FRAME_BYTES = 8
+
+_READ = 0x40
+_WRITE = {1: 0x2F, 2: 0x2B, 4: 0x23}  # command by size
+_VALUE = {0x4F: 1, 0x4B: 2, 0x43: 4}  # size by command
+_WRITTEN = 0x60
+_ABORT = 0x80
+
+
+class NmtCommand(IntEnum):
+    """What an NMT frame (COB-ID 0) can ask of a node (§3.7)."""
+
+    START = 0x01
+    STOP = 0x02
+    PREOPERATIONAL = 0x80
+    RESET_NODE = 0x81  #: the board reboots
+    RESET_COMMUNICATION = 0x82  #: the boot-up frame is sent again
+
+
+class NmtState(IntEnum):
+    """What a heartbeat says (§3.8)."""
+
+    BOOT_UP = 0x00
+    STOPPED = 0x04
+    OPERATIONAL = 0x05
+    PREOPERATIONAL = 0x7F
+
+
+NMT_COB_ID = 0x000
+_TPDO_BASES = {1: 0x180, 2: 0x280, 3: 0x380, 4: 0x480}
+
+
+def request_cob_id(node_id: int) -> int:
+    """SDO requests to this node."""
+    return 0x600 + node_id
+
+
+def reply_cob_id(node_id: int) -> int:
+    """SDO replies of this node."""
+    return 0x580 + node_id
+
+
+def heartbeat_cob_id(node_id: int) -> int:
+    """Boot-up and heartbeat of this node."""
+    return 0x700 + node_id
+
+
+def tpdo_cob_id(number: int, node_id: int) -> int:
+    """TPDO 1 … 4 of this node."""
+    return _TPDO_BASES[number] + node_id
+
+
+def nmt_frame(command: NmtCommand, node_id: int) -> bytes:
+    """The data of an NMT frame, for COB-ID 0."""
+    return bytes((command, node_id))
+
+
+def _multiplexer(index: int, sub: int) -> bytes:
+    if not (0 <= index <= 0xFFFF and 0 <= sub <= 0xFF):
+        raise ValueError(f"object 0x{index:X} sub {sub}: an index has 16 bits, a sub-index 8")
+    return index.to_bytes(2, "little") + bytes((sub,))
+
+
+def read_request(index: int, sub: int) -> bytes:
+    """The frame that asks for an object."""
+    return bytes((_READ,)) + _multiplexer(index, sub) + bytes(4)
+
+
+def write_request(index: int, sub: int, value: int, size: int) -> bytes:
+    """The frame that writes an unsigned value of 1, 2 or 4 bytes; ValueError if it does not fit."""
+    if size not in _WRITE or not 0 <= value < 1 << 8 * size:
+        raise ValueError(f"{value} in {size} bytes: an expedited write takes an unsigned value of 1, 2 or 4 bytes")
+    return bytes((_WRITE[size],)) + _multiplexer(index, sub) + value.to_bytes(4, "little")
+
+
+@dataclass(frozen=True, slots=True)
+class SdoValue:
+    """An object was read."""
+
+    index: int
+    sub: int
+    value: int  #: unsigned
+    size: int  #: bytes that the reply declares: 1, 2 or 4
+
+
+@dataclass(frozen=True, slots=True)
+class SdoWritten:
+    """An object was written."""
+
+    index: int
+    sub: int
+
+
+@dataclass(frozen=True, slots=True)
+class SdoAbort:
+    """The node is there and refuses."""
+
+    index: int
+    sub: int
+    code: int
+
+    @property
+    def meaning(self) -> str:
+        """The code in words (CiA 301, table 22)."""
+        return ABORT_MEANINGS.get(self.code, "not a documented reason")
+
+    def __str__(self) -> str:
+        return f"0x{self.index:04X}:{self.sub:02X} aborted with 0x{self.code:08X}: {self.meaning}"
+
+
+@dataclass(frozen=True, slots=True)
+class SdoMalformed:
+    """Not a reply that we understand; it counts as none."""
+
+    reason: str
+
+
+SdoReply = SdoValue | SdoWritten | SdoAbort | SdoMalformed
+
+
+def parse_reply(data: bytes) -> SdoReply:
+    """What a frame on a node's reply COB-ID says. Never raises."""
+    if len(data) != FRAME_BYTES:
+        return SdoMalformed(f"{len(data)} bytes, expected {FRAME_BYTES}: {bytes(data).hex(' ').upper()}")
+    command, index, sub = data[0], data[1] | data[2] << 8, data[3]
+    size = _VALUE.get(command)
+    if size is not None:
+        return SdoValue(index, sub, int.from_bytes(data[4 : 4 + size], "little"), size)
+    if command == _WRITTEN:
+        return SdoWritten(index, sub)
+    if command == _ABORT:
+        return SdoAbort(index, sub, int.from_bytes(data[4:], "little"))
+    return SdoMalformed(f"command 0x{command:02X}, expected 43, 4B, 4F, 60 or 80: {bytes(data).hex(' ').upper()}")
+
+
+#: CiA 301, table 22.
+ABORT_MEANINGS = {
+    0x05030000: "toggle bit not alternated",
+    0x05040000: "SDO protocol timed out",
+    0x05040001: "command specifier not valid or unknown",
+    0x05040002: "invalid block size",
+    0x05040003: "invalid sequence number",
+    0x05040004: "CRC error",
+    0x05040005: "out of memory",
+    0x06010000: "unsupported access to an object",
+    0x06010001: "attempt to read a write-only object",
+    0x06010002: "attempt to write a read-only object",
+    0x06020000: "object does not exist in the object dictionary",
+    0x06040041: "object cannot be mapped to the PDO",
+    0x06040042: "the objects to be mapped would exceed the PDO's length",
+    0x06040043: "general parameter incompatibility",
+    0x06040047: "general internal incompatibility in the device",
+    0x06060000: "access failed because of a hardware error",
+    0x06070010: "data type or length does not match",
+    0x06070012: "data type does not match: too long",
+    0x06070013: "data type does not match: too short",
+    0x06090011: "sub-index does not exist",
+    0x06090030: "invalid value for the parameter",
+    0x06090031: "value of the parameter too high",
+    0x06090032: "value of the parameter too low",
+    0x06090036: "maximum value is less than minimum value",
+    0x060A0023: "resource not available: SDO connection",
+    0x08000000: "general error",
+    0x08000020: "data cannot be transferred or stored",
+    0x08000021: "data cannot be transferred or stored because of local control",
+    0x08000022: "data cannot be transferred or stored in the device's present state",
+    0x08000023: "no object dictionary is present",
+    0x08000024: "no data available",
+}

@@ -1,0 +1,32 @@
+"""From the BMU's words to measurements, by an object map."""
+
+from orchestrator.model import Measurement
+from orchestrator.protocol.objects import FieldMap, ObjectEntry
+
+#: What a field's newest raw bits turned out to be: a value in range; None where the BMU says that it has none (so a
+#: reading's field becomes unknown, which is no fault by itself); or, in words, why they cannot be believed.
+Decoded = Measurement | str | None
+
+
+def raw_bits(field: FieldMap, word: int) -> int:
+    """The field's own bits of a word, sign and scale not yet applied."""
+    return word >> field.first_bit & (1 << field.width) - 1
+
+
+def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[str, Decoded]:
+    """Every field of an object, from the unsigned word that a reply of `size` bytes carried; asked for at `t_s`."""
+    if size != entry.size:
+        why = f"0x{entry.index:04X}:{entry.sub:02X} declared {size} bytes, the map says {entry.size}"
+        return {field.name: why for field in entry.fields}
+    return {field.name: _decode(field, word, t_s) for field in entry.fields}
+
+
+def _decode(field: FieldMap, word: int, t_s: float) -> Decoded:
+    raw = raw_bits(field, word)
+    if raw == field.unavailable:
+        return None
+    signed = raw - (1 << field.width) if field.signed and raw >> (field.width - 1) else raw
+    value = round(signed * field.scale + field.offset, 9)  # 29.11, not 29.110000000000003
+    if field.range.low <= value <= field.range.high:
+        return Measurement(value, t_s)
+    return f"{field.name} {value:g} is outside {field.range} (raw 0x{raw:0{(field.width + 3) // 4}X})"
