@@ -1,0 +1,71 @@
+"""The three kinds of file, and how one is found by a path or by the name of a shipped one."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.config.map_rules import MAP_RULES
+from orchestrator.config.policy import Policy
+from orchestrator.config.policy_rules import POLICY_RULES
+from orchestrator.config.rules import Problems, problems
+from orchestrator.config.scalars import UnfitError, did_you_mean, nearest
+from orchestrator.config.shipped import shipped_dir, shipped_names
+from orchestrator.config.station import Station
+from orchestrator.config.station_rules import station_problems
+from orchestrator.protocol.objects import ObjectMap
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One kind of file: its first key, what it becomes, where shipped ones lie, and its rules."""
+
+    key: str
+    about: str
+    record: type
+    folder: str
+    rules: Callable[[Mapping[str, object]], Problems]
+
+
+POLICY = Kind("policy", "policy", Policy, "policies", lambda values: problems(POLICY_RULES, values))
+MAP = Kind("map", "object map", ObjectMap, "configs/maps", lambda values: problems(MAP_RULES, values))
+STATION = Kind("station", "station", Station, "configs/stations", station_problems)
+KINDS = (POLICY, MAP, STATION)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A file: its path, and what it is called in messages."""
+
+    path: Path
+    shown: str
+
+
+def place(path: str | Path) -> Place:
+    """A file as its user wrote it."""
+    return Place(Path(path), str(path))
+
+
+def find(kind: Kind, text: str, base: Path) -> Place:
+    """The file that `text` names: a path relative to the directory `base`, or a shipped file's name.
+
+    Raises `UnfitError` with the shipped names if there is no such file.
+    """
+    if "/" in text or text.endswith((".yaml", ".yml")):
+        path = Path(os.path.normpath(base / text))
+        if path.is_file():
+            return place(path)
+        raise UnfitError(f"there is no file {path}{_instead(kind, path)}")
+    names = shipped_names(kind.folder)
+    if text in names:
+        return Place(shipped_dir() / kind.folder / f"{text}.yaml", f"{kind.folder}/{text}.yaml")
+    raise UnfitError(f"no {kind.about} of this name is shipped; {did_you_mean(text, names)}; or a path to a .yaml file")
+
+
+def _instead(kind: Kind, path: Path) -> str:
+    if path.stem in shipped_names(kind.folder):
+        return f"; for the shipped {kind.about} write {path.stem}"
+    beside = sorted(other.name for other in path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
+    if not path.parent.is_dir():
+        return f": there is no directory {path.parent}"
+    return f"; did you mean {near}?" if (near := nearest(path.name, beside)) else ""

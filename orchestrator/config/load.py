@@ -1,0 +1,134 @@
+"""From file names to a `Station`, a `Policy` or an `ObjectMap`; or to every finding in them, at once."""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TypeVar
+
+from orchestrator.config.files import KINDS, MAP, POLICY, STATION, Kind, Place, find, place
+from orchestrator.config.policy import Policy
+from orchestrator.config.reader import INVALID, Reader
+from orchestrator.config.scalars import UnfitError, nearest
+from orchestrator.config.station import Station
+from orchestrator.config.yamltree import MAX_BYTES, Entries, Node, parse
+from orchestrator.errors import ConfigError, Finding
+from orchestrator.protocol.objects import ObjectMap
+
+T = TypeVar("T")
+
+
+def load_station(path: str | Path) -> Station:
+    """The station in a file, with the policies and object maps that it names. Raises `ConfigError`."""
+    return _load(STATION, place(path), Station)
+
+
+def load_policy(name_or_path: str | Path, relative_to: Path | None = None) -> Policy:
+    """A policy by a shipped name or a path (relative to the directory `relative_to`). Raises `ConfigError`."""
+    return _load(POLICY, _find(POLICY, name_or_path, relative_to), Policy)
+
+
+def load_map(name_or_path: str | Path, relative_to: Path | None = None) -> ObjectMap:
+    """An object map by a shipped name or a path (relative to the directory `relative_to`). Raises `ConfigError`."""
+    return _load(MAP, _find(MAP, name_or_path, relative_to), ObjectMap)
+
+
+def check(paths: Iterable[str | Path]) -> list[Finding]:
+    """Everything that is wrong in these files and in those that they name, sorted; an empty list is a yes.
+
+    What a file is, is told by its key `policy`, `station` or `map`. A file named twice is reported once.
+    """
+    places = [place(path) for path in paths]
+    loader = _Loader(places)
+    for one in places:
+        loader.check(one)
+    return sorted(set(loader.findings))
+
+
+def _load(kind: Kind, where: Place, wanted: type[T]) -> T:
+    loader = _Loader([where])
+    value = loader.load(kind, where)
+    if loader.findings or not isinstance(value, wanted):
+        raise ConfigError(tuple(sorted(set(loader.findings))))
+    return value
+
+
+def _find(kind: Kind, name_or_path: str | Path, relative_to: Path | None) -> Place:
+    try:
+        if isinstance(name_or_path, Path):
+            return place(relative_to / name_or_path if relative_to else name_or_path)
+        return find(kind, name_or_path, relative_to or Path())
+    except UnfitError as error:
+        raise ConfigError((Finding(str(name_or_path), 1, 1, str(error)),)) from None
+
+
+class _Loader:
+    """Reads each file once, however many bays name it, and collects the findings of all."""
+
+    def __init__(self, named: Iterable[Place]) -> None:
+        self.findings: list[Finding] = []
+        self._shown = {os.path.realpath(one.path): one.shown for one in named}
+        self._trees: dict[str, Node | None] = {}
+        self._loaded: dict[tuple[str, str], object] = {}
+
+    def check(self, where: Place) -> None:
+        """Reads a file of a kind that it says itself."""
+        node = self._tree(where)
+        if node is None:
+            return
+        keys = [name.text for name, _ in node.entries] if isinstance(node, Entries) else []
+        kinds = [kind for kind in KINDS if kind.key in keys]
+        if kinds:
+            self.load(kinds[0], where)
+            return
+        near = next((f" ({key!r}: did you mean {found}?)" for key in keys if (found := _kind_near(key))), "")
+        text = f"this is no file of ours: it has none of the keys policy, station, map{near}"
+        self.findings.append(Finding(self._name(where), node.mark.line, node.mark.column, text))
+
+    def load(self, kind: Kind, where: Place) -> object:
+        """The record in a file, or `INVALID` if anything in it, or in a file that it names, is wrong."""
+        real = (os.path.realpath(where.path), kind.key)
+        if real not in self._loaded:
+            self._loaded[real] = INVALID  # a file cannot contain itself, but nothing shall depend on that
+            self._loaded[real] = self._read(kind, where)
+        return self._loaded[real]
+
+    def _read(self, kind: Kind, where: Place) -> object:
+        node = self._tree(where)
+        if node is None:
+            return INVALID
+        shown = self._name(where)
+        base = where.path.parent
+        reader = Reader(
+            shown,
+            {
+                Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),
+                ObjectMap: lambda text: self.load(MAP, find(MAP, text, base)),
+            }
+            if kind is STATION
+            else {},
+        )
+        value = reader.read(kind.record, node)
+        for path, text in kind.rules(reader.values):
+            reader.report(path, text)
+        self.findings += reader.findings
+        return INVALID if reader.findings else value
+
+    def _tree(self, where: Place) -> Node | None:
+        real = os.path.realpath(where.path)
+        if real not in self._trees:
+            try:
+                with where.path.open("rb") as stream:
+                    node, findings = parse(self._name(where), stream.read(MAX_BYTES + 1))
+            except OSError as error:
+                text = f"cannot be read: {error.strerror}"
+                node, findings = None, [Finding(self._name(where), 1, 1, text)]
+            self.findings += findings
+            self._trees[real] = node
+        return self._trees[real]
+
+    def _name(self, where: Place) -> str:
+        return self._shown.setdefault(os.path.realpath(where.path), where.shown)
+
+
+def _kind_near(key: str) -> str:
+    return nearest(key, [kind.key for kind in KINDS])

@@ -1,0 +1,118 @@
+"""What must hold between the keys of one object map."""
+
+import dataclasses
+from itertools import pairwise
+
+from orchestrator.config.names import name_problem
+from orchestrator.config.rules import Problems, Rule
+from orchestrator.config.scalars import did_you_mean
+from orchestrator.model import BatteryReading
+from orchestrator.protocol.objects import ObjectEntry, Sweep, TpdoEntry
+
+SIZES = (1, 2, 4)  #: bytes that an expedited SDO answer of this BMU can have (CANopen manual §3.2)
+TPDO_BYTES = 8  #: of one CAN frame
+#: The values of a battery reading: all that a map may name.
+READING_FIELDS = tuple(field.name for field in dataclasses.fields(BatteryReading))
+#: Without these no charge can be supervised. Those in FAST stop one, so they are read in every sweep.
+FAST = ("voltage_v", "current_a", "temperature_c", "status")
+REQUIRED = (*FAST, "soc_pct", "soh_pct")
+
+Objects = tuple[ObjectEntry, ...]
+
+
+def _name(name: str) -> Problems:
+    if problem := name_problem(name):
+        yield "map", problem
+
+
+def _unique_objects(objects: Objects) -> Problems:
+    seen: dict[tuple[int, int], int] = {}
+    for i, entry in enumerate(objects):
+        first = seen.setdefault((entry.index, entry.sub), i)
+        if first != i:
+            yield f"objects[{i}].index", f"0x{entry.index:04X} sub {entry.sub} is objects[{first}] already"
+
+
+def _sizes(objects: Objects) -> Problems:
+    for i, entry in enumerate(objects):
+        if entry.size not in SIZES:
+            yield f"objects[{i}].size", f"{entry.size} bytes cannot be; allowed: 1, 2 or 4"
+
+
+def _bits(objects: Objects) -> Problems:
+    for i, entry in enumerate(objects):
+        for j, field in enumerate(entry.fields):
+            at = f"objects[{i}].fields[{j}]"
+            end = field.first_bit + field.width
+            if end > entry.size * 8:
+                yield (
+                    f"{at}.width",
+                    f"bits {field.first_bit} … {end - 1} reach beyond the object's {entry.size} bytes "
+                    f"(bits 0 … {entry.size * 8 - 1})",
+                )
+            if field.unavailable is not None and field.unavailable >= 1 << field.width:
+                yield f"{at}.unavailable", f"{field.unavailable:#x} does not fit into {field.width} bits"
+            if field.scale == 0:
+                yield f"{at}.scale", "0 would make every value the same; what is one raw count?"
+
+
+def _overlap(objects: Objects) -> Problems:
+    for i, entry in enumerate(objects):
+        rows = sorted((field.first_bit, j) for j, field in enumerate(entry.fields))
+        for (_, lower), (first_bit, upper) in pairwise(rows):
+            below = entry.fields[lower]
+            if first_bit < below.first_bit + below.width:
+                yield (
+                    f"objects[{i}].fields[{upper}].first_bit",
+                    f"{first_bit} lies inside {below.name}, "
+                    f"which has bits {below.first_bit} … {below.first_bit + below.width - 1}",
+                )
+
+
+def _field_names(objects: Objects) -> Problems:
+    seen: dict[str, str] = {}
+    for i, entry in enumerate(objects):
+        for j, field in enumerate(entry.fields):
+            at = f"objects[{i}].fields[{j}].name"
+            if field.name not in READING_FIELDS:
+                yield at, f"no field is called {field.name!r}; {did_you_mean(field.name, READING_FIELDS)}"
+            elif field.name in seen:
+                yield at, f"{field.name} comes twice: it is {seen[field.name]} already"
+            else:
+                seen[field.name] = f"objects[{i}].fields[{j}]"
+
+
+def _required(objects: Objects) -> Problems:
+    sweeps = {field.name: (i, entry.sweep) for i, entry in enumerate(objects) for field in entry.fields}
+    for name in REQUIRED:
+        if name not in sweeps:
+            yield "objects", f"no object holds {name}; without it no charge can be supervised"
+        elif name in FAST and sweeps[name][1] is not Sweep.FAST:
+            yield f"objects[{sweeps[name][0]}].sweep", f"must be fast, because {name} can stop a charge"
+
+
+def _tpdos(tpdos: tuple[TpdoEntry, ...], objects: Objects) -> Problems:
+    sizes = {entry.index: entry.size for entry in objects if entry.sub == 0}
+    numbers: set[int] = set()
+    for i, tpdo in enumerate(tpdos):
+        if tpdo.number in numbers:
+            yield f"tpdos[{i}].number", f"TPDO {tpdo.number} comes twice"
+        numbers.add(tpdo.number)
+        for j, index in enumerate(tpdo.objects):
+            if index not in sizes:
+                known = ", ".join(f"0x{known:04X}" for known in sizes)
+                yield f"tpdos[{i}].objects[{j}]", f"0x{index:04X} is not one of this map's objects: {known}"
+        if (total := sum(sizes.get(index, 0) for index in tpdo.objects)) > TPDO_BYTES:
+            yield f"tpdos[{i}].objects", f"together {total} bytes; one TPDO carries at most {TPDO_BYTES}"
+
+
+MAP_RULES: tuple[Rule, ...] = (
+    Rule(_name, ("map",)),
+    Rule(_unique_objects, ("objects",)),
+    Rule(_sizes, ("objects",)),
+    Rule(_bits, ("objects",)),
+    Rule(_overlap, ("objects",)),
+    Rule(_field_names, ("objects",)),
+    Rule(_required, ("objects",)),
+    Rule(_tpdos, ("tpdos", "objects")),
+)

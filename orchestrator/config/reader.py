@@ -1,0 +1,261 @@
+"""A YAML tree into the frozen dataclasses that describe it, by their type hints and `keys.Key`.
+
+One generic walk for every file that we have. It never stops at an error: whatever is wrong becomes a finding, what is
+right is kept in `values` by its dotted path, so that the rules across keys (`rules.py`) can run on the rest.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, is_dataclass
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Final, Union, get_args, get_origin, get_type_hints
+
+from orchestrator.config import scalars
+from orchestrator.config.scalars import UnfitError
+from orchestrator.config.yamltree import Entries, Items, Mark, Node, Refused, Scalar
+from orchestrator.errors import Finding
+from orchestrator.keys import Key, Range, Source
+
+INVALID: Final = object()  #: stands for a value that is already a finding
+
+_SCALARS: dict[object, Callable[..., object]] = {
+    float: scalars.read_float,
+    int: scalars.read_int,
+    bool: scalars.read_bool,
+    str: scalars.read_str,
+    object: scalars.read_any,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One key of a record: its name in YAML, its field, its type and what is known of it."""
+
+    name: str
+    field: str
+    hint: Any
+    key: Key
+    default: object  #: INVALID if the key is required
+
+
+@cache
+def slots(record: type) -> dict[str, Slot]:
+    """The keys that a record has in YAML, in the order of its fields."""
+    hints = get_type_hints(record)
+    found = {}
+    for field in dataclasses.fields(record):
+        if "key" in field.metadata:
+            default: object = INVALID
+            if field.default is not dataclasses.MISSING:
+                default = field.default
+            elif field.default_factory is not dataclasses.MISSING:
+                default = field.default_factory()
+            name = field.name.removesuffix("_")
+            found[name] = Slot(name, field.name, hints[field.name], field.metadata["key"], default)
+    return found
+
+
+class Reader:
+    """Reads one file's tree. `findings`, `values` and `marks` fill while it goes.
+
+    `references`: for types that are named in the file but described in another one, how to get them; these return
+    `INVALID` when they have reported a finding elsewhere and raise `UnfitError` for one at the name itself.
+    """
+
+    def __init__(self, file: str, references: Mapping[type, Callable[[str], object]] | None = None) -> None:
+        self.findings: list[Finding] = []
+        self.values: dict[str, object] = {}
+        self.marks: dict[str, Mark] = {}
+        self._lines: dict[str, int] = {}
+        self._file = file
+        self._references = references or {}
+
+    def report(self, path: str, text: str) -> None:
+        """A finding at the key `path`, or at its nearest parent that is written in the file."""
+        at = path
+        while at not in self.marks and at:
+            at = _parent(at)
+        self._report(self.marks.get(at, Mark(1, 1)), f"{path}: {text}" if path else text)
+
+    def read(self, record: type, node: Node) -> object:
+        """The whole file as one record, or `INVALID`."""
+        self.marks[""] = node.mark
+        return self._record(node, record, "")
+
+    def _report(self, mark: Mark, text: str) -> None:
+        self.findings.append(Finding(self._file, mark.line, mark.column, text))
+
+    # --- by kind of type -------------------------------------------------------------------------------------------
+
+    def _value(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+        value: object
+        if get_origin(hint) in (Union, UnionType):
+            if scalars.is_null(node):
+                value = None
+            else:
+                (hint,) = (arg for arg in get_args(hint) if arg is not NoneType)
+                value = self._value(node, hint, path, key)
+        elif isinstance(node, Refused):
+            value = INVALID
+        elif hint is Range:
+            value = self._range(node, path, key)
+        elif isinstance(hint, type) and is_dataclass(hint) and hint not in self._references:
+            value = self._record(node, hint, path)
+        elif get_origin(hint) is tuple:
+            value = self._items(node, get_args(hint)[0], path, key)
+        elif get_origin(hint) is Mapping:
+            value = self._mapping(node, get_args(hint)[1], path, key)
+        else:
+            value = self._scalar(node, hint, path, key)
+        if value is not INVALID:
+            self.values[path] = value
+        return value
+
+    def _scalar(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+        if not isinstance(node, Scalar):
+            self._report(node.mark, f"{path}: needs one value here, not {_kind(node)}: {key.about}")
+            return INVALID
+        try:
+            if node.plain and not node.text:
+                raise UnfitError(f"needs a value: {key.about}")
+            if scalars.is_null(node) and hint is not object:
+                raise UnfitError(f"cannot be null: {key.about}")
+            if hint in self._references:
+                return self._references[hint](node.text)
+            if hint is Path:
+                return Path(self._file).parent / scalars.read_str(node, key)
+            if isinstance(hint, type) and issubclass(hint, Enum):
+                return scalars.read_enum(node, hint)
+            return _SCALARS[hint](node, key)
+        except UnfitError as error:
+            self.report(path, str(error))
+            return INVALID
+
+    def _range(self, node: Node, path: str, key: Key) -> object:
+        if not isinstance(node, Items) or len(node.items) != 2:
+            self._report(node.mark, f"{path}: write [low, high]: {key.about}")
+            return INVALID
+        low, high = (self._element(item, float, f"{path}[{i}]", key) for i, item in enumerate(node.items))
+        if not (isinstance(low, float) and isinstance(high, float)):
+            return INVALID
+        if low < high:
+            return Range(low, high)
+        self._report(node.mark, f"{path}: [low, high] with low below high, not [{low:g}, {high:g}]")
+        return INVALID
+
+    def _items(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+        if not isinstance(node, Items):
+            self.report(path, f"needs a list: {key.about}")
+            return INVALID
+        if not node.items:
+            self.report(path, f"needs at least one item: {key.about}")
+            return INVALID
+        values = tuple(self._element(item, hint, f"{path}[{i}]", key) for i, item in enumerate(node.items))
+        return INVALID if INVALID in values else values
+
+    def _element(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+        self.marks[path] = node.mark
+        self._lines[path] = node.mark.line
+        return self._value(node, hint, path, key)
+
+    def _mapping(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+        if not isinstance(node, Entries) or not node.entries:
+            self.report(path, f"needs names with their values: {key.about}")
+            return INVALID
+        values = {}
+        for name, value in node.entries:
+            values[name.text] = self._entry(name, value, hint, f"{path}.{name.text}", key)
+        return INVALID if INVALID in values.values() else values
+
+    def _entry(self, name: Scalar, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - as above
+        self.marks[path] = node.mark if node.mark.line == name.mark.line and not _empty(node) else name.mark
+        self._lines[path] = name.mark.line
+        return self._value(node, hint, path, key)
+
+    # --- records ---------------------------------------------------------------------------------------------------
+
+    def _record(self, node: Node, record: type, path: str) -> object:
+        known = slots(record)
+        if isinstance(node, Refused):
+            return INVALID
+        if not isinstance(node, Entries):
+            self.report(path, f"needs the keys {', '.join(known)}")
+            return INVALID
+        given = {name.text for name, _ in node.entries}
+        values: dict[str, object] = {}
+        for name, value in node.entries:
+            slot = known.get(name.text) or self._unknown(name, record, given | set(values), path)
+            if slot is not None:
+                values[slot.name] = self._entry(name, value, slot.hint, _join(path, slot.name), slot.key)
+        for slot in known.values():
+            if slot.name not in values:
+                values[slot.name] = self._absent(slot, path)
+        if INVALID in values.values():
+            return INVALID
+        return self._build(record, {known[name].field: value for name, value in values.items()}, path)
+
+    def _unknown(self, name: Scalar, record: type, taken: set[str], path: str) -> Slot | None:
+        """Says what an unknown key may have meant; if that is still free, its value is read as such."""
+        known = slots(record)
+        near = scalars.nearest(name.text, known)
+        hint = f"did you mean {near}? " if near else ""
+        inner = _places(record, frozenset(self._references))
+        where = [place for place in inner if place.rpartition(".")[2] == name.text]
+        if where:
+            hint = f"it belongs below {' or '.join(place.rpartition('.')[0] for place in where)}, indented. "
+        at = f" in {path}" if path else ""
+        self._report(name.mark, f"unknown key {name.text!r}{at}; {hint}Allowed here: {', '.join(known)}")
+        return known[near] if near and near not in taken and not where else None
+
+    def _absent(self, slot: Slot, path: str) -> object:
+        if slot.default is INVALID:
+            about = f"{slot.key.about}, in {slot.key.unit}" if slot.key.unit else slot.key.about
+            self.report(path, f"the key {slot.name!r} is missing: {about}")
+        else:
+            self._default(slot.default, _join(path, slot.name))
+        return slot.default
+
+    def _default(self, value: object, path: str) -> None:
+        self.values[path] = value
+        if is_dataclass(value) and not isinstance(value, (type, Range)):
+            for slot in slots(type(value)).values():
+                self._default(getattr(value, slot.field), _join(path, slot.name))
+
+    def _build(self, record: type, values: dict[str, object], path: str) -> object:
+        if any(field.name == "source" for field in dataclasses.fields(record)):
+            prefix = f"{path}." if path else ""
+            lines = {at.removeprefix(prefix): line for at, line in self._lines.items() if at.startswith(prefix)}
+            values["source"] = Source(self._file, lines)
+        return record(**values)
+
+
+@cache
+def _places(record: type, elsewhere: frozenset[type], prefix: str = "") -> tuple[str, ...]:
+    """Dotted paths of all keys below a record's own ones, without those of other files."""
+    found: list[str] = []
+    for slot in slots(record).values():
+        for inner in (slot.hint, *get_args(slot.hint)):
+            if isinstance(inner, type) and is_dataclass(inner) and inner not in {Range, *elsewhere}:
+                below = _join(prefix, slot.name)
+                found += [f"{below}.{name}" for name in slots(inner)]
+                found += _places(inner, elsewhere, below)
+    return tuple(found)
+
+
+def _parent(path: str) -> str:
+    return path[: max(path.rfind("."), path.rfind("["), 0)]
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+def _empty(node: Node) -> bool:
+    return isinstance(node, Scalar) and node.plain and not node.text
+
+
+def _kind(node: Node) -> str:
+    return "a list" if isinstance(node, Items) else "a group of keys"

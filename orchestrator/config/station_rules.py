@@ -1,0 +1,212 @@
+"""What must hold between the keys of one station, and between it and the policies and maps that it names."""
+
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+
+from orchestrator.config.names import name_problem
+from orchestrator.config.policy import Policy
+from orchestrator.config.rules import Problems, Rule, problems
+from orchestrator.config.scalars import did_you_mean, nearest
+from orchestrator.keys import Range
+from orchestrator.protocol.objects import ObjectMap
+
+MAX_BAYS = 128
+STEPS = 5  #: the charger has five current-limit steps (protocol 2/2, §4.2)
+BITRATES = (10_000, 1_000_000)  #: bit/s, CiA 301
+SOCKET_PATH_MAX = 107  #: bytes, Linux' sun_path without its closing 0
+SIMULATED = ("virtual", "udp_multicast")  #: buses without a wire, hence without a bit rate
+#: python-can's own; others may come from its plug-ins, so that an unlike name is let through.
+INTERFACES = (
+    "canalystii",
+    "cantact",
+    "etas",
+    "gs_usb",
+    "iscan",
+    "ixxat",
+    "kvaser",
+    "neousys",
+    "neovi",
+    "nican",
+    "nixnet",
+    "pcan",
+    "robotell",
+    "seeedstudio",
+    "serial",
+    "slcan",
+    "socketcan",
+    "socketcand",
+    "systec",
+    "udp_multicast",
+    "usb2can",
+    "vector",
+    "virtual",
+)
+
+Values = Mapping[str, object]
+
+
+def station_problems(values: Values) -> Problems:
+    """All that the rules find in one station; what is a finding already is left out."""
+    yield from problems(_STATION_RULES, values)
+    bays = _bays(values)
+    for path, bay in bays.items():
+        for at, text in problems(_BAY_RULES, bay):
+            yield f"{path}.{at}", text
+    if len(bays) > MAX_BAYS:
+        yield "bays", f"{len(bays)} bays; one gateway serves at most {MAX_BAYS}"
+    for name, identity, text in _UNIQUE:
+        yield from _unique(bays, name, identity, text)
+    if isinstance(buses := values.get("can"), Mapping):
+        for path, bay in bays.items():
+            if (bus := bay.get("battery.can")) is not None and bus not in buses:
+                yield f"{path}.battery.can", f"the station has no CAN bus {bus!r}; {did_you_mean(str(bus), buses)}"
+
+
+def _bays(values: Values) -> dict[str, dict[str, object]]:
+    bays: dict[str, dict[str, object]] = {}
+    for path, value in values.items():
+        if match := re.fullmatch(r"(bays\[\d+\])\.(.+)", path):
+            bays.setdefault(match[1], {})[match[2]] = value
+    return bays
+
+
+# --- between bays ----------------------------------------------------------------------------------------------------
+
+
+def _name(bay: Values) -> Iterator[object]:
+    if (name := bay.get("name")) is not None:
+        yield str(name).casefold()
+
+
+def _port(bay: Values) -> Iterator[object]:
+    """The device behind the port's name, so that two names of one adapter are found out."""
+    if (port := bay.get("charger.port")) is not None:
+        yield os.path.realpath(str(port))
+
+
+def _node(bay: Values) -> Iterator[object]:
+    bus, node_id = bay.get("battery.can"), bay.get("battery.node_id")
+    if bus is not None and node_id is not None:
+        yield bus, node_id
+
+
+_UNIQUE: tuple[tuple[str, Callable[[Values], Iterable[object]], str], ...] = (
+    ("name", _name, "{bay} has this name already; each bay needs its own"),
+    ("charger.port", _port, "{bay} is on this port already; each charger needs its own port (its address is fixed)"),
+    ("battery.node_id", _node, "{bay} has this node id on the same bus already; set the BMU's switch to another"),
+)
+
+
+def _unique(bays: Mapping[str, Values], at: str, identity: Callable[[Values], Iterable[object]], text: str) -> Problems:
+    seen: dict[object, str] = {}
+    for path, bay in bays.items():
+        for key in identity(bay):
+            first = seen.setdefault(key, path)
+            if first != path:
+                name = bays[first].get("name")
+                yield f"{path}.{at}", text.format(bay=f"{first} ({name})" if name else first)
+
+
+# --- one station -----------------------------------------------------------------------------------------------------
+
+
+def _station_name(name: str) -> Problems:
+    if problem := name_problem(name):
+        yield "station", problem
+
+
+def _buses(buses: Mapping[str, Mapping[str, object]]) -> Problems:
+    for name, bus in buses.items():
+        yield from ((f"can.{name}{at}", text) for at, text in _bus(bus))
+
+
+def _bus(bus: Mapping[str, object]) -> Problems:
+    interface, bitrate = bus.get("interface"), bus.get("bitrate")
+    if not isinstance(interface, str):
+        yield "", "the key 'interface' is missing: which of python-can's interfaces, e.g. socketcan"
+    elif interface not in INTERFACES and (near := nearest(interface, INTERFACES)):
+        yield ".interface", f"{interface!r} is not an interface of python-can; did you mean {near}?"
+    if bitrate is None:
+        if interface not in SIMULATED:
+            yield "", "the key 'bitrate' is missing: the bus's bit/s (the BMU's document does not say it), e.g. 250000"
+    elif not isinstance(bitrate, int) or not BITRATES[0] <= bitrate <= BITRATES[1]:
+        yield ".bitrate", f"{bitrate!r} is no bit rate; in bit/s, {BITRATES[0]} … {BITRATES[1]}, e.g. 250000"
+
+
+def _socket(socket: Path) -> Problems:
+    length = len(os.fsencode(socket.absolute()))
+    if length > SOCKET_PATH_MAX:
+        yield "control.socket", f"the whole path has {length} bytes; Linux allows a socket {SOCKET_PATH_MAX}"
+
+
+_STATION_RULES: tuple[Rule, ...] = (
+    Rule(_station_name, ("station",)),
+    Rule(_buses, ("can",)),
+    Rule(_socket, ("control.socket",)),
+)
+
+
+# --- one bay ---------------------------------------------------------------------------------------------------------
+
+
+def _bay_name(name: str) -> Problems:
+    if problem := name_problem(name):
+        yield "name", problem
+
+
+def _steps(steps_a: tuple[float, ...]) -> Problems:
+    if len(steps_a) != STEPS:
+        yield "charger.steps_a", f"{len(steps_a)} values; the charger has {STEPS} current-limit steps, lowest first"
+    for i, (lower, upper) in enumerate(pairwise(steps_a), start=1):
+        if upper <= lower:
+            yield f"charger.steps_a[{i}]", f"{upper:g} A must be above the step before, {lower:g} A"
+
+
+def _lowest_step(steps_a: tuple[float, ...], current_a: float) -> Problems:
+    if steps_a[0] > current_a:
+        yield (
+            "charger.steps_a[0]",
+            f"even the lowest step, {steps_a[0]:g} A, is above limits.current_a, {current_a:g} A: "
+            "no step would be allowed",
+        )
+
+
+def _voltage(policy: Policy, voltage_v: float) -> Problems:
+    if policy.pack.voltage_v.high > voltage_v:
+        yield (
+            "policy",
+            f"{policy.policy} allows {policy.pack.voltage_v.high:g} V ({policy.source.at('pack.voltage_v')}), "
+            f"this bay's limits.voltage_v only {voltage_v:g} V",
+        )
+
+
+def _temperature(policy: Policy, limits: Range) -> Problems:
+    pack = policy.pack.temperature_c
+    if pack.low < limits.low or pack.high > limits.high:
+        yield (
+            "policy",
+            f"{policy.policy} allows {pack} °C ({policy.source.at('pack.temperature_c')}), "
+            f"this bay's limits.temperature_c only {limits} °C",
+        )
+
+
+def _tpdos(object_map: ObjectMap, _tpdo_s: float) -> Problems:
+    if not object_map.tpdos:
+        yield (
+            "battery.tpdo_s",
+            f"the object map {object_map.map} ({object_map.source.file}) does not say what the TPDOs carry; "
+            "write null, or add `tpdos` to a map of your own",
+        )
+
+
+_BAY_RULES: tuple[Rule, ...] = (
+    Rule(_bay_name, ("name",)),
+    Rule(_steps, ("charger.steps_a",)),
+    Rule(_lowest_step, ("charger.steps_a", "limits.current_a")),
+    Rule(_voltage, ("policy", "limits.voltage_v")),
+    Rule(_temperature, ("policy", "limits.temperature_c")),
+    Rule(_tpdos, ("battery.map", "battery.tpdo_s")),
+)
