@@ -1,0 +1,42 @@
+# Every target does its own set-up: it finds a Python, makes .venv and fills it from the locked lists in requirements/.
+# The set-up is stamped, so the second call costs nothing. `make PYTHON=/usr/bin/python3.12 test` chooses the Python.
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check format bench lock clean
+
+BIN := .venv/bin
+SETUP := pyproject.toml requirements/install.sh
+
+help:  ## show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+
+demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, about a minute
+	$(BIN)/orchestrator demo $(ARGS)
+
+test: .venv/dev.stamp  ## all tests; ARGS='tests/core -k taper' chooses some
+	$(BIN)/python -m pytest $(ARGS)
+
+check: .venv/dev.stamp  ## format, lint, types, import rules, tests with branch coverage
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest tests/test_imports.py
+	$(BIN)/python -m pytest --cov --cov-report=term-missing $(ARGS)
+
+format: .venv/dev.stamp  ## rewrite the files as `make check` wants them
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: .venv/demo.stamp  ## measure reaction times, memory and CPU beside a naive controller
+	$(BIN)/python -m benchmarks $(ARGS)
+
+lock: .venv/dev.stamp  ## choose the dependencies' versions anew: requirements/*.txt
+	sh requirements/lock.sh
+
+clean:  ## remove everything that the other targets made
+	rm -rf .venv build dist *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.venv/demo.stamp .venv/dev.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
+	PYTHON='$(PYTHON)' sh requirements/install.sh $*
+	touch $@

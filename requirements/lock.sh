@@ -1,0 +1,28 @@
+#!/bin/sh
+# Choose exact versions, with the hash of every file of each release, so that one list serves every Python and machine.
+# Run by `make lock`, which leaves the choice to the newest versions that pyproject.toml and dev.in allow.
+set -eu
+cd "$(dirname "$0")/.."
+
+tools=$(mktemp -d)
+trap 'rm -rf "$tools"' EXIT
+.venv/bin/python -m venv "$tools"
+"$tools/bin/pip" install --quiet 'pip-tools==7.6.2'
+
+lock() { # OUTPUT SOURCE [OPTION]...
+    output=requirements/$1
+    shift
+    # No option of pip's configuration, no index and no path of this machine goes into the list.
+    CUSTOM_COMPILE_COMMAND='make lock' "$tools/bin/pip-compile" --quiet --no-config --rebuild \
+        --generate-hashes --allow-unsafe --strip-extras --no-annotate \
+        --no-emit-options --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
+        --output-file "$output" "$@"
+    sed -i 's/^# The following packages are considered.*/# builds the package/' "$output"
+}
+
+# Each list is part of the next. setuptools, which builds the package, is in all of them: an installation fetches
+# nothing that its list does not name.
+rm -f requirements/*.txt
+lock runtime.txt pyproject.toml --build-deps-for=editable
+lock demo.txt pyproject.toml --build-deps-for=editable --extra=demo --constraint=requirements/runtime.txt
+lock dev.txt requirements/dev.in
