@@ -1,0 +1,152 @@
+"""The serial port to a charger: the only user of pyserial. Whatever goes wrong here becomes one LinkError.
+
+pyserial is used for what it does well: opening, locking and setting up the port. Around it stand the answers to its
+traps: waiting is done with poll(), since its own write spins on a full line and its timeouts reconfigure the port.
+"""
+
+import errno
+import os
+import select
+import termios
+import time
+from typing import Self
+
+import serial
+from serial.rs485 import RS485Settings
+
+from orchestrator.errors import LinkError
+
+BAUD = 19200  #: 8 data bits, no parity, 1 stop bit, no flow control (protocol 2/2, §2.2.2)
+BYTE_S = 10 / BAUD  #: start bit, 8 data bits, stop bit: 0.52 ms
+WRITE_TIMEOUT_S = 0.2  #: one slot; an idle line takes a frame at once, since the kernel buffers it
+
+_READ_SIZE = 4096  #: more than a line can bring in several slots
+#: What pyserial 3.5 raises when a port is unplugged, closed, odd or not there (SerialException is an OSError).
+_FAILURES = (OSError, termios.error, TypeError, ValueError)
+
+_MISSING = "no such port: check that the adapter is plugged in, and the name (ls -l /dev/serial/by-path)"
+_GONE = "the adapter was unplugged or lost its power, or another program reads this port; plug it in again"
+_BUSY = "in use: another program holds it, or two bays name the same port; close the other one (lsof shows it)"
+_FORBIDDEN = "permission denied: add the user that runs this to the group dialout, then log in again"
+_NO_PORT = "it is no serial port: check the name in the station file (ls -l /dev/serial/by-path)"
+_STALLED = f"stalled, it took nothing for {WRITE_TIMEOUT_S:g} s; unplug the adapter and plug it in again"
+_FULL = "too many open files: raise the limit of the service (LimitNOFILE)"
+
+#: What a person has to know and do, by what the kernel says.
+_SENTENCES = {
+    errno.ENOENT: _MISSING,
+    errno.EACCES: _FORBIDDEN,
+    errno.EPERM: _FORBIDDEN,
+    errno.EAGAIN: _BUSY,  # its lock (flock) is taken
+    errno.EBUSY: _BUSY,
+    errno.EIO: _GONE,
+    errno.ENXIO: _GONE,
+    errno.ENODEV: _GONE,
+    errno.ENOTTY: _NO_PORT,
+    errno.EINVAL: _NO_PORT,
+    errno.EISDIR: _NO_PORT,
+    errno.EMFILE: _FULL,
+    errno.ENFILE: _FULL,
+}
+
+
+class SerialLine:
+    """One open serial port, used by one thread. Every method but `close` raises LinkError once the port fails."""
+
+    def __init__(self, port: serial.Serial) -> None:
+        self._port = port
+        self._fd: int = port.fileno()
+        self._readable = select.poll()
+        self._readable.register(self._fd, select.POLLIN)
+        self._writable = select.poll()
+        self._writable.register(self._fd, select.POLLOUT)
+
+    @classmethod
+    def open(cls, path: str, *, kernel_rs485: bool = False) -> Self:
+        """Open `path` for us alone, and forget what came in before.
+
+        `kernel_rs485`: let the serial driver switch the line's direction (RTS high while sending). Not needed for
+        adapters that switch by themselves. LinkError says what is wrong and what to do.
+        """
+        port = serial.Serial(None, baudrate=BAUD, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+        # exclusive is a flock: it keeps a second service out, yet not a stop tool. TIOCEXCL would, so it is not set.
+        port.port = path
+        try:
+            port.open()
+        except _FAILURES as error:
+            raise LinkError(f"{path}: {_sentence(error, otherwise='cannot be opened')}") from error
+        if kernel_rs485:
+            try:
+                port.rs485_mode = RS485Settings()
+            except _FAILURES as error:
+                port.close()
+                raise LinkError(
+                    f"{path}: its driver cannot switch the direction of an RS-485 line (rs485: kernel); "
+                    "use an adapter that switches by itself, with rs485: off"
+                ) from error
+        return cls(port)
+
+    def write(self, data: bytes) -> None:
+        """Hand `data` to the port; it is on the wire `BYTE_S` a byte later. LinkError if the line takes nothing."""
+        try:
+            # Asked first: on a full line pyserial's write burns the processor until its timeout.
+            if not self._writable.poll(WRITE_TIMEOUT_S * 1000):
+                raise serial.SerialTimeoutException
+            self._port.write(data)
+        except serial.SerialTimeoutException as error:
+            self._forget_output()
+            raise LinkError(f"{self._port.port}: {_STALLED}") from error
+        except _FAILURES as error:
+            raise self._failed(error) from error
+
+    def read(self, timeout_s: float, expected: int = 0) -> bytes:
+        """Whatever has come in, at the latest after `timeout_s`; b"" if nothing has.
+
+        `expected`: so many bytes are still to cross the wire, ours and theirs. Sleeping over their time, rather than
+        waking for every few of them, costs a third of the processor time.
+        """
+        pause_s = min(timeout_s, expected * BYTE_S)
+        if pause_s > 0:
+            time.sleep(pause_s)
+        try:
+            if self._readable.poll(max(0.0, timeout_s - pause_s) * 1000):
+                return self._port.read(_READ_SIZE)
+        except _FAILURES as error:
+            raise self._failed(error) from error
+        return b""
+
+    def fileno(self) -> int:
+        """The open file, for whom it is to be shared with. LinkError once closed."""
+        try:
+            return self._port.fileno()
+        except _FAILURES as error:
+            raise self._failed(error) from error
+
+    def close(self) -> None:
+        """Give the port back; what was written is still sent. May be called again, and after any failure."""
+        try:
+            self._port.close()
+        except _FAILURES:
+            # The port is gone already, and pyserial has forgotten it.
+            self._port.is_open = False
+
+    def _forget_output(self) -> None:
+        """Drop what a stalled line has not sent: an old command must not come out minutes later."""
+        try:
+            self._port.reset_output_buffer()
+        except _FAILURES:
+            return  # then there is no port left that could send it
+
+    def _failed(self, error: Exception) -> LinkError:
+        return LinkError(f"{self._port.port}: {_sentence(error, otherwise=_GONE)}")
+
+
+def _sentence(error: BaseException, *, otherwise: str) -> str:
+    """The words for an error, by its errno: often pyserial keeps that only in the error's cause or first argument."""
+    cause: BaseException | None = error
+    while cause is not None:
+        number = getattr(cause, "errno", None) or (cause.args[0] if cause.args else None)
+        if isinstance(number, int):
+            return _SENTENCES.get(number) or f"{otherwise} ({os.strerror(number)})"
+        cause = cause.__context__
+    return f"{otherwise} ({error})"
