@@ -18,6 +18,7 @@ class Key:
     le: float | None = None
     gt: float | None = None
     lt: float | None = None
+    is_path: bool = False  #: a text that names a device file, relative to the YAML file
 
 
 def key(
@@ -28,11 +29,12 @@ def key(
     le: float | None = None,
     gt: float | None = None,
     lt: float | None = None,
+    is_path: bool = False,
     default: Any = MISSING,  # noqa: ANN401 - as in dataclasses.field
     default_factory: Callable[[], Any] | None = None,
 ) -> Any:  # noqa: ANN401 - as dataclasses.field, so that the field keeps its own type
     """A dataclass field that a YAML key fills. Without a default the key is required."""
-    metadata = {"key": Key(about, unit, ge, le, gt, lt)}
+    metadata = {"key": Key(about, unit, ge, le, gt, lt, is_path)}
     if default_factory is not None:
         return field(default_factory=default_factory, metadata=metadata)
     return field(default=default, metadata=metadata)

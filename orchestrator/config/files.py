@@ -9,7 +9,7 @@ from orchestrator.config.map_rules import MAP_RULES
 from orchestrator.config.policy import Policy
 from orchestrator.config.policy_rules import POLICY_RULES
 from orchestrator.config.rules import Problems, problems
-from orchestrator.config.scalars import UnfitError, did_you_mean, nearest
+from orchestrator.config.scalars import UnfitError, did_you_mean, nearest, shown
 from orchestrator.config.shipped import shipped_dir, shipped_names
 from orchestrator.config.station import Station
 from orchestrator.config.station_rules import station_problems
@@ -53,8 +53,11 @@ def find(kind: Kind, text: str, base: Path) -> Place:
     """
     if "/" in text or text.endswith((".yaml", ".yml")):
         path = Path(os.path.normpath(base / text))
-        if path.is_file():
-            return place(path)
+        try:
+            if path.is_file():
+                return place(path)
+        except OSError as error:  # e.g. a name that is too long
+            raise UnfitError(f"{shown(text)}: {error.strerror}") from None
         raise UnfitError(f"there is no file {path}{_instead(kind, path)}")
     names = shipped_names(kind.folder)
     if text in names:

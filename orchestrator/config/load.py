@@ -1,14 +1,15 @@
 """From file names to a `Station`, a `Policy` or an `ObjectMap`; or to every finding in them, at once."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
 from orchestrator.config.files import KINDS, MAP, POLICY, STATION, Kind, Place, find, place
 from orchestrator.config.policy import Policy
-from orchestrator.config.reader import INVALID, Reader
+from orchestrator.config.reader import Reader
 from orchestrator.config.scalars import UnfitError, nearest
+from orchestrator.config.schema import INVALID
 from orchestrator.config.station import Station
 from orchestrator.config.yamltree import MAX_BYTES, Entries, Node, parse
 from orchestrator.errors import ConfigError, Finding
@@ -46,7 +47,11 @@ def check(paths: Iterable[str | Path]) -> list[Finding]:
 
 def _load(kind: Kind, where: Place, wanted: type[T]) -> T:
     loader = _Loader([where])
-    value = loader.load(kind, where)
+    value: object = INVALID
+    try:
+        value = loader.load(kind, where)
+    except UnfitError as error:
+        loader.findings.append(Finding(where.shown, 1, 1, str(error)))
     if loader.findings or not isinstance(value, wanted):
         raise ConfigError(tuple(sorted(set(loader.findings))))
     return value
@@ -75,38 +80,35 @@ class _Loader:
         node = self._tree(where)
         if node is None:
             return
-        keys = [name.text for name, _ in node.entries] if isinstance(node, Entries) else []
-        kinds = [kind for kind in KINDS if kind.key in keys]
-        if kinds:
+        if kinds := _kinds(node):
             self.load(kinds[0], where)
             return
+        keys = [name.text for name, _ in node.entries] if isinstance(node, Entries) else []
         near = next((f" ({key!r}: did you mean {found}?)" for key in keys if (found := _kind_near(key))), "")
         text = f"this is no file of ours: it has none of the keys policy, station, map{near}"
         self.findings.append(Finding(self._name(where), node.mark.line, node.mark.column, text))
 
     def load(self, kind: Kind, where: Place) -> object:
-        """The record in a file, or `INVALID` if anything in it, or in a file that it names, is wrong."""
+        """The record in a file, or `INVALID` if anything in it, or in a file that it names, is wrong.
+
+        Raises `UnfitError` if the file is of another kind.
+        """
         real = (os.path.realpath(where.path), kind.key)
         if real not in self._loaded:
-            self._loaded[real] = INVALID  # a file cannot contain itself, but nothing shall depend on that
-            self._loaded[real] = self._read(kind, where)
+            node = self._tree(where)
+            others = _kinds(node)
+            if others and kind not in others:
+                raise UnfitError(f"{self._name(where)} is for a {others[0].about}; needed is one for a {kind.about}")
+            self._loaded[real] = INVALID if node is None else self._read(kind, where, node)
         return self._loaded[real]
 
-    def _read(self, kind: Kind, where: Place) -> object:
-        node = self._tree(where)
-        if node is None:
-            return INVALID
-        shown = self._name(where)
+    def _read(self, kind: Kind, where: Place, node: Node) -> object:
         base = where.path.parent
-        reader = Reader(
-            shown,
-            {
-                Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),
-                ObjectMap: lambda text: self.load(MAP, find(MAP, text, base)),
-            }
-            if kind is STATION
-            else {},
-        )
+        named: dict[type, Callable[[str], object]] = {
+            Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),
+            ObjectMap: lambda text: self.load(MAP, find(MAP, text, base)),
+        }
+        reader = Reader(self._name(where), named if kind is STATION else {})
         value = reader.read(kind.record, node)
         for path, text in kind.rules(reader.values):
             reader.report(path, text)
@@ -128,6 +130,12 @@ class _Loader:
 
     def _name(self, where: Place) -> str:
         return self._shown.setdefault(os.path.realpath(where.path), where.shown)
+
+
+def _kinds(node: Node | None) -> list[Kind]:
+    """Which kinds of file this may be, by its keys."""
+    keys = {name.text for name, _ in node.entries} if isinstance(node, Entries) else set()
+    return [kind for kind in KINDS if kind.key in keys]
 
 
 def _kind_near(key: str) -> str:

@@ -10,8 +10,8 @@ class Pack:
     """The battery that this policy is for. Outside of these values no current flows."""
 
     cells_in_series: int = key("cells in series; the voltages of this file are checked against it", ge=1, le=200)
-    voltage_v: Range = key("pack voltage: below it a charge is refused, above it is over-voltage", unit="V")
-    temperature_c: Range = key("outside of it charging pauses until well inside again", unit="°C")
+    voltage_v: Range = key("pack voltage: below it a charge is refused, above it is over-voltage", unit="V", gt=0)
+    temperature_c: Range = key("outside of it charging pauses until well inside again", unit="°C", ge=-30, le=55)
     soh_min_pct: float = key("a pack with less health is refused", unit="%", ge=0, le=100)
 
 

@@ -6,20 +6,20 @@ right is kept in `values` by its dotted path, so that the rules across keys (`ru
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, is_dataclass
+from dataclasses import is_dataclass
 from enum import Enum
-from functools import cache
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, Final, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, get_args, get_origin
 
 from orchestrator.config import scalars
 from orchestrator.config.scalars import UnfitError
+from orchestrator.config.schema import INVALID, Slot, join, places, slots
 from orchestrator.config.yamltree import Entries, Items, Mark, Node, Refused, Scalar
 from orchestrator.errors import Finding
 from orchestrator.keys import Key, Range, Source
 
-INVALID: Final = object()  #: stands for a value that is already a finding
+MAX_FINDINGS = 200  #: in one file; the rest can wait until these are mended
 
 _SCALARS: dict[object, Callable[..., object]] = {
     float: scalars.read_float,
@@ -28,34 +28,6 @@ _SCALARS: dict[object, Callable[..., object]] = {
     str: scalars.read_str,
     object: scalars.read_any,
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Slot:
-    """One key of a record: its name in YAML, its field, its type and what is known of it."""
-
-    name: str
-    field: str
-    hint: Any
-    key: Key
-    default: object  #: INVALID if the key is required
-
-
-@cache
-def slots(record: type) -> dict[str, Slot]:
-    """The keys that a record has in YAML, in the order of its fields."""
-    hints = get_type_hints(record)
-    found = {}
-    for field in dataclasses.fields(record):
-        if "key" in field.metadata:
-            default: object = INVALID
-            if field.default is not dataclasses.MISSING:
-                default = field.default
-            elif field.default_factory is not dataclasses.MISSING:
-                default = field.default_factory()
-            name = field.name.removesuffix("_")
-            found[name] = Slot(name, field.name, hints[field.name], field.metadata["key"], default)
-    return found
 
 
 class Reader:
@@ -86,7 +58,8 @@ class Reader:
         return self._record(node, record, "")
 
     def _report(self, mark: Mark, text: str) -> None:
-        self.findings.append(Finding(self._file, mark.line, mark.column, text))
+        if len(self.findings) < MAX_FINDINGS:
+            self.findings.append(Finding(self._file, mark.line, mark.column, text))
 
     # --- by kind of type -------------------------------------------------------------------------------------------
 
@@ -125,8 +98,8 @@ class Reader:
                 raise UnfitError(f"cannot be null: {key.about}")
             if hint in self._references:
                 return self._references[hint](node.text)
-            if hint is Path:
-                return Path(self._file).parent / scalars.read_str(node, key)
+            if hint is Path or key.is_path:
+                return hint(Path(self._file).parent / scalars.read_path(node, key))
             if isinstance(hint, type) and issubclass(hint, Enum):
                 return scalars.read_enum(node, hint)
             return _SCALARS[hint](node, key)
@@ -136,7 +109,8 @@ class Reader:
 
     def _range(self, node: Node, path: str, key: Key) -> object:
         if not isinstance(node, Items) or len(node.items) != 2:
-            self._report(node.mark, f"{path}: write [low, high]: {key.about}")
+            meant = scalars.range_meant(node.text) if isinstance(node, Scalar) else ""
+            self.report(path, f"write {meant or '[low, high]'}: {key.about}")
             return INVALID
         low, high = (self._element(item, float, f"{path}[{i}]", key) for i, item in enumerate(node.items))
         if not (isinstance(low, float) and isinstance(high, float)):
@@ -148,7 +122,7 @@ class Reader:
 
     def _items(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
         if not isinstance(node, Items):
-            self.report(path, f"needs a list: {key.about}")
+            self.report(path, f"needs a list, [a, b, …] or a line '- …' for each item: {key.about}")
             return INVALID
         if not node.items:
             self.report(path, f"needs at least one item: {key.about}")
@@ -189,7 +163,7 @@ class Reader:
         for name, value in node.entries:
             slot = known.get(name.text) or self._unknown(name, record, given | set(values), path)
             if slot is not None:
-                values[slot.name] = self._entry(name, value, slot.hint, _join(path, slot.name), slot.key)
+                values[slot.name] = self._entry(name, value, slot.hint, join(path, slot.name), slot.key)
         for slot in known.values():
             if slot.name not in values:
                 values[slot.name] = self._absent(slot, path)
@@ -200,9 +174,9 @@ class Reader:
     def _unknown(self, name: Scalar, record: type, taken: set[str], path: str) -> Slot | None:
         """Says what an unknown key may have meant; if that is still free, its value is read as such."""
         known = slots(record)
-        near = scalars.nearest(name.text, known)
+        near = scalars.nearest(name.text, known) if len(self.findings) < MAX_FINDINGS else ""
         hint = f"did you mean {near}? " if near else ""
-        inner = _places(record, frozenset(self._references))
+        inner = places(record, frozenset(self._references))
         where = [place for place in inner if place.rpartition(".")[2] == name.text]
         if where:
             hint = f"it belongs below {' or '.join(place.rpartition('.')[0] for place in where)}, indented. "
@@ -215,14 +189,14 @@ class Reader:
             about = f"{slot.key.about}, in {slot.key.unit}" if slot.key.unit else slot.key.about
             self.report(path, f"the key {slot.name!r} is missing: {about}")
         else:
-            self._default(slot.default, _join(path, slot.name))
+            self._default(slot.default, join(path, slot.name))
         return slot.default
 
     def _default(self, value: object, path: str) -> None:
         self.values[path] = value
         if is_dataclass(value) and not isinstance(value, (type, Range)):
             for slot in slots(type(value)).values():
-                self._default(getattr(value, slot.field), _join(path, slot.name))
+                self._default(getattr(value, slot.field), join(path, slot.name))
 
     def _build(self, record: type, values: dict[str, object], path: str) -> object:
         if any(field.name == "source" for field in dataclasses.fields(record)):
@@ -232,25 +206,8 @@ class Reader:
         return record(**values)
 
 
-@cache
-def _places(record: type, elsewhere: frozenset[type], prefix: str = "") -> tuple[str, ...]:
-    """Dotted paths of all keys below a record's own ones, without those of other files."""
-    found: list[str] = []
-    for slot in slots(record).values():
-        for inner in (slot.hint, *get_args(slot.hint)):
-            if isinstance(inner, type) and is_dataclass(inner) and inner not in {Range, *elsewhere}:
-                below = _join(prefix, slot.name)
-                found += [f"{below}.{name}" for name in slots(inner)]
-                found += _places(inner, elsewhere, below)
-    return tuple(found)
-
-
 def _parent(path: str) -> str:
     return path[: max(path.rfind("."), path.rfind("["), 0)]
-
-
-def _join(path: str, name: str) -> str:
-    return f"{path}.{name}" if path else name
 
 
 def _empty(node: Node) -> bool:

@@ -18,7 +18,10 @@ _HEX = re.compile(r"0x[\da-fA-F]+", re.ASCII)
 _NULL = re.compile(r"~|null", re.IGNORECASE)
 _TRUE = {"true", "yes", "on", "y", "1"}
 _FALSE = {"false", "no", "off", "n", "0"}
+_RANGE = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:\.\.+|…|-|–|~|to|,|;|:|/)\s*([-+]?\d+(?:\.\d+)?)", re.ASCII)
 _MAX_DIGITS = 40  #: of a number; more is nonsense
+_MAX_WORD = 64  #: that is compared with others
+_MAX_PATH = 4096  #: bytes, Linux' PATH_MAX
 
 
 class UnfitError(ValueError):
@@ -32,6 +35,8 @@ def is_null(node: object) -> bool:
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """The known word that was probably meant, or ""."""
+    if len(word) > _MAX_WORD:
+        return ""
     by_folded = {k.casefold().replace("-", "_"): k for k in known}
     found = difflib.get_close_matches(word.casefold().replace("-", "_"), by_folded, n=1, cutoff=0.6)
     return by_folded[found[0]] if found else ""
@@ -51,6 +56,8 @@ def quantity(value: float, unit: str) -> str:
 
 def allowed(key: Key) -> str:
     """The bounds of a key in words, e.g. "above 0, at most 100 %"."""
+    if key.ge is not None and key.le is not None:
+        return f"{key.ge:g} … {key.le:g} {key.unit}".rstrip()
     lower = f"at least {key.ge:g}" if key.ge is not None else f"above {key.gt:g}" if key.gt is not None else ""
     upper = f"at most {key.le:g}" if key.le is not None else f"below {key.lt:g}" if key.lt is not None else ""
     bounds = ", ".join(part for part in (lower, upper) if part)
@@ -95,10 +102,28 @@ def read_bool(node: Scalar, _key: Key) -> bool:
 
 
 def read_str(node: Scalar, key: Key) -> str:
-    """Any text that is not empty."""
-    if node.text.strip():
-        return node.text
-    raise UnfitError(f"needs a text: {key.about}")
+    """One line of text that is not empty."""
+    if not node.text.strip():
+        raise UnfitError(f"needs a text: {key.about}")
+    if not node.text.isprintable():
+        raise UnfitError("needs one line of text without control characters")
+    return node.text
+
+
+def read_path(node: Scalar, key: Key) -> str:
+    """A path; one for a device that is no more than a bare name is not believed."""
+    text = read_str(node, key)
+    if len(text) > _MAX_PATH:
+        raise UnfitError(f"a path has at most {_MAX_PATH} characters, this one {len(text)}")
+    if key.is_path and "/" not in text:
+        raise UnfitError(f"{shown(text)} is not a whole path: write e.g. /dev/{text.lower()[:_MAX_DIGITS]}")
+    return text
+
+
+def range_meant(text: str) -> str:
+    """`[low, high]` for a range that was written in another way; "" if it is none."""
+    match = _RANGE.fullmatch(text.strip()) if len(text) <= _MAX_DIGITS else None
+    return f"[{match[1]}, {match[2]}]" if match else ""
 
 
 def read_enum(node: Scalar, kind: type[Enum]) -> Enum:
@@ -112,7 +137,7 @@ def read_enum(node: Scalar, kind: type[Enum]) -> Enum:
 def read_any(node: Scalar, key: Key) -> object:
     """A value for a library that is handed it as it is: null, true/false, a number or a text."""
     if not node.plain:
-        return node.text
+        return read_str(node, key) if node.text else ""
     if is_null(node):
         return None
     if node.text in ("true", "false"):

@@ -22,7 +22,7 @@ class Rs485(StrEnum):
 class ChargerConfig:
     """One charger on one serial port (its address is always 0x90)."""
 
-    port: str = key("the serial port, best a stable name below /dev/serial/by-path")
+    port: str = key("the serial port, best a stable name below /dev/serial/by-path", is_path=True)
     control: ControlMode = key("manual (rotary switch on 1) or automatic (2 … 5: only stop and resume)")
     steps_a: tuple[float, ...] = key(
         "what the five current-limit steps mean on this charger, lowest first", unit="A", gt=0
@@ -55,7 +55,7 @@ class Limits:
 
     voltage_v: float = key("no current above this voltage, at the charger or at the pack", unit="V", gt=0, le=120)
     current_a: float = key("no step above this current", unit="A", gt=0, le=100)
-    temperature_c: Range = key("no current outside of it", unit="°C")
+    temperature_c: Range = key("no current outside of it", unit="°C", ge=-30, le=60)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

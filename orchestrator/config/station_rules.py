@@ -119,8 +119,12 @@ def _station_name(name: str) -> Problems:
 
 
 def _buses(buses: Mapping[str, Mapping[str, object]]) -> Problems:
+    seen: dict[object, str] = {}
     for name, bus in buses.items():
         yield from ((f"can.{name}{at}", text) for at, text in _bus(bus))
+        first = seen.setdefault((bus.get("interface"), bus.get("channel")), name)
+        if first != name:
+            yield f"can.{name}", f"is the same interface and channel as {first}: name each bus once"
 
 
 def _bus(bus: Mapping[str, object]) -> Problems:

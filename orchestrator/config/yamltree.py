@@ -18,6 +18,7 @@ from orchestrator.errors import Finding
 MAX_BYTES = 512 * 1024  #: 128 bays with comments are about 80 KiB
 MAX_DEPTH = 16  #: the deepest key of any of our files is at 7
 MAX_NODES = 50_000  #: 128 bays are about 6 000
+MAX_KEY = 128  #: characters
 MAX_FINDINGS = 50  #: of one kind, so that a binary file does not fill the screen
 
 #: libyaml is ten times as fast; what it refuses is read again by the pure parser, whose messages we translate.
@@ -203,6 +204,8 @@ def _unfit_key(name: Scalar) -> str:
         return "merge key <<: not allowed, write the keys out"
     if not name.text:
         return "a key is missing before ':'"
+    if len(name.text) > MAX_KEY or not name.text.isprintable():
+        return f"a key is one line of at most {MAX_KEY} characters, without control characters"
     if name.plain and _NOT_TEXT.fullmatch(name.text):
         return f"the key {name.text} is not a word in YAML: use a name, or put it in quotes"
     return ""

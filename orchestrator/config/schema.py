@@ -1,0 +1,65 @@
+"""What a record's YAML looks like: its keys, read from the dataclass once."""
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass, is_dataclass
+from functools import cache
+from typing import Any, Final, get_args, get_type_hints
+
+from orchestrator.keys import Key, Range
+
+INVALID: Final = object()  #: stands for a value that is already a finding
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One key of a record: its name in YAML, its field, its type and what is known of it."""
+
+    name: str
+    field: str
+    hint: Any
+    key: Key
+    default: object  #: INVALID if the key is required
+
+
+@cache
+def slots(record: type) -> dict[str, Slot]:
+    """The keys that a record has in YAML, in the order of its fields."""
+    hints = get_type_hints(record)
+    found = {}
+    for field in dataclasses.fields(record):
+        if "key" in field.metadata:
+            default: object = INVALID
+            if field.default is not dataclasses.MISSING:
+                default = field.default
+            elif field.default_factory is not dataclasses.MISSING:
+                default = field.default_factory()
+            name = field.name.removesuffix("_")
+            found[name] = Slot(name, field.name, hints[field.name], field.metadata["key"], default)
+    return found
+
+
+@cache
+def places(record: type, elsewhere: frozenset[type], prefix: str = "") -> tuple[str, ...]:
+    """Dotted paths of all keys below a record's own ones, without those of other files."""
+    found: list[str] = []
+    for slot in slots(record).values():
+        for inner in _types(slot.hint):
+            if is_dataclass(inner) and inner not in {Range, *elsewhere}:
+                below = join(prefix, slot.name)
+                found += [f"{below}.{name}" for name in slots(inner)]
+                found += places(inner, elsewhere, below)
+    return tuple(found)
+
+
+def _types(hint: Any) -> Iterator[type]:  # noqa: ANN401 - any type expression
+    """The plain types inside a type expression: `tuple[Band, ...] | None` → Band, None."""
+    if isinstance(hint, type) and not get_args(hint):
+        yield hint
+    for inner in get_args(hint):
+        yield from _types(inner)
+
+
+def join(path: str, name: str) -> str:
+    """The dotted path of a key below `path`."""
+    return f"{path}.{name}" if path else name
