@@ -1,0 +1,38 @@
+"""One bay as nature has it: a charger and a pack on one pair of cables. Pure: time is an argument."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from orchestrator.sim.charger import Charger
+from orchestrator.sim.pack import Pack, Readout
+
+#: Model time is cut into steps of at most this, so that pulses and the constant-voltage phase come out right.
+MAX_STEP_S = 0.1
+
+
+@dataclass(slots=True)
+class Bay:
+    """A charger and a pack; `falsify` changes what the BMU tells of it, by field of the readout."""
+
+    charger: Charger
+    pack: Pack
+    falsify: dict[str, Callable[[float], float]] = field(default_factory=dict)
+
+    def advance(self, dt_s: float) -> None:
+        """Let `dt_s` pass for both."""
+        while dt_s > 0:
+            step_s = min(dt_s, MAX_STEP_S)
+            self.pack.advance(step_s, self.charger.current_a)
+            self.charger.advance(step_s, self.pack)
+            # The pack sees the new current at once: charger and BMU are measured on one cable.
+            self.pack.current_a = self.charger.current_a
+            dt_s -= step_s
+
+    def readout(self) -> Readout:
+        """What the BMU tells, falsified or not."""
+        truth = self.pack.readout()
+        if not self.falsify:
+            return truth
+        lies: dict[str, Any] = {name: change(getattr(truth, name)) for name, change in self.falsify.items()}
+        return replace(truth, **lies)

@@ -1,0 +1,144 @@
+"""An emulated BMU: `durand` answers CANopen, a pack model says what.
+
+durand is a CANopen responder that shares nothing with the `canopen` library, so that our client is not tested by its
+own makers. Two parts are written here. TPDOs: durand sends them on every change and knows no event timer (sub 5), while
+the BMU's manual has nothing but the timer (§2.5). And what a reset forgets: durand keeps all values through it.
+"""
+
+import asyncio
+from collections.abc import Callable
+from enum import Enum
+from functools import partial
+
+from durand import DatatypeEnum, Node, Record, Variable  # type: ignore[import-untyped]  # it has no annotations
+from durand.node import NodeCapabilities  # type: ignore[import-untyped]  # as above
+from durand.services.nmt import StateEnum  # type: ignore[import-untyped]  # as above
+
+from orchestrator.sim.can_wire import CanWire, NodePort
+from orchestrator.sim.pack import Readout
+
+HEARTBEAT, TPDO_PARAMETERS, TPDO_COB_ID = 0x1017, 0x1800, 0x180
+EVENT_TIMER = 5  #: sub-index of a TPDO's period in ms
+
+#: The objects that each TPDO carries, whole and in order.
+TPDOS = ((0x6000, 0x6001), (0x6002, 0x6003), (0x6004,))
+
+#: "Not available" in TTF and TTE, as gas gauges have it.
+NO_MINUTES = 0xFFFF
+
+
+class Layout(Enum):
+    """How the fields lie in the words 0x6001 … 0x6003; the document leaves it open."""
+
+    FIRST_HIGH = "first-named field in the most significant bits, as the documented sample of 0x6000 has it"
+    FIRST_LOW = "first-named field in the least significant bits"
+
+
+def words(readout: Readout, layout: Layout) -> dict[int, int]:
+    """The five objects as 32-bit words. Values that do not fit are cut to the field's width, as firmware would."""
+    volts, amps = round(readout.voltage_v * 100), round(readout.current_a * 100)
+    minutes = [
+        NO_MINUTES if value is None else min(round(value), NO_MINUTES - 1)
+        for value in (readout.time_to_full_min, readout.time_to_empty_min)
+    ]
+    high = layout is Layout.FIRST_HIGH
+    return {
+        0x6000: _word([(volts, 16), (amps, 16)], first_high=True),  # the sample fixes this one
+        0x6001: _word([(readout.status, 16), (minutes[0], 16)], first_high=high),
+        0x6002: _word([(minutes[1], 16), (round(readout.soc_pct), 8), (round(readout.soh_pct), 8)], first_high=high),
+        0x6003: _word(
+            [(round(readout.remaining_ah * 100), 16), (round(readout.available_wh * 10), 16)], first_high=high
+        ),
+        0x6004: round(readout.temperature_c * 10) & 0xFFFF,
+    }
+
+
+def _word(fields: list[tuple[int, int]], *, first_high: bool) -> int:
+    word = 0
+    for value, width in fields if first_high else reversed(fields):
+        word = word << width | value & (1 << width) - 1
+    return word
+
+
+class Bmu:
+    """One BMU on a bus; it says its boot-up when it is made. Belongs to the loop's thread."""
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        wire: CanWire,
+        node_id: int,
+        readout: Callable[[], Readout],
+        *,
+        layout: Layout = Layout.FIRST_HIGH,
+    ) -> None:
+        self.port = NodePort(wire, loop)
+        self.layout = layout
+        self._loop = loop
+        self._readout = readout
+        self._timers: dict[int, asyncio.TimerHandle] = {}
+        self._node = Node(self.port, node_id, capabilities=NodeCapabilities(sdo_servers=1, rpdos=1, tpdos=0))
+        self._dictionary = self._node.object_dictionary
+        for index in (index for tpdo in TPDOS for index in tpdo):
+            self._dictionary[index] = Variable(DatatypeEnum.UNSIGNED32, "ro")
+            self._dictionary.set_read_callback(index, 0, partial(self._read, index))
+        for number in range(len(TPDOS)):
+            self._add_tpdo(number)
+        self._node.nmt.state_callbacks.add(self._on_state)
+
+    @property
+    def node_id(self) -> int:
+        """Its CANopen node id."""
+        return int(self._node.node_id)
+
+    def reboot(self) -> None:
+        """Boot-up, and all settings forgotten."""
+        self._node.nmt.reset()
+
+    def emergency(self, code: int, register: int = 1) -> None:
+        """Send an EMCY frame; code 0 is "error reset"."""
+        self._node.emcy.set(code, register)
+
+    def close(self) -> None:
+        """Fall silent for ever."""
+        self._forget()
+        self.port.faults.mute = True
+
+    # --- objects ---
+
+    def _read(self, index: int) -> int:
+        return words(self._readout(), self.layout)[index]
+
+    def _on_state(self, state: int) -> None:
+        if state == StateEnum.INITIALISATION:
+            self._forget()
+
+    def _forget(self) -> None:
+        self._dictionary.write(HEARTBEAT, 0, 0)
+        for number in range(len(TPDOS)):
+            self._dictionary.write(TPDO_PARAMETERS + number, EVENT_TIMER, 0)
+
+    # --- TPDOs ---
+
+    def _add_tpdo(self, number: int) -> None:
+        record = Record(name=f"TPDO {number + 1} communication parameter")
+        cob_id = TPDO_COB_ID + 0x100 * number + self.node_id
+        record[1] = Variable(DatatypeEnum.UNSIGNED32, "rw", cob_id)
+        record[2] = Variable(DatatypeEnum.UNSIGNED8, "rw", 0xFF)
+        record[EVENT_TIMER] = Variable(DatatypeEnum.UNSIGNED16, "rw", 0)
+        self._dictionary[TPDO_PARAMETERS + number] = record
+        self._dictionary.update_callbacks[TPDO_PARAMETERS + number, EVENT_TIMER].add(partial(self._set_timer, number))
+
+    def _set_timer(self, number: int, period_ms: int) -> None:
+        timer = self._timers.pop(number, None)
+        if timer is not None:
+            timer.cancel()
+        if period_ms:
+            self._timers[number] = self._loop.call_later(period_ms / 1000, self._send_tpdo, number, period_ms)
+
+    def _send_tpdo(self, number: int, period_ms: int) -> None:
+        self._set_timer(number, period_ms)
+        if self._node.nmt.state == StateEnum.OPERATIONAL:
+            all_words = words(self._readout(), self.layout)
+            data = b"".join(all_words[index].to_bytes(4, "little") for index in TPDOS[number])
+            self.port.send(TPDO_COB_ID + 0x100 * number + self.node_id, data)

@@ -1,0 +1,136 @@
+"""A python-can bus served by an asyncio loop, and one node's access to it with the faults that a node can have."""
+
+import asyncio
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import can
+
+Handler = Callable[[int, bytes], None]
+
+#: How often the thread of a bus without a file descriptor looks whether it is to end.
+LOOK_S = 0.1
+
+
+class CanWire:
+    """Hands the frames of one bus to those who subscribed to their COB-ID. Belongs to the loop's thread."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, bus: can.BusABC) -> None:
+        self.frames = 0  #: received, our own echo included where the bus gives one
+        self._loop = loop
+        self._bus = bus
+        self._subscribers: dict[int, dict[object, Handler]] = {}
+        self._closing = False
+        self._thread: threading.Thread | None = None
+        try:
+            self._fd = bus.fileno()
+        except NotImplementedError:
+            self._fd = -1
+        if self._fd >= 0:
+            loop.add_reader(self._fd, self._on_readable)
+        else:
+            self._thread = threading.Thread(target=self._listen, name="emulated bus", daemon=True)
+            self._thread.start()
+
+    def close(self) -> None:
+        """Stop serving; the bus itself is left to whoever made it."""
+        self._closing = True
+        if self._thread is not None:
+            self._thread.join()
+        elif self._fd >= 0:
+            self._loop.remove_reader(self._fd)
+
+    def subscribe(self, cob_id: int, owner: object, handler: Handler) -> None:
+        """Several owners may have the same COB-ID: NMT and SYNC are for all."""
+        self._subscribers.setdefault(cob_id, {})[owner] = handler
+
+    def unsubscribe(self, cob_id: int, owner: object) -> None:
+        """No more frames of this COB-ID for this owner."""
+        self._subscribers.get(cob_id, {}).pop(owner, None)
+
+    def send(self, cob_id: int, data: bytes) -> None:
+        """Put one frame on the bus; a bus that does not take it loses it, as a node without a listener does."""
+        try:
+            self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        except can.CanError:
+            return
+
+    def _on_readable(self) -> None:
+        while (message := self._bus.recv(0)) is not None:
+            self._deliver(message)
+
+    def _listen(self) -> None:
+        while not self._closing:
+            message = self._bus.recv(LOOK_S)
+            if message is not None:
+                self._loop.call_soon_threadsafe(self._deliver, message)
+
+    def _deliver(self, message: can.Message) -> None:
+        self.frames += 1
+        if message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+            return
+        handlers = self._subscribers.get(message.arbitration_id)
+        if handlers:
+            for handler in tuple(handlers.values()):
+                handler(message.arbitration_id, bytes(message.data))
+
+
+@dataclass(slots=True)
+class NodeFaults:
+    """What is wrong with a node's answers."""
+
+    mute: bool = False  #: neither hears nor says anything
+    delay_s: float = 0.0  #: SDO answers come this late
+    aborts: dict[int, int] = field(default_factory=dict)  #: object index → abort code, for reads
+    short: set[int] = field(default_factory=set)  #: object indexes whose reads declare 2 bytes instead of 4
+
+
+class NodePort:
+    """What durand calls a network, for one node: it sends and subscribes, and here its faults take effect."""
+
+    def __init__(self, wire: CanWire, loop: asyncio.AbstractEventLoop) -> None:
+        self.faults = NodeFaults()
+        self.reads = 0  #: SDO requests that came
+        self._wire = wire
+        self._loop = loop
+
+    def add_subscription(self, cob_id: int, callback: Handler) -> None:
+        """Called by durand."""
+
+        def hear(cob_id: int, data: bytes) -> None:
+            if self.faults.mute:
+                return
+            if cob_id & 0x780 == 0x600:
+                self.reads += 1
+                if self._refuse(cob_id, data):
+                    return
+            callback(cob_id, data)
+
+        self._wire.subscribe(cob_id, self, hear)
+
+    def remove_subscription(self, cob_id: int) -> None:
+        """Called by durand."""
+        self._wire.unsubscribe(cob_id, self)
+
+    def send(self, cob_id: int, msg: bytes) -> None:
+        """Called by durand."""
+        faults = self.faults
+        if faults.mute:
+            return
+        if cob_id & 0x780 != 0x580:
+            self._wire.send(cob_id, msg)
+            return
+        if faults.short and msg[0] == 0x43 and int.from_bytes(msg[1:3], "little") in faults.short:
+            msg = b"\x4b" + msg[1:6] + b"\0\0"
+        if faults.delay_s:
+            self._loop.call_later(faults.delay_s, self._wire.send, cob_id, msg)
+        else:
+            self._wire.send(cob_id, msg)
+
+    def _refuse(self, cob_id: int, data: bytes) -> bool:
+        index = int.from_bytes(data[1:3], "little")
+        if data[:1] != b"\x40" or index not in self.faults.aborts:
+            return False
+        self.send(cob_id - 0x80, b"\x80" + data[1:4] + self.faults.aborts[index].to_bytes(4, "little"))
+        return True

@@ -1,0 +1,122 @@
+"""The charger's side of its serial protocol, bytes in and bytes out, from its document alone (§3 and §4.1).
+
+It shares nothing with `orchestrator.protocol`: where the two disagree, one of them has misread the document.
+"""
+
+from dataclasses import dataclass
+
+from orchestrator.sim.charger import Charger
+
+ADDRESS = 0x90
+HEAD, TAIL = b"\xaf\xfa", b"\xaf\xa0"
+STATUS, SET, REPLY, REST, ERROR = 0x01, 0x02, 0x03, 0x10, 0x1F
+
+#: What each request must have in its length byte: data + 3 (§3.2.4).
+LENGTHS = {STATUS: 5, SET: 5, REST: 4}
+
+LENGTH_ERROR, COMMAND_ERROR, ORDER_ERROR, CHECKSUM_ERROR = 1, 2, 4, 8
+
+#: Frames are never longer than this (§3.2.7: at most 20 bytes of data).
+MAX_LENGTH = 23
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One frame as it came; `errors` has the bits of §3.3.5, 0 for a good one."""
+
+    length: int
+    command: int
+    order: int
+    data: bytes
+    checksum: int
+    errors: int
+
+
+class Ear:
+    """Finds requests in a stream of bytes."""
+
+    def __init__(self) -> None:
+        self._heard = b""
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a frame has begun that has not ended."""
+        return bool(self._heard)
+
+    def forget(self) -> int:
+        """Give up on a frame that does not end; how many bytes that were."""
+        count, self._heard = len(self._heard), b""
+        return count
+
+    def hear(self, chunk: bytes) -> list[Request]:
+        """The frames that are complete with this chunk, good and bad ones for address 0x90."""
+        self._heard += chunk
+        found = []
+        while (start := self._heard.find(HEAD)) >= 0 and len(self._heard) >= start + 4:
+            self._heard = self._heard[start:]
+            address, length = self._heard[2], self._heard[3]
+            size = length + 6  # the length counts command, order, data and checksum
+            if address != ADDRESS:
+                self._heard = self._heard[1:]
+            elif not min(LENGTHS.values()) <= length <= MAX_LENGTH:
+                found.append(Request(length, 0, 0, b"", 0, LENGTH_ERROR))
+                self._heard = self._heard[1:]
+            elif len(self._heard) < size:
+                return found
+            else:
+                found.append(_read(self._heard[:size]))
+                whole = self._heard[size - 2 : size] == TAIL
+                self._heard = self._heard[size if whole else 1 :]
+        if start < 0:  # keep only what may be the first half of a head
+            self._heard = HEAD[:1] if self._heard.endswith(HEAD[:1]) else b""
+        return found
+
+
+def _read(frame: bytes) -> Request:
+    length, command, order, checksum = frame[3], frame[4], frame[5], frame[-3]
+    wrong_length = LENGTHS.get(command, length) != length or frame[-2:] != TAIL
+    errors = (
+        LENGTH_ERROR * wrong_length
+        | COMMAND_ERROR * (command not in LENGTHS)
+        | ORDER_ERROR * (order != ADDRESS)
+        | CHECKSUM_ERROR * (sum(frame[2:-3]) & 0xFF != checksum)
+    )
+    return Request(length, command, order, frame[6:-3], checksum, errors)
+
+
+def frame(command: int, order: int, data: bytes) -> bytes:
+    """A frame of the charger's own."""
+    body = bytes((ADDRESS, len(data) + 3, command, order)) + data
+    return HEAD + body + bytes((sum(body) & 0xFF,)) + TAIL
+
+
+def complaint(request: Request, errors: int) -> bytes:
+    """0x1F: the error bits, then what was received (§3.3.5)."""
+    return frame(ERROR, errors, bytes((request.length, request.command, request.order, request.checksum)))
+
+
+def status(charger: Charger, kind1: int, kind2: int) -> bytes:
+    """0x03: the requested values, in list order, two bytes each; no values for the bits that mean nothing."""
+    values = _values(charger)
+    wanted = [values[0][bit] for bit in range(5) if kind1 >> bit & 1] + [
+        values[1][bit] for bit in range(5) if kind2 >> bit & 1
+    ]
+    return frame(REPLY, ADDRESS, b"".join(value.to_bytes(2, "big") for value in wanted))
+
+
+def _values(charger: Charger) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """The ten values of §4.1.1 by kind and bit; the two temperatures have no information since 2022-01."""
+    return (
+        (_hundredths(charger.voltage_v), _hundredths(charger.current_a), 0, 0, charger.control_mode),
+        (
+            charger.operation,
+            charger.current_limit,
+            charger.charge_mode,
+            charger.precharge,
+            charger.connection,
+        ),
+    )
+
+
+def _hundredths(value: float) -> int:
+    return min(max(round(value * 100), 0), 0xFFFF)

@@ -1,0 +1,171 @@
+"""An emulated charger on a pseudo-terminal: real bytes on a real tty, served by an asyncio loop."""
+
+import asyncio
+import os
+import tty
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger_frames import CHECKSUM_ERROR, REST, SET, STATUS, Ear, Request, complaint, status
+from orchestrator.sim.line import Line, Noise
+
+#: A frame that pauses for this long (some 60 byte times) has been cut off.
+FRAME_GAP_S = 0.03
+
+
+@dataclass(slots=True)
+class Counters:
+    """What came over the line since it was opened; times are `time.monotonic()`."""
+
+    polls: int = 0
+    orders: int = 0
+    stops: int = 0
+    resumes: int = 0
+    bad: int = 0
+    first_byte_s: float | None = None  #: the first byte since `mark()`
+    first_stop_s: float | None = None  #: the first stop frame (0x10, rest 0) since `mark()`
+
+    def mark(self) -> None:
+        """From now on, wait for the first byte and the first stop frame anew."""
+        self.first_byte_s = self.first_stop_s = None
+
+
+class ChargerWire:
+    """Serves one charger model on a pty.
+
+    `now()` is called before a request is acted upon and lets the model catch up with the time. All methods belong to
+    the loop's thread.
+    """
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        charger: Charger,
+        *,
+        line: Line | None = None,
+        link: Path | None = None,
+        now: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.charger = charger
+        self.counters = Counters()
+        self.mute_rx = False  #: hears nothing
+        self.mute_tx = False  #: says nothing
+        self.complains = False  #: answers every frame with 0x1F, checksum error
+        self.on_bytes: Callable[[float, bytes], None] | None = None  #: called with (monotonic s, bytes) as they come
+        self.path = ""
+        self._loop = loop
+        self._line = line or Line()
+        self._noise = Noise(self._line)
+        self._link = link
+        self._now = now
+        self._ear = Ear()
+        self._cut_off: asyncio.TimerHandle | None = None
+        self._master = self._slave = -1
+
+    # --- the port ---
+
+    def open(self) -> None:
+        """Make the pty, and the link to it if there is to be one. The line settings are the client's to set."""
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)  # also keeps the line up while no client has it open
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        if self._link is not None:
+            fresh = self._link.with_name(self._link.name + ".new")
+            fresh.unlink(missing_ok=True)
+            fresh.symlink_to(self.path)
+            fresh.rename(self._link)
+        self._loop.add_reader(self._master, self._on_readable)
+
+    def close(self) -> None:
+        """Take the pty away, as an adapter that is unplugged; its link goes too."""
+        if self._master < 0:
+            return
+        self._loop.remove_reader(self._master)
+        os.close(self._master)
+        os.close(self._slave)
+        self._master = self._slave = -1
+        self._ear.forget()
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the port is there."""
+        return self._master >= 0
+
+    # --- hearing ---
+
+    def _on_readable(self) -> None:
+        now_s = self._loop.time()
+        try:
+            chunk = os.read(self._master, 4096)
+        except OSError:  # a client closed with bytes unread; the port itself stays
+            return
+        if self.counters.first_byte_s is None:
+            self.counters.first_byte_s = now_s
+        if self.on_bytes is not None:
+            self.on_bytes(now_s, chunk)
+        if self._line.echo:
+            self._write(chunk)
+        if self.mute_rx:
+            return
+        if self._line.byte_s:
+            self._loop.call_later(len(chunk) * self._line.byte_s, self._hear, now_s, chunk)
+        else:
+            self._hear(now_s, chunk)
+
+    def _hear(self, came_s: float, chunk: bytes) -> None:
+        for request in self._ear.hear(self._noise.spoil(chunk)):
+            self._now()
+            self._obey(request, came_s)
+        if self._cut_off is not None:
+            self._cut_off.cancel()
+            self._cut_off = None
+        if self._ear.waiting:
+            self._cut_off = self._loop.call_later(FRAME_GAP_S, self._give_up)
+
+    def _give_up(self) -> None:
+        self._cut_off = None
+        self.counters.bad += self._ear.forget() > 0
+
+    def _obey(self, request: Request, came_s: float) -> None:
+        counters = self.counters
+        if request.errors or self.complains:
+            counters.bad += request.errors != 0
+            self._say(complaint(request, request.errors or CHECKSUM_ERROR))
+        elif request.command == STATUS:
+            counters.polls += 1
+            self._say(status(self.charger, *request.data))
+        elif request.command == SET:
+            counters.orders += 1
+            self.charger.push(*request.data)
+        elif request.command == REST:
+            value = request.data[0]
+            counters.stops += value == 0
+            counters.resumes += value == 1
+            if value == 0 and counters.first_stop_s is None:
+                counters.first_stop_s = came_s
+            self.charger.rest(value)
+
+    # --- saying ---
+
+    def _say(self, answer: bytes) -> None:
+        if self.mute_tx:
+            return
+        line, heard = self._line, self._noise.spoil(answer)
+        if line.bytewise:
+            for count in range(len(heard)):
+                due_s = line.answer_s + (count + 1) * line.byte_s
+                self._loop.call_later(due_s, self._write, heard[count : count + 1])
+        else:
+            self._loop.call_later(line.answer_s + len(heard) * line.byte_s, self._write, heard)
+
+    def _write(self, data: bytes) -> None:
+        if self._master >= 0:
+            try:
+                os.write(self._master, data)
+            except OSError:  # nobody reads: a wire does not keep what nobody hears
+                return

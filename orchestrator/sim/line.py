@@ -1,0 +1,50 @@
+"""What a serial line can do to the bytes on it."""
+
+import random
+from dataclasses import dataclass
+
+#: One byte at 19200 baud with start and stop bit (§2.2.2).
+BYTE_S = 10 / 19200
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A kind of line; the default is perfect and takes no time."""
+
+    byte_s: float = 0.0  #: time that one byte takes, `BYTE_S` for a real line
+    answer_s: float = 0.002  #: how long the charger thinks before it answers
+    bytewise: bool = False  #: answers come byte by byte, not frame by frame
+    loss: float = 0.0  #: the share of frames, either way, that lose one byte
+    garbage: float = 0.0  #: the share of frames, either way, that have rubbish before them
+    echo: bool = False  #: an RS-485 adapter that returns what it sends
+    seed: int = 1
+
+
+#: The lines that tests run on.
+LINES = {
+    "perfect": Line(),
+    "real": Line(byte_s=BYTE_S),
+    "bytewise": Line(bytewise=True),
+    "delayed": Line(answer_s=0.08),
+    "lossy": Line(loss=0.05),
+    "garbage": Line(garbage=0.5),
+    "echo": Line(echo=True),
+}
+
+
+class Noise:
+    """Spoils frames as its line does; the same seed spoils the same ones."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self._random = random.Random(line.seed)  # noqa: S311 - noise, no secret
+
+    def spoil(self, frame: bytes) -> bytes:
+        """The frame as it arrives."""
+        line, dice = self._line, self._random
+        if line.loss and dice.random() < line.loss:
+            gap = dice.randrange(len(frame))
+            frame = frame[:gap] + frame[gap + 1 :]
+        if line.garbage and dice.random() < line.garbage:
+            frame = dice.choice((b"", b"\xaf", b"\xaf\xfa", b"\xaf\xa0")) + dice.randbytes(dice.randint(1, 16)) + frame
+        return frame

@@ -1,0 +1,151 @@
+"""A model of a lithium battery pack: charge, open-circuit voltage, resistance, heat. Pure: time is an argument.
+
+Below 0 % lies the deep discharge: a few per cent of the capacity in which the voltage of an NMC pack climbs from
+2.54 V to 3.0 V a cell. It is where a pack must be woken gently before it may be charged.
+"""
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+
+from orchestrator.model import BatteryStatus
+
+#: Open-circuit volts of one cell over its state of charge (0 … 1), typical of NMC; beyond 1 it is overcharged.
+NMC = (
+    (0.00, 3.00),
+    (0.05, 3.35),
+    (0.10, 3.45),
+    (0.20, 3.55),
+    (0.30, 3.60),
+    (0.40, 3.65),
+    (0.50, 3.70),
+    (0.60, 3.78),
+    (0.70, 3.88),
+    (0.80, 3.98),
+    (0.90, 4.08),
+    (1.00, 4.19),
+    (1.05, 4.45),
+)
+
+#: The same below 0 %, over the share of the deep discharge that is gone (−1 … 0): steep at first, then flatter.
+DEEP = ((-2.0, 0.0), (-1.0, 2.54), (-0.66, 2.77), (0.0, 3.00))
+
+#: Where a BMU of this kind sets its status bits: volts of a cell and °C; wider than what any charge policy allows.
+HIGH_CELL_V, LOW_CELL_V, HIGH_C, LOW_C = 4.25, 2.30, 60.0, -20.0
+
+Curve = tuple[tuple[float, float], ...]
+
+
+def interpolate(curve: Curve, x: float) -> float:
+    """The curve's value at x, straight between its points and flat beyond its ends; x must ascend."""
+    upper = bisect_right(curve, (x, math.inf))
+    if upper == 0:
+        return curve[0][1]
+    if upper == len(curve):
+        return curve[-1][1]
+    (x0, y0), (x1, y1) = curve[upper - 1], curve[upper]
+    return y0 + (y1 - y0) * (x - x0) / (x1 - x0)
+
+
+@dataclass(frozen=True, slots=True)
+class Readout:
+    """What a BMU knows of its pack. None: not available (no current flows in that direction)."""
+
+    voltage_v: float
+    current_a: float  #: positive while charging
+    status: int  #: bits, `BatteryStatus`
+    time_to_full_min: float | None
+    time_to_empty_min: float | None
+    soc_pct: float
+    soh_pct: float
+    remaining_ah: float
+    available_wh: float
+    temperature_c: float
+
+
+@dataclass(slots=True)
+class Pack:
+    """One battery. `charge_ah` is what it holds above 0 %; negative in the deep discharge."""
+
+    cells: int = 13
+    capacity_ah: float = 20.0  #: nominal; `soh_pct` of it can be used
+    deep_ah: float = 0.4  #: what lies between 2.54 V and 3.0 V a cell
+    resistance_ohm: float = 0.05
+    soh_pct: float = 100.0
+    temperature_c: float = 20.0
+    ambient_c: float = 20.0
+    heat_j_per_k: float = 6000.0  #: about 6 kg of cells and their case
+    cooling_w_per_k: float = 2.0
+    charge_ah: float = 0.0
+    current_a: float = 0.0  #: positive while charging
+    bias_v: float = 0.0  #: added to the open-circuit voltage by a fault
+    leaky: bool = False  #: a fault: charge that flows in is lost inside
+
+    @property
+    def usable_ah(self) -> float:
+        """What fits between 0 and 100 % at this state of health."""
+        return self.capacity_ah * self.soh_pct / 100
+
+    @property
+    def soc(self) -> float:
+        """The true state of charge, 0 … 1; outside of that when overcharged or deeply discharged."""
+        return self.charge_ah / self.usable_ah
+
+    @property
+    def ocv_v(self) -> float:
+        """Volts without current."""
+        deep = self.charge_ah < 0
+        cell_v = interpolate(DEEP, self.charge_ah / self.deep_ah) if deep else interpolate(NMC, self.soc)
+        return self.cells * cell_v + self.bias_v
+
+    @property
+    def voltage_v(self) -> float:
+        """Volts at the terminals with the present current."""
+        return self.ocv_v + self.current_a * self.resistance_ohm
+
+    def set_soc(self, pct: float) -> None:
+        """Put the pack to a state of charge; −100 is the bottom of the deep discharge."""
+        self.charge_ah = self.usable_ah * pct / 100 if pct >= 0 else self.deep_ah * pct / 100
+
+    def advance(self, dt_s: float, current_a: float) -> None:
+        """Let `current_a` flow for `dt_s`; it stays the present current afterwards."""
+        if not self.leaky:
+            self.charge_ah += current_a * dt_s / 3600
+        self.current_a = current_a
+        loss_w = current_a * current_a * self.resistance_ohm
+        settled_c = self.ambient_c + loss_w / self.cooling_w_per_k
+        fade = math.exp(-dt_s * self.cooling_w_per_k / self.heat_j_per_k)
+        self.temperature_c = settled_c + (self.temperature_c - settled_c) * fade
+
+    def status(self) -> int:
+        """The status bits that the pack's own state sets."""
+        cell_v = self.voltage_v / self.cells
+        active = (
+            (BatteryStatus.OVER_VOLTAGE, cell_v > HIGH_CELL_V),
+            (BatteryStatus.LOW_VOLTAGE, cell_v < LOW_CELL_V),
+            (BatteryStatus.HIGH_TEMPERATURE, self.temperature_c > HIGH_C),
+            (BatteryStatus.LOW_TEMPERATURE, self.temperature_c < LOW_C),
+        )
+        return sum(1 << bit for bit, is_set in active if is_set)
+
+    def readout(self) -> Readout:
+        """All that the BMU measures and counts, now."""
+        remaining_ah = max(self.charge_ah, 0.0)
+        idle = abs(self.current_a) < 0.05
+        return Readout(
+            voltage_v=self.voltage_v,
+            current_a=self.current_a,
+            status=self.status(),
+            time_to_full_min=_minutes(self.usable_ah - remaining_ah, self.current_a) if not idle else None,
+            time_to_empty_min=_minutes(remaining_ah, -self.current_a) if not idle else None,
+            soc_pct=min(max(self.soc * 100, 0.0), 100.0),
+            soh_pct=self.soh_pct,
+            remaining_ah=remaining_ah,
+            available_wh=remaining_ah * self.ocv_v,
+            temperature_c=self.temperature_c,
+        )
+
+
+def _minutes(charge_ah: float, current_a: float) -> float | None:
+    """How long `current_a` needs to move that charge; None when it flows the other way."""
+    return max(charge_ah, 0.0) / current_a * 60 if current_a > 0 else None
