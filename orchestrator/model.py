@@ -6,7 +6,7 @@ computed from them is never too young. Unknown is `None`, never a number.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum, StrEnum
+from enum import IntEnum, IntFlag, StrEnum
 
 # --- the charger, in its document's own values (protocol 2/2, §4.1.1 and §4.2) ---------------------------------------
 
@@ -51,6 +51,15 @@ class Connection(IntEnum):
 
     REVERSED = 0
     NORMAL = 1
+
+
+class ErrorBit(IntFlag):
+    """What was wrong with a frame that the charger received, in its words (§3.3.5)."""
+
+    LENGTH = 1
+    COMMAND = 2
+    ORDER = 4
+    CHECKSUM = 8
 
 
 class Action(StrEnum):
@@ -168,6 +177,7 @@ class BatteryLink:
     abort_code: int = 0
     implausible: Mapping[str, str] = field(default_factory=dict)  #: field → why its newest value was thrown away
     emergency: str = ""  #: newest EMCY that is not "error reset"
+    bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers
 
 
 # --- what the core is given and what it says -------------------------------------------------------------------------

@@ -1,0 +1,46 @@
+"""Faults of the charge itself: it takes too long, too much, or leads nowhere."""
+
+from orchestrator.core.facts import Facts
+from orchestrator.model import State
+
+
+def precharge_no_rise(f: Facts) -> str | None:
+    """FAULTS C15."""
+    rule = f.rules.policy.precharge
+    if rule is None or f.pack_v is None or f.memory.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS):
+        return None
+    lasted_s, rise_v = f.now_s - f.memory.mark_s, f.pack_v - f.memory.mark_v
+    if lasted_s < rule.rise.within_min * 60 or rise_v >= rule.rise.volts:
+        return None
+    at = f.rules.policy.source.at("precharge.rise")
+    return f"the pack rose by {rise_v:.2f} V in {lasted_s / 60:.1f} min, {rule.rise.volts:g} V were expected ({at})"
+
+
+def precharge_too_long(f: Facts) -> str | None:
+    """FAULTS C15."""
+    rule = f.rules.policy.precharge
+    if rule is None or f.memory.state is not State.PRECHARGE_CONTINUOUS or f.state_s <= rule.continuous.max_min * 60:
+        return None
+    at = f.rules.policy.source.at("precharge.continuous.max_min")
+    return f"continuous precharge has taken {f.state_s / 60:.1f} min and the pack is below {rule.below_v:g} V ({at})"
+
+
+def time_limit(f: Facts) -> str | None:
+    """FAULTS C17."""
+    session, hours = f.memory.session, f.rules.policy.finish.max_hours
+    if session is None or session.energised_s <= hours * 3600:
+        return None
+    return f"charging has taken {session.energised_s / 3600:.2f} h ({f.rules.policy.source.at('finish.max_hours')})"
+
+
+def ah_limit(f: Facts) -> str | None:
+    """FAULTS C17."""
+    session, max_ah = f.memory.session, f.rules.policy.finish.max_ah
+    if session is None or session.charged_ah <= max_ah:
+        return None
+    return f"{session.charged_ah:.2f} Ah were charged ({f.rules.policy.source.at('finish.max_ah')})"
+
+
+def internal(f: Facts) -> str | None:
+    """FAULTS G5."""
+    return f.snapshot.internal or None

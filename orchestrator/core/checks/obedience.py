@@ -1,0 +1,125 @@
+"""Faults of a charger that does not do as it is told, or does not answer."""
+
+from orchestrator.core.facts import CHARGER_STALE_S, Facts
+from orchestrator.core.safestop import OBEY_STOP_S
+from orchestrator.model import Action, ChargeMode
+
+#: A setting must be read back within this time (about ten attempts), and a run must be seen (FAULTS C7, C9).
+OBEY_S = 5.0
+#: A charger's current measurement may be off by this, whatever the step.
+OVER_CURRENT_OFFSET_A = 0.3
+#: The charger's own modes before current flows (search) and while it wakes a pack (recovery, precharge).
+SEARCH_MAX_S = 60.0
+WAKE_MAX_S = 1800.0
+#: Charging with less than this is no charging.
+NO_CURRENT_A = 0.1
+#: A running charger that delivers nothing for this long is connected to nothing.
+IDLE_MAX_S = 10.0
+#: Nearly full packs may take no current.
+NEARLY_FULL_PCT = 95.0
+#: The charger ends a charge by itself below this state of charge: something is wrong.
+EARLY_FULL_PCT = 80.0
+
+
+def charger_silent(f: Facts) -> str | None:
+    """FAULTS C23, C25."""
+    if f.charger.problem:
+        return f.charger.problem
+    port = f.rules.bay.charger.port
+    if not f.charger.online:
+        return f"the charger on {port} has not answered {f.charger.misses} polls"
+    if f.reading is None:
+        return f"the charger on {port} has sent no status for {CHARGER_STALE_S:g} s"
+    return None
+
+
+def found_running(f: Facts) -> str | None:
+    """FAULTS G10: the last run of this service died, or somebody else commands this charger."""
+    return "the charger was found running when the service started" if f.runs else None
+
+
+def rogue_run(f: Facts) -> str | None:
+    """FAULTS C5."""
+    if not f.runs or f.reading is None:
+        return None
+    return f"the charger runs though it was not commanded to: {f.reading.current_a:.2f} A"
+
+
+def will_not_stop(f: Facts) -> str | None:
+    """FAULTS C6: it answers, and the answer is that it goes on."""
+    sent_s, since_s = f.charger.stop_sent_s, f.memory.since_s
+    if sent_s is None or since_s is None or f.state_s < OBEY_STOP_S or sent_s < since_s:
+        return None
+    if f.reading is None or f.reading.t_s < since_s + OBEY_STOP_S or not f.runs:
+        return None
+    return f"the charger does not obey the stop: {f.reading.current_a:.2f} A, {f.state_s:.1f} s after it was sent"
+
+
+def will_not_start(f: Facts) -> str | None:
+    """FAULTS C7."""
+    if f.memory.order is None or f.memory.order.action not in (Action.RUN, Action.RESUME) or not f.energised:
+        return None
+    return _unconfirmed(f, "run")
+
+
+def setting_not_obeyed(f: Facts) -> str | None:
+    """FAULTS C9, C16."""
+    order = f.memory.order
+    if order is None or order.action in (Action.RUN, Action.RESUME, Action.STOP) or not f.energised:
+        return None
+    return _unconfirmed(f, f"{order.action.value.removeprefix('set_')} {order.value}")
+
+
+def _unconfirmed(f: Facts, what: str) -> str | None:
+    waited_s = f.now_s - f.memory.order_s
+    if waited_s < OBEY_S:
+        return None
+    held = f"; the interlock held it back: {f.charger.refused}" if f.charger.refused else ""
+    return f"the charger was told '{what}' for {waited_s:.1f} s and its status does not show it{held}"
+
+
+def over_current(f: Facts) -> str | None:
+    """FAULTS C11."""
+    reading, rules = f.reading, f.rules
+    if reading is None:
+        return None
+    limit_a = rules.bay.limits.current_a
+    if rules.manual and reading.current_limit is not None:
+        limit_a = min(limit_a, rules.steps_a[reading.current_limit])
+    allowed_a = limit_a * rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
+    if reading.current_a <= allowed_a:
+        return None
+    return f"{reading.current_a:.2f} A, more than {allowed_a:.2f} A for a limit of {limit_a:g} A"
+
+
+def early_full(f: Facts) -> str | None:
+    """FAULTS C18."""
+    if not f.full_mode or f.soc is None or f.soc >= min(EARLY_FULL_PCT, f.rules.policy.finish.soc_pct):
+        return None
+    return f"the charger reports full (mode 5), the BMU only {f.soc:.0f} %"
+
+
+def open_circuit(f: Facts) -> str | None:
+    """FAULTS C13."""
+    since_s = f.memory.idle_a_s
+    if since_s is None or f.now_s - since_s <= IDLE_MAX_S or f.soc is None or f.soc >= NEARLY_FULL_PCT:
+        return None
+    return f"the charger runs but has delivered nothing for {f.now_s - since_s:.0f} s at SOC {f.soc:.0f} %"
+
+
+def no_battery(f: Facts) -> str | None:
+    """FAULTS C14."""
+    return _mode_too_long(f, (ChargeMode.BATTERY_SEARCH,), SEARCH_MAX_S, "has been looking for a battery")
+
+
+def wakes_too_long(f: Facts) -> str | None:
+    """FAULTS C15, the charger's own recovery and precharge."""
+    modes = (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)
+    return _mode_too_long(f, modes, WAKE_MAX_S, "has been in recovery or precharge")
+
+
+def _mode_too_long(f: Facts, modes: tuple[ChargeMode, ...], limit_s: float, what: str) -> str | None:
+    lasted_s = f.now_s - f.memory.mode_s
+    if f.memory.mode not in modes or f.memory.running_s is None or lasted_s <= limit_s:
+        return None
+    return f"the charger {what} for {lasted_s / 60:.0f} min"

@@ -1,0 +1,64 @@
+"""Faults that the charger itself reports."""
+
+from orchestrator.core.facts import Facts
+from orchestrator.model import ChargeMode, Connection, ErrorBit
+
+#: An error frame is news for this long.
+ERROR_FRAME_S = 5.0
+
+
+def reverse_polarity(f: Facts) -> str | None:
+    """FAULTS C1."""
+    if f.reading is None:
+        return None
+    if f.reading.connection is Connection.REVERSED:
+        return "the charger reports connection 0: the battery is connected the wrong way round"
+    if f.reading.charge_mode is ChargeMode.REVERSED:
+        return "the charger reports mode 6: the battery is connected the wrong way round"
+    return None
+
+
+def error_stop(f: Facts) -> str | None:
+    """FAULTS C3."""
+    stopped = f.reading is not None and f.reading.charge_mode is ChargeMode.ERROR_STOP
+    return "the charger reports mode 8: stopped by an error of its own" if stopped else None
+
+
+def system_stop(f: Facts) -> str | None:
+    """FAULTS C4."""
+    stopped = f.reading is not None and f.reading.charge_mode is ChargeMode.SYSTEM_STOP
+    return "the charger reports mode 7: it stopped itself without being asked" if stopped else None
+
+
+def illegal_value(f: Facts) -> str | None:
+    """FAULTS C19."""
+    return f"the charger reports {', '.join(f.reading.illegal)}" if f.reading and f.reading.illegal else None
+
+
+def mode_taken_over(f: Facts) -> str | None:
+    """FAULTS C8."""
+    configured = f.rules.bay.charger.control
+    if f.reading is None or f.reading.control_mode in (None, configured):
+        return None
+    return (
+        f"the charger is in {f.reading.control_mode.name.lower()} mode, the station file says {configured.name.lower()}: "
+        "look at its rotary switch"
+    )
+
+
+def rejected_frame(f: Facts) -> str | None:
+    """FAULTS C22."""
+    return _error_frame(f, ErrorBit.COMMAND | ErrorBit.ORDER)
+
+
+def noisy_line(f: Facts) -> str | None:
+    """FAULTS C21."""
+    return _error_frame(f, ErrorBit.LENGTH | ErrorBit.CHECKSUM)
+
+
+def _error_frame(f: Facts, bits: ErrorBit) -> str | None:
+    link = f.charger
+    if link.error_t_s is None or f.now_s - link.error_t_s > ERROR_FRAME_S or not link.error_bits & bits:
+        return None
+    names = " and ".join(bit.name.lower() for bit in ErrorBit if bit & link.error_bits and bit.name)
+    return f"the charger answered with an error frame (0x1F): wrong {names} in what it received"

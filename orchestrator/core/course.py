@@ -1,0 +1,211 @@
+"""Where a bay goes next: one trigger at most, and the reason that people read. The machine's table says where it leads.
+
+Each state has one function here; all of them ask the same questions in the same order: must current stop, can the charger
+be trusted to stand by, does something keep us from charging, does the battery want to be charged.
+"""
+
+from orchestrator.core.facts import Facts
+from orchestrator.core.faults import ROW, Clear
+from orchestrator.core.finish import finished
+from orchestrator.core.machine import RESTING, Trigger
+from orchestrator.core.safestop import gives_up
+from orchestrator.model import ENERGISED, ActiveFault, Effect, State
+
+Course = tuple[Trigger | None, str]
+Faults = tuple[ActiveFault, ...]
+
+#: Everything must have spoken for a charge for this long, with a second, newer sample of each value.
+QUALIFY_S = 2.0
+#: A stage's voltage must have been reached for this long before the next stage begins.
+REACHED_S = 2.0
+#: A full battery must have lost this much before it is charged again, however high the policy's threshold.
+RECHARGE_DROP_PCT = 3.0
+
+#: Where each trigger of rest leads; to be there already is no trigger.
+LEADS = {
+    Trigger.LOSE: State.OFFLINE,
+    Trigger.REST: State.IDLE,
+    Trigger.SUSPEND: State.SUSPENDED,
+    Trigger.FILL: State.FULL,
+    Trigger.TRIP: State.TRIPPED,
+}
+
+
+def course(f: Facts, faults: Faults) -> Course:
+    """The trigger for now (None: stay) and why the bay is, or goes, where it is."""
+    state = f.memory.state
+    if state in ENERGISED:
+        return _energised(f, faults)
+    if state in RESTING or state is State.TRIPPED:
+        return _resting(f, faults)
+    return _stopping(f, faults)
+
+
+def _energised(f: Facts, faults: Faults) -> Course:
+    if faults and faults[0].effect >= Effect.PAUSE:
+        return Trigger.STOP, faults[0].text
+    if f.memory.hold or f.memory.paused:
+        return Trigger.STOP, f.memory.hold or "paused by the operator"
+    if f.memory.state is State.CHARGING:
+        full = finished(f)
+        if full is not None:
+            f.memory.full_pct = f.soc
+            return Trigger.STOP, f"full: {full}"
+        return None, _charging_reason(f, faults)
+    return _precharging(f)
+
+
+def _charging_reason(f: Facts, faults: Faults) -> str:
+    chosen = f.memory.step
+    if chosen is None:
+        return "the charger charges by itself (automatic mode)" if not f.rules.manual else f.memory.reason
+    limited = f"; {faults[0].text}" if faults and faults[0].effect is Effect.LIMIT else ""
+    return f"step {chosen.index} ({chosen.current_a:.1f} A): {chosen.rule}{limited}"
+
+
+def _precharging(f: Facts) -> Course:
+    memory, rule, source = f.memory, f.rules.policy.precharge, f.rules.policy.source
+    if rule is None or f.pack_v is None:
+        return None, memory.reason
+    pulse = memory.state is State.PRECHARGE_PULSE
+    target_v = rule.pulse.until_v if pulse else rule.below_v
+    if f.pack_v < target_v:
+        memory.reached_s = None
+    elif memory.reached_s is None:
+        memory.reached_s = f.now_s
+    reached = memory.reached_s is not None and f.now_s - memory.reached_s >= REACHED_S
+    if f.now_s - memory.mark_s >= rule.rise.within_min * 60:
+        memory.mark_s, memory.mark_v = f.now_s, f.pack_v  # it rose: the fault table has looked already
+    if pulse and reached:
+        return Trigger.CONTINUE, f"the pack reached {target_v:g} V ({source.at('precharge.pulse.until_v')})"
+    if pulse and f.state_s >= rule.pulse.max_min * 60:
+        return Trigger.CONTINUE, f"{rule.pulse.max_min:g} min of pulses ({source.at('precharge.pulse.max_min')})"
+    if reached:
+        return Trigger.CHARGE, f"the pack reached {target_v:g} V ({source.at('precharge.below_v')})"
+    where = source.at("precharge.pulse" if pulse else "precharge.continuous")
+    return None, f"the pack is below {rule.below_v:g} V: {'pulse' if pulse else 'continuous'} precharge ({where})"
+
+
+def _stopping(f: Facts, faults: Faults) -> Course:
+    if f.stopped:
+        return _rest(f, faults)
+    silent = f.memory.state is State.STARTING and not f.charger.online and f.state_s >= LOST_S
+    if silent:
+        return Trigger.LOSE, _offline_reason(f)
+    if gives_up(f):
+        return Trigger.GIVE_UP, f"the charger has not confirmed the stop for {f.state_s:.0f} s: {_why(f)}"
+    return None, f.memory.reason
+
+
+#: A charger that has not answered for this long at the start is not there.
+LOST_S = 3.0
+
+
+def _why(f: Facts) -> str:
+    if f.charger.problem:
+        return f.charger.problem
+    if not f.charger.online or f.reading is None:
+        return f"no answer on {f.rules.bay.charger.port}"
+    return f"it delivers {f.reading.current_a:.2f} A" if f.runs else "its status is not valid"
+
+
+def _offline_reason(f: Facts) -> str:
+    return f.charger.problem or f"the charger on {f.rules.bay.charger.port} does not answer"
+
+
+def _resting(f: Facts, faults: Faults) -> Course:
+    fresh = next((x for x in faults if x.since_s == f.now_s and x.effect >= Effect.STOP), None)
+    if fresh is not None and f.charger.online:
+        return Trigger.STOP, fresh.text
+    if f.runs:
+        return Trigger.STOP, "the charger runs though it was not commanded to"
+    if f.memory.state is State.OFFLINE and f.charger.online and not f.stopped:
+        return None, "the charger answers again; it is being stopped before anything else"
+    return _rest(f, faults)
+
+
+def _rest(f: Facts, faults: Faults) -> Course:
+    """Where a bay whose charger stands by belongs."""
+    trigger, reason = _resting_place(f, faults)
+    state = f.memory.state
+    if state is State.TRIPPED:
+        if trigger is Trigger.TRIP:
+            return None, reason
+        return Trigger.RESET, "reset by the operator"
+    if state is State.QUALIFYING and trigger is Trigger.QUALIFY:
+        return _qualifying(f)
+    if trigger is Trigger.QUALIFY and state not in (State.IDLE, State.FULL, State.SUSPENDED):
+        return Trigger.REST, reason
+    return (None if LEADS.get(trigger) is state else trigger), reason
+
+
+def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
+    memory = f.memory
+    worst = faults[0] if faults else None
+    if worst is not None and worst.effect is Effect.TRIP:
+        return Trigger.TRIP, worst.text
+    if not f.charger.online or f.reading is None:
+        return Trigger.LOSE, _offline_reason(f)
+    waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
+    if waits is not None:
+        return Trigger.REST, waits.text
+    if memory.hold:
+        return Trigger.REST, memory.hold
+    if memory.paused:
+        return Trigger.SUSPEND, "paused by the operator; start to go on"
+    absent = _absent(f)
+    if absent is not None:
+        return absent
+    wanted, why = _wanted(f)
+    if not wanted:
+        return (Trigger.REST if memory.full_pct is None else Trigger.FILL), why
+    if worst is not None and worst.effect >= Effect.NO_START:
+        return Trigger.SUSPEND, worst.text
+    return Trigger.QUALIFY, why
+
+
+def _absent(f: Facts) -> tuple[Trigger, str] | None:
+    """Where a bay without a battery belongs, None when a battery is there."""
+    if f.battery.online and not f.silent:
+        return None
+    if not f.departed:
+        problem = f.battery.problem or f"the BMU (node {f.rules.bay.battery.node_id}) does not answer"
+        return Trigger.LOSE, f"{f.volts or 0:.1f} V at the charger, but {problem}"
+    return Trigger.REST, "no battery"
+
+
+def _wanted(f: Facts) -> tuple[bool, str]:
+    """Whether the battery wants to be charged, and why (not)."""
+    policy, full_pct = f.rules.policy, f.memory.full_pct
+    if f.soc is None:
+        return False, "a battery is there; its SOC is not known yet"
+    if full_pct is None:
+        key, threshold = "start.soc_below_pct", policy.start.soc_below_pct
+    else:  # it may have been full by taper at less than the policy's SOC: it must have fallen since
+        key, threshold = "recharge.soc_below_pct", min(policy.recharge.soc_below_pct, full_pct - RECHARGE_DROP_PCT)
+    below = f.soc < threshold
+    at = policy.source.at(key)
+    return below, f"SOC {f.soc:.0f} % is {'' if below else 'not '}below {threshold:g} % ({at})"
+
+
+def _qualifying(f: Facts) -> Course:
+    memory = f.memory
+    if not f.present or f.volts is None:
+        memory.qualified_s = None
+        return None, "waiting for fresh values of charger and BMU"
+    if memory.qualified_s is None:
+        memory.qualified_s = f.now_s
+    if f.now_s - memory.qualified_s < QUALIFY_S or not _seen_twice(f, memory.qualified_s):
+        return None, "checking charger and battery before a charge"
+    rule = f.rules.policy.precharge
+    if f.rules.manual and rule is not None and f.pack_v is not None and f.pack_v < rule.below_v:
+        at = f.rules.policy.source.at("precharge.below_v")
+        return Trigger.PULSE, f"the pack has {f.pack_v:.2f} V, below {rule.below_v:g} V ({at})"
+    return Trigger.CHARGE, f"qualified: {f.pack_v:.2f} V, SOC {f.soc:.0f} %, {f.temperature_c:.1f} °C"
+
+
+def _seen_twice(f: Facts, since_s: float) -> bool:
+    """A newer sample of every value has come since; the first one was there when it began."""
+    battery = f.snapshot.battery
+    values = (battery.voltage_v, battery.temperature_c, battery.status, battery.soc_pct, battery.soh_pct)
+    return all(value is not None and value.t_s > since_s for value in values)

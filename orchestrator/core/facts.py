@@ -1,0 +1,128 @@
+"""What is true of a bay now: ages, validity and comparisons, worked out once a step for everything that decides.
+
+A value here is fresh and in range, or it is None. Nothing downstream looks at a reading's age again.
+"""
+
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
+from orchestrator.model import (
+    ENERGISED,
+    BatteryLink,
+    ChargeMode,
+    ChargerLink,
+    ChargerReading,
+    Measurement,
+    Operation,
+    Snapshot,
+    State,
+)
+
+#: A status reply is taken for the charger's present state for this long: five polls.
+CHARGER_STALE_S = 1.0
+#: Volts, amps, status and temperature of the pack: three sweeps, at most this.
+FAST_STALE_S = 1.5
+#: The objects that are read once a second: three readings.
+SLOW_STALE_S = 3.0
+#: Standby may show this much: the resolution and offset of a charger's current measurement.
+STANDBY_A = 0.5
+#: Below this the charger sees no battery at its terminals.
+TERMINAL_V = 5.0
+
+
+def _fresh(measurement: Measurement | None, oldest_s: float) -> float | None:
+    return measurement.value if measurement is not None and measurement.t_s >= oldest_s else None
+
+
+class Facts:
+    """Read-only by convention; made anew by every step."""
+
+    __slots__ = (
+        "amps",
+        "battery",
+        "charger",
+        "energised",
+        "memory",
+        "now_s",
+        "pack_a",
+        "pack_v",
+        "raised",
+        "reading",
+        "rules",
+        "snapshot",
+        "soc",
+        "soh",
+        "state_s",
+        "status",
+        "temperature_c",
+        "volts",
+    )
+
+    def __init__(self, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> None:
+        self.now_s = now_s
+        self.snapshot = snapshot
+        self.memory = memory
+        self.rules = rules
+        reading = snapshot.charger
+        self.reading: ChargerReading | None = (
+            reading if reading is not None and reading.t_s >= now_s - CHARGER_STALE_S else None
+        )
+        self.charger: ChargerLink = snapshot.charger_link
+        self.battery: BatteryLink = snapshot.battery_link
+        self.volts = self.reading.voltage_v if self.reading else None
+        self.amps = self.reading.current_a if self.reading else None
+        battery, fast_s, slow_s = snapshot.battery, now_s - FAST_STALE_S, now_s - SLOW_STALE_S
+        self.pack_v = _fresh(battery.voltage_v, fast_s)
+        self.pack_a = _fresh(battery.current_a, fast_s)
+        self.status = _fresh(battery.status, fast_s)
+        self.temperature_c = _fresh(battery.temperature_c, fast_s)
+        self.soc = _fresh(battery.soc_pct, slow_s)
+        self.soh = _fresh(battery.soh_pct, slow_s)
+        self.energised = memory.state in ENERGISED
+        self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
+        #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
+        self.raised = {name for name, fault in memory.faults.items() if fault.raised_s is not None}
+
+    @property
+    def silent(self) -> bool:
+        """The BMU answers nothing that a charge is supervised by."""
+        return self.pack_v is None and self.temperature_c is None and self.status is None
+
+    @property
+    def departed(self) -> bool:
+        """The battery has left, as batteries do: its BMU is silent and the charger sees no voltage."""
+        return self.silent and not self.battery.online and self.volts is not None and self.volts < TERMINAL_V
+
+    @property
+    def present(self) -> bool:
+        """A battery is there, with everything fresh that a charge needs."""
+        return None not in (self.pack_v, self.pack_a, self.status, self.temperature_c, self.soc, self.soh)
+
+    @property
+    def standby(self) -> bool:
+        """The charger says, freshly, that it is stopped and delivers nothing."""
+        reading = self.reading
+        return reading is not None and reading.operation is Operation.STOPPED and reading.current_a <= STANDBY_A
+
+    @property
+    def runs(self) -> bool:
+        """The charger says, freshly, that it runs or delivers current."""
+        reading = self.reading
+        return reading is not None and (reading.operation is Operation.RUNNING or reading.current_a > STANDBY_A)
+
+    @property
+    def stopped(self) -> bool:
+        """A stop that was sent in this state was answered with standby: the only proof that is taken."""
+        reading, sent_s, since_s = self.reading, self.charger.stop_sent_s, self.memory.since_s
+        if reading is None or sent_s is None or since_s is None:
+            return False
+        return since_s <= sent_s <= reading.t_s and self.standby
+
+    @property
+    def full_mode(self) -> bool:
+        """The charger itself ended a charge that it was running (mode 5 is also plain standby)."""
+        return (
+            self.memory.state is State.CHARGING
+            and self.memory.ran
+            and self.reading is not None
+            and self.reading.charge_mode is ChargeMode.FULL
+        )

@@ -1,0 +1,159 @@
+"""The fault table: one row a fault. A new fault is one row here, one predicate in `checks/`, one test.
+
+Faults name effects, not states; the worst effect wins. `clear` says how a fault ends once its condition is gone:
+
+- AUTO: after `clean_s` without it.
+- BACKOFF: after 10 s without it, and 10, 60, 300 s for the first, second, third time within an hour; the fourth latches.
+- OPERATOR: when an operator starts the bay (or resets it).
+- RESET: when a person resets it; never while the condition is there.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from orchestrator.core.checks import battery, charge, obedience, pair, reports
+from orchestrator.core.facts import Facts
+from orchestrator.model import ENERGISED, Effect, State
+
+Check = Callable[[Facts], str | None]
+
+
+class Clear(Enum):
+    """What ends a fault after its condition is gone."""
+
+    AUTO = auto()
+    BACKOFF = auto()
+    OPERATOR = auto()
+    RESET = auto()
+
+
+ALWAYS = frozenset(State)
+#: The charger was verified to stand by and was not told to run.
+AT_REST = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
+AT_WORK = ENERGISED | {State.QUALIFYING}
+STARTING = frozenset({State.STARTING})
+QUALIFYING = frozenset({State.QUALIFYING})
+UNSTOPPED = frozenset({State.STOPPING, State.UNCONTROLLABLE})
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One fault: when it is raised, what it does, how it ends, what the operator is told to do."""
+
+    id: str
+    source: str  #: its number in the fault catalogue
+    effect: Effect
+    clear: Clear
+    check: Check
+    where: frozenset[State]  #: the states it is looked for in; a fault that is raised is followed everywhere
+    advice: str  #: what to do
+    for_s: float = 0.0  #: the condition must last this long …
+    polls: int = 1  #: … and be seen in this many charger readings in a row
+    clean_s: float = 0.0  #: AUTO, RESET: how long the condition must be gone
+    departs: bool = False  #: a battery that leaves in mid-charge looks like this; once it has left, it was no fault
+
+
+E = Effect
+FAULTS: tuple[Row, ...] = (
+    # what the charger reports
+    Row("reverse_polarity", "C1", E.TRIP, Clear.RESET, reports.reverse_polarity, ALWAYS,
+        "correct the battery's polarity, then reset", clean_s=5),
+    Row("error_stop", "C3", E.TRIP, Clear.RESET, reports.error_stop, ALWAYS,
+        "look at the charger's own display and manual, then reset"),
+    Row("system_stop", "C4", E.STOP, Clear.OPERATOR, reports.system_stop, ALWAYS,
+        "find out who stopped the charger, then start"),
+    Row("illegal_value", "C19", E.STOP, Clear.BACKOFF, reports.illegal_value, ALWAYS,
+        "a value outside its documented list: check the line and the charger's version", polls=2),
+    Row("mode_taken_over", "C8", E.STOP, Clear.OPERATOR, reports.mode_taken_over, ALWAYS,
+        "set the rotary switch or the station file, then start", polls=2),
+    Row("rejected_frame", "C22", E.TRIP, Clear.RESET, reports.rejected_frame, ALWAYS,
+        "this charger does not know our commands: check its model and version, then reset"),
+    Row("noisy_line", "C21", E.WARN, Clear.AUTO, reports.noisy_line, ALWAYS,
+        "check the cable, its shield and its ground", clean_s=10),
+    # whether it obeys
+    Row("charger_silent", "C23, C25", E.STOP, Clear.BACKOFF, obedience.charger_silent, AT_WORK,
+        "check the charger's power and its cable"),
+    Row("found_running", "G10", E.STOP, Clear.OPERATOR, obedience.found_running, STARTING,
+        "it was stopped; find out why it ran, then start"),
+    Row("rogue_run", "C5", E.TRIP, Clear.RESET, obedience.rogue_run, AT_REST,
+        "somebody else commands this charger, or it is defective: find out, then reset"),
+    Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNSTOPPED,
+        "cut the charger's mains now; reset after it was repaired"),
+    Row("will_not_start", "C7", E.STOP, Clear.BACKOFF, obedience.will_not_start, ENERGISED,
+        "check the charger's rotary switch and its mains"),
+    Row("setting_not_obeyed", "C9, C16", E.TRIP, Clear.RESET, obedience.setting_not_obeyed, ENERGISED,
+        "check the charger, then reset"),
+    Row("over_current", "C11", E.TRIP, Clear.RESET, obedience.over_current, ALWAYS,
+        "check the station file's steps_a against the charger, then reset", polls=2),
+    Row("early_full", "C18", E.STOP, Clear.OPERATOR, obedience.early_full, ENERGISED,
+        "check the BMU's SOC against the pack's voltage, then start", polls=2),
+    Row("open_circuit", "C13", E.STOP, Clear.BACKOFF, obedience.open_circuit, ENERGISED,
+        "check the contacts between charger and battery", departs=True),
+    Row("no_battery", "C14", E.STOP, Clear.BACKOFF, obedience.no_battery, ENERGISED,
+        "check the contacts between charger and battery", departs=True),
+    Row("wakes_too_long", "C15", E.TRIP, Clear.RESET, obedience.wakes_too_long, ENERGISED,
+        "the pack may be defective: inspect it, then reset"),
+    # charger and battery side by side
+    Row("over_voltage", "C10, B14", E.TRIP, Clear.RESET, pair.over_voltage, ALWAYS,
+        "inspect pack and charger, check the voltages of policy and station, then reset"),
+    Row("volts_disagree", "B15", E.TRIP, Clear.RESET, pair.volts_disagree, ENERGISED,
+        "check that this BMU belongs to this charger's battery, then reset", for_s=3),
+    Row("not_paired", "B15", E.NO_START, Clear.AUTO, pair.volts_disagree, QUALIFYING,
+        "check that this BMU belongs to this charger's battery", for_s=1, clean_s=1),
+    Row("amps_disagree", "B16", E.TRIP, Clear.RESET, pair.amps_disagree, ENERGISED,
+        "check for loads on the battery and for a wrong node id, then reset", for_s=5),
+    Row("back_feed", "C12", E.TRIP, Clear.RESET, pair.back_feed, ENERGISED,
+        "check charger and wiring, then reset", for_s=2),
+    # the battery
+    Row("bmu_silent", "B1", E.STOP, Clear.BACKOFF, battery.bmu_silent, AT_WORK,
+        "check the CAN cable, its termination and the BMU's power", departs=True),
+    Row("stale_reading", "B2", E.STOP, Clear.BACKOFF, battery.stale_reading, ENERGISED,
+        "check the CAN bus for load and errors", departs=True),
+    Row("sdo_refused", "B3", E.TRIP, Clear.RESET, battery.sdo_refused, ALWAYS,
+        "check the object map against this BMU, then reset"),
+    Row("sdo_aborted", "B4", E.STOP, Clear.BACKOFF, battery.sdo_aborted, ALWAYS,
+        "the BMU cannot answer now; if it stays so, restart it", for_s=0.5),
+    Row("heartbeat_lost", "B6", E.STOP, Clear.BACKOFF, battery.heartbeat_lost, AT_WORK,
+        "check the CAN cable and the BMU's power", departs=True),
+    Row("bmu_rebooted", "B7", E.STOP, Clear.BACKOFF, battery.bmu_rebooted, ENERGISED,
+        "if it happens again, check the BMU's supply"),
+    Row("status_trip", "B9", E.TRIP, Clear.RESET, battery.status_trip, ALWAYS,
+        "inspect the pack, then reset"),
+    Row("status_limit", "B9", E.LIMIT, Clear.AUTO, battery.status_limit, ALWAYS,
+        "charging goes on, on the lowest step", clean_s=10),
+    Row("emergency", "B9", E.STOP, Clear.OPERATOR, battery.emergency, ALWAYS,
+        "read the BMU's error code in its manual, then start"),
+    Row("hot_trip", "B10", E.TRIP, Clear.RESET, battery.hot_trip, ALWAYS,
+        "keep people away until it has cooled down; inspect the pack, then reset"),
+    Row("over_temperature", "B10", E.PAUSE, Clear.AUTO, battery.over_temperature, ALWAYS,
+        "goes on when it has cooled down", clean_s=10),
+    Row("under_temperature", "B11", E.PAUSE, Clear.AUTO, battery.under_temperature, ALWAYS,
+        "goes on when it has warmed up", clean_s=10),
+    Row("runaway", "B12", E.TRIP, Clear.RESET, battery.runaway, ENERGISED,
+        "keep people away; inspect the pack, then reset"),
+    Row("temperature_invalid", "B13", E.TRIP, Clear.RESET, battery.temperature_invalid, ALWAYS,
+        "no temperature, no charge: check the sensor and the object map, then reset", clean_s=5),
+    Row("implausible", "B14, B17", E.STOP, Clear.BACKOFF, battery.implausible, ALWAYS,
+        "check the object map against this BMU"),
+    Row("under_voltage", "B14", E.NO_START, Clear.AUTO, battery.under_voltage, ALWAYS,
+        "too deeply discharged to be woken here: have the pack inspected", for_s=1, clean_s=5),
+    Row("needs_precharge", "B14", E.NO_START, Clear.AUTO, battery.needs_precharge, ALWAYS,
+        "use a policy with a precharge section", for_s=1, clean_s=5),
+    Row("soh_low", "B17", E.NO_START, Clear.AUTO, battery.soh_low, ALWAYS,
+        "the pack is worn out: replace it", clean_s=5),
+    # the charge
+    Row("precharge_no_rise", "C15", E.TRIP, Clear.RESET, charge.precharge_no_rise, ENERGISED,
+        "the pack may be defective: inspect it, then reset"),
+    Row("precharge_too_long", "C15", E.TRIP, Clear.RESET, charge.precharge_too_long, ENERGISED,
+        "the pack may be defective: inspect it, then reset"),
+    Row("time_limit", "C17", E.TRIP, Clear.RESET, charge.time_limit, ENERGISED,
+        "inspect pack and policy, then reset"),
+    Row("ah_limit", "C17", E.TRIP, Clear.RESET, charge.ah_limit, ENERGISED,
+        "the pack took more than it holds: inspect it, check the policy's max_ah, then reset"),
+    # ourselves
+    Row("internal", "G5", E.TRIP, Clear.RESET, charge.internal, ALWAYS,
+        "this is a defect of the software: report it with the journal, then reset"),
+)  # fmt: skip
+
+ROW = {row.id: row for row in FAULTS}

@@ -1,0 +1,126 @@
+"""How faults come and go: debounce, latch, backoff, clear. Mechanism only; what is a fault stands in the table.
+
+Theory of operation. A row's predicate says what is seen now. It becomes a fault after the row's time and number of polls,
+is then followed in every state, and ends as its `Clear` says. A fault whose condition is there is never cleared.
+"""
+
+from dataclasses import replace
+
+from orchestrator.core.facts import Facts
+from orchestrator.core.faults import FAULTS, ROW, Clear, Row
+from orchestrator.core.memory import FaultMemory
+from orchestrator.model import ActiveFault, Effect
+
+#: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
+CLEAN_S = 10.0
+BACKOFF_S = (10.0, 60.0, 300.0)
+#: Strikes are forgotten after this long; one more than there are backoffs latches.
+STRIKES_S = 3600.0
+
+
+def update(f: Facts) -> dict[str, FaultMemory]:
+    """The fault memory after this step's facts."""
+    before, state = f.memory.faults, f.memory.state
+    departed = f.departed and not f.energised
+    after: dict[str, FaultMemory] = {}
+    for row in FAULTS:
+        fault = before.get(row.id)
+        if fault is None and state not in row.where:
+            continue
+        if row.departs and departed:
+            continue
+        looked_for = state in row.where or (fault is not None and fault.raised_s is not None)
+        seen = row.check(f) if looked_for else None
+        if seen is not None:
+            after[row.id] = _present(row, fault or FaultMemory(), seen, f)
+        elif fault is not None:
+            kept = _absent(row, fault, f.now_s)
+            if kept is not None:
+                after[row.id] = kept
+    return after
+
+
+def _present(row: Row, fault: FaultMemory, seen: str, f: Facts) -> FaultMemory:
+    poll_t_s = f.reading.t_s if f.reading else fault.poll_t_s
+    present_s = fault.present_s if fault.present_s is not None else f.now_s
+    polls = fault.polls + 1 if fault.polls == 0 or poll_t_s != fault.poll_t_s else fault.polls
+    fault = replace(fault, present_s=present_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
+    if fault.raised_s is not None or f.now_s - present_s < row.for_s or polls < row.polls:
+        return fault
+    strikes = fault.strikes
+    if row.clear is Clear.BACKOFF:
+        strikes = (*(t for t in strikes if f.now_s - t < STRIKES_S), f.now_s)
+    latched = row.clear is Clear.RESET or len(strikes) > len(BACKOFF_S)
+    return replace(fault, raised_s=f.now_s, text=seen, latched=latched, strikes=strikes)
+
+
+def _absent(row: Row, fault: FaultMemory, now_s: float) -> FaultMemory | None:
+    """What is left of a fault while its condition is not there; None when nothing is."""
+    if fault.raised_s is None:
+        remembered = tuple(t for t in fault.strikes if now_s - t < STRIKES_S)
+        return FaultMemory(strikes=remembered) if remembered else None
+    clean_s = fault.clean_s if fault.clean_s is not None else now_s
+    wait_s = clear_after_s(row, fault)
+    if wait_s is not None and now_s - clean_s >= wait_s:
+        return FaultMemory(strikes=fault.strikes) if fault.strikes else None
+    return replace(fault, present_s=None, polls=0, clean_s=clean_s)
+
+
+def clear_after_s(row: Row, fault: FaultMemory) -> float | None:
+    """How long the condition must be gone for the fault to clear by itself; None: a person must act."""
+    if fault.latched or row.clear in (Clear.OPERATOR, Clear.RESET):
+        return None
+    if row.clear is Clear.BACKOFF:
+        return CLEAN_S + BACKOFF_S[max(len(fault.strikes), 1) - 1]
+    return row.clean_s
+
+
+def effect(name: str, fault: FaultMemory) -> Effect:
+    """A fault that has latched trips, whatever its row says."""
+    return Effect.TRIP if fault.latched else ROW[name].effect
+
+
+def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
+    """The faults in force, worst effect first, then the oldest."""
+    live = [(name, fault) for name, fault in faults.items() if fault.raised_s is not None]
+    live.sort(key=lambda item: (-effect(*item), item[1].raised_s))
+    return live
+
+
+def shown(faults: dict[str, FaultMemory]) -> tuple[ActiveFault, ...]:
+    """The faults in force, for people: what was seen and what to do."""
+    return tuple(
+        ActiveFault(name, effect(name, fault), f"{fault.text}; {_advice(ROW[name], fault)}", fault.raised_s or 0.0)
+        for name, fault in raised(faults)
+    )
+
+
+def _advice(row: Row, fault: FaultMemory) -> str:
+    if fault.latched and row.clear is not Clear.RESET:
+        return f"{row.advice}; it came {len(fault.strikes)} times within an hour: reset by a person"
+    return row.advice
+
+
+def release(
+    faults: dict[str, FaultMemory], now_s: float, *, by_reset: bool
+) -> tuple[dict[str, FaultMemory], list[str]]:
+    """Clear what a person may clear: by a reset everything, by a start what waits for a start.
+
+    Returns the faults that are left and the reasons why some of them could not be cleared.
+    """
+    left: dict[str, FaultMemory] = {}
+    reasons: list[str] = []
+    for name, fault in faults.items():
+        row = ROW[name]
+        if fault.raised_s is None or clear_after_s(row, fault) is not None:
+            left[name] = fault  # it is not a fault, or clears by itself
+        elif not by_reset and (fault.latched or row.clear is Clear.RESET):
+            left[name] = fault
+            reasons.append(f"{name} is latched and needs a reset: {fault.text}")
+        elif fault.clean_s is None:
+            left[name] = fault
+            reasons.append(f"{name} is still there: {fault.text}")
+        elif now_s - fault.clean_s < row.clean_s:
+            left[name] = fault
+            reasons.append(f"{name} must be gone for {row.clean_s:g} s first")
+    return left, reasons

@@ -1,0 +1,98 @@
+"""The state machine: every state, every trigger, every transition, in one table.
+
+Theory of operation. `step()` looks at the facts and picks at most one trigger; this table says where it leads. A pair that
+is not in the table is refused with `RefusedError` and the state stays as it is. Three rules can be read off it:
+
+- Current flows in three states only, and they are left only by `stop`, or one to the next.
+- What follows a stop is chosen after the stop was verified, so no fault names a state.
+- TRIPPED is left by a person's `reset`, or by `stop` if the charger runs again.
+
+`transitions` is used as the engine, with a throw-away model for each call: the machine itself has no state.
+"""
+
+from enum import StrEnum
+
+from transitions import Machine, MachineError
+
+from orchestrator.errors import RefusedError
+from orchestrator.model import State
+
+
+class Trigger(StrEnum):
+    """What can make a bay change its state."""
+
+    STOP = "stop"  #: whatever the reason: no current, and verify it
+    GIVE_UP = "give_up"  #: the charger did not obey a stop in time
+    LOSE = "lose"  #: a device does not answer
+    REST = "rest"  #: verified standby, nothing to do
+    SUSPEND = "suspend"  #: verified standby, goes on by itself later
+    FILL = "fill"  #: verified standby, the battery is full
+    TRIP = "trip"  #: verified standby, a latched fault
+    RESET = "reset"  #: a person has reset every latched fault
+    QUALIFY = "qualify"  #: a battery is there and wants to be charged
+    PULSE = "pulse"  #: begin pulse precharge
+    CONTINUE = "continue"  #: begin continuous precharge
+    CHARGE = "charge"  #: begin to charge
+
+
+S, T = State, Trigger
+
+#: Current flows; in the order in which a deeply discharged pack goes through them.
+ENERGISED_STAGES = (S.PRECHARGE_PULSE, S.PRECHARGE_CONTINUOUS, S.CHARGING)
+#: States in which the charger stands by, verified, and from which a bay goes where the facts lead.
+RESTING = (S.OFFLINE, S.IDLE, S.QUALIFYING, S.FULL, S.SUSPENDED)
+#: States that wait for a verified standby.
+UNVERIFIED = (S.STARTING, S.STOPPING, S.UNCONTROLLABLE)
+
+#: (trigger, the states it is accepted in, the state it leads to; None: the state stays).
+TABLE: tuple[tuple[Trigger, tuple[State, ...], State | None], ...] = (
+    (T.STOP, UNVERIFIED, None),  # they are stopping already
+    (T.STOP, (*RESTING, *ENERGISED_STAGES, S.TRIPPED), S.STOPPING),
+    (T.GIVE_UP, (S.STARTING, S.STOPPING), S.UNCONTROLLABLE),
+    (T.LOSE, (*RESTING, *UNVERIFIED), S.OFFLINE),
+    (T.REST, (*RESTING, *UNVERIFIED), S.IDLE),
+    (T.SUSPEND, (*RESTING, *UNVERIFIED), S.SUSPENDED),
+    (T.FILL, (*RESTING, *UNVERIFIED), S.FULL),
+    (T.TRIP, (*RESTING, *UNVERIFIED), S.TRIPPED),
+    (T.RESET, (S.TRIPPED,), S.IDLE),
+    (T.QUALIFY, (S.IDLE, S.FULL, S.SUSPENDED), S.QUALIFYING),
+    (T.PULSE, (S.QUALIFYING,), S.PRECHARGE_PULSE),
+    (T.CONTINUE, (S.PRECHARGE_PULSE,), S.PRECHARGE_CONTINUOUS),
+    (T.CHARGE, (S.QUALIFYING, S.PRECHARGE_CONTINUOUS), S.CHARGING),
+)
+
+
+class _Bay:
+    """The model that `transitions` moves: made for one call."""
+
+    __slots__ = ("state",)
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+
+
+MACHINE = Machine(
+    model=None,
+    states=State,
+    initial=State.STARTING,
+    transitions=[
+        {"trigger": trigger.value, "source": source, "dest": dest}
+        for trigger, sources, dest in TABLE
+        for source in sources
+    ],
+    auto_transitions=False,
+    queued=False,
+)
+
+
+def fire(state: State, trigger: Trigger) -> State:
+    """The state that `trigger` leads to from `state`.
+
+    Raises RefusedError where the table has no such pair.
+    """
+    bay = _Bay(state)
+    try:
+        MACHINE.events[trigger.value].trigger(bay)
+    except MachineError:
+        raise RefusedError(f"{trigger.value} is not possible in {state.value}") from None
+    return bay.state

@@ -1,0 +1,61 @@
+"""What the core carries from one step to the next. Plain values only, so that it can be written down and read again."""
+
+from dataclasses import dataclass, field, replace
+
+from orchestrator.model import Command, Session, State, Step
+
+
+@dataclass(frozen=True, slots=True)
+class FaultMemory:
+    """One row of the fault table whose condition is, or lately was, true."""
+
+    present_s: float | None = None  #: when the condition became true, None while it is false
+    polls: int = 0  #: charger readings in a row that showed it
+    poll_t_s: float = 0.0  #: the newest of them
+    raised_s: float | None = None  #: when it became a fault, None while it is being debounced
+    clean_s: float | None = None  #: when the condition became false again
+    text: str = ""  #: what was seen when it was raised
+    latched: bool = False  #: a person must reset it
+    strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
+
+
+@dataclass(slots=True)
+class Memory:
+    """`step()` changes a copy of its own, never the one it was given."""
+
+    state: State = State.STARTING
+    since_s: float | None = None  #: when the state was entered; None before the first step
+    last_s: float | None = None  #: when the last step was taken
+    reason: str = "the service has just started"
+    faults: dict[str, FaultMemory] = field(default_factory=dict)
+    stop_reason: str = ""  #: why the last charge was stopped
+    hold: str = ""  #: why a person must start before the next charge; "" is free to go
+    paused: bool = False  #: the operator paused the bay
+    full_pct: float | None = None  #: the SOC at which this battery was charged full here; None: it was not, or it left
+    boots: int = 0  #: boot-ups of the BMU that were dealt with
+    session: Session | None = None
+    counted_t_s: float | None = None  #: the charger reading up to which the session's Ah are counted
+    resumed: bool = False  #: the charger was brought back from standby …
+    resume_s: float = 0.0  #: … by a resume sent after this moment
+    ran: bool = False  #: the charger has reported that it runs, in this stage
+    order: Command | None = None  #: what the sequence is waiting to see confirmed …
+    order_s: float = 0.0  #: … since when
+    tries: int = 0  #: … and how often the resume was repeated for it
+    qualified_s: float | None = None  #: since when everything has spoken for a charge
+    step: Step | None = None
+    raise_s: float | None = None  #: since when a higher step has been allowed
+    taper_s: float | None = None  #: since when the current has been tapered off
+    reached_s: float | None = None  #: since when the pack has been above the stage's voltage
+    mark_s: float = 0.0  #: precharge: where the expected rise is counted from …
+    mark_v: float = 0.0  #: … and the pack voltage then
+    sample: tuple[float, float] | None = None  #: (t_s, °C), the newest …
+    sample_before: tuple[float, float] | None = None  #: … and the one before
+    warmth: tuple[tuple[float, float], ...] = ()  #: (t_s, °C) of the last minutes, oldest first
+    running_s: float | None = None  #: since when the charger has reported that it runs
+    idle_a_s: float | None = None  #: since when a running charger has delivered nothing
+    mode_s: float = 0.0  #: since when the charger has shown its present mode …
+    mode: int = 0  #: … which is this one
+
+    def copy(self) -> "Memory":
+        """An independent copy."""
+        return replace(self, faults=dict(self.faults))

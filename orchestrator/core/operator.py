@@ -1,0 +1,44 @@
+"""What becomes of an operator's request. A refusal names its cause; a reset permits a start, it does not make one."""
+
+from orchestrator.core import latches
+from orchestrator.core.memory import Memory
+from orchestrator.model import Request, State
+
+STOPPED = "stopped by the operator; start to go on"
+RESET = "reset by the operator; start to go on"
+
+
+def hear(memory: Memory, request: Request, now_s: float) -> str:
+    """Change the memory as the operator asks; "" when it was done, else why not."""
+    match request:
+        case Request.STOP:
+            memory.hold = STOPPED
+            return ""
+        case Request.PAUSE:
+            if memory.hold:
+                return f"not running: {memory.hold}"
+            memory.paused = True
+            return ""
+        case Request.START:
+            return _start(memory, now_s)
+        case Request.RESET:
+            return _reset(memory, now_s)
+
+
+def _start(memory: Memory, now_s: float) -> str:
+    if memory.state is State.UNCONTROLLABLE:
+        return "the charger does not obey: cut its mains; nothing can start here"
+    memory.faults, reasons = latches.release(memory.faults, now_s, by_reset=False)
+    if reasons:
+        return "; ".join(reasons)
+    memory.hold, memory.paused = "", False
+    return ""
+
+
+def _reset(memory: Memory, now_s: float) -> str:
+    memory.faults, reasons = latches.release(memory.faults, now_s, by_reset=True)
+    if reasons:
+        return "; ".join(reasons)
+    if memory.state is State.TRIPPED:
+        memory.hold = RESET
+    return ""

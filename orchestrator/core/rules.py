@@ -1,0 +1,39 @@
+"""What a bay is decided by: its station entry and its policy, with the stricter of both worked out once."""
+
+from dataclasses import dataclass
+
+from orchestrator.config.policy import Policy
+from orchestrator.config.station import Bay
+from orchestrator.keys import Range
+from orchestrator.model import ControlMode
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """Fixed for as long as a bay runs on one policy; made by `Rules.of(bay)`."""
+
+    bay: Bay
+    policy: Policy
+    manual: bool  #: the charger obeys values, not only stop and resume
+    max_v: float  #: no current above this, at the charger or at the pack
+    temperature_c: Range  #: no current outside
+    steps_a: tuple[float, ...]  #: what each current-limit step means
+    top_step: int  #: the highest step within the station's current limit
+
+    @classmethod
+    def of(cls, bay: Bay) -> "Rules":
+        """The stricter of station and policy, for each limit that both have."""
+        policy, limits = bay.policy, bay.limits
+        allowed = [index for index, amps in enumerate(bay.charger.steps_a) if amps <= limits.current_a]
+        return cls(
+            bay=bay,
+            policy=policy,
+            manual=bay.charger.control is ControlMode.MANUAL,
+            max_v=min(policy.pack.voltage_v.high, limits.voltage_v),
+            temperature_c=Range(
+                max(policy.pack.temperature_c.low, limits.temperature_c.low),
+                min(policy.pack.temperature_c.high, limits.temperature_c.high),
+            ),
+            steps_a=bay.charger.steps_a,
+            top_step=max(allowed, default=0),
+        )

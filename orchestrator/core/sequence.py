@@ -1,0 +1,62 @@
+"""How a charger is brought to a setpoint: one order at a time, each seen in a status reply before the next.
+
+Manual mode: resume (rest 1) → limit step → mode → precharge function → run. Automatic mode: resume only. An order stands
+until its read-back ends it, and the port repeats it meanwhile, so a lost frame costs one slot. A resume has no read-back
+of its own: it counts when a reply was asked for after it was sent. If what follows is not obeyed, the resume may have been
+the frame that was lost, so the sequence begins again with it.
+"""
+
+from orchestrator.core.facts import Facts
+from orchestrator.model import Action, ChargeMode, ChargerReading, Command, Operation, Setpoint
+
+#: Without a read-back for this long, begin again with the resume.
+RETRY_S = 1.5
+RESUME = Command(Action.RESUME)
+RUN = Command(Action.RUN)
+#: What a charger that was told to run may show before the mode that it was told.
+ON_THE_WAY = (ChargeMode.BATTERY_SEARCH, ChargeMode.BATTERY_RECOVERY)
+
+
+def next_order(f: Facts, setpoint: Setpoint) -> Command | None:
+    """The order that leads towards `setpoint`, None when the status shows all of it.
+
+    Keeps `resumed`, `resume_s`, `order`, `order_s` and `tries` of the memory.
+    """
+    memory, reading = f.memory, f.reading
+    if reading is None:
+        return memory.order
+    missing = _missing(reading, setpoint, manual=f.rules.manual)
+    if missing != memory.order:
+        memory.order, memory.order_s, memory.tries = missing, f.now_s, 0
+    if missing is None or _running(reading):
+        return missing
+    memory.resumed = memory.resumed or _resume_seen(f, reading)
+    tries = int((f.now_s - memory.order_s) / RETRY_S)
+    if tries > memory.tries:
+        memory.tries, memory.resumed, memory.resume_s = tries, False, f.now_s
+    return missing if memory.resumed else RESUME
+
+
+def _running(reading: ChargerReading) -> bool:
+    return reading.operation is Operation.RUNNING
+
+
+def _resume_seen(f: Facts, reading: ChargerReading) -> bool:
+    sent = f.charger.sent
+    return sent is not None and sent.command == RESUME and f.memory.resume_s <= sent.t_s < reading.t_s
+
+
+def _missing(reading: ChargerReading, setpoint: Setpoint, *, manual: bool) -> Command | None:
+    """The first value of the setpoint that the status does not show."""
+    running = _running(reading)
+    if not manual:
+        return None if running else RESUME
+    if setpoint.current_limit is not None and reading.current_limit != setpoint.current_limit:
+        return Command(Action.SET_LIMIT, setpoint.current_limit)
+    if setpoint.charge_mode is not None and reading.charge_mode is not setpoint.charge_mode:
+        under_way = running and reading.charge_mode in ON_THE_WAY
+        if not under_way:
+            return Command(Action.SET_MODE, setpoint.charge_mode)
+    if setpoint.precharge is not None and reading.precharge is not setpoint.precharge:
+        return Command(Action.SET_PRECHARGE, setpoint.precharge)
+    return None if running else RUN

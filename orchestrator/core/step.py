@@ -1,0 +1,120 @@
+"""`step()`: one decision about one bay. The live service, the simulator, the checker and the replay all call this.
+
+facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the standing order.
+"""
+
+from dataclasses import replace
+
+from orchestrator.core import latches, limits
+from orchestrator.core.course import course
+from orchestrator.core.facts import Facts
+from orchestrator.core.machine import fire
+from orchestrator.core.memory import Memory
+from orchestrator.core.operator import hear
+from orchestrator.core.rules import Rules
+from orchestrator.core.safestop import must_stop
+from orchestrator.core.sequence import next_order
+from orchestrator.core.track import follow, follow_state
+from orchestrator.model import (
+    ENERGISED,
+    STANDBY,
+    STOP,
+    ActiveFault,
+    ChargeMode,
+    Command,
+    Decision,
+    Precharge,
+    Session,
+    Setpoint,
+    Snapshot,
+    State,
+    Step,
+)
+
+#: What the charger is told in each state in which current flows; the limit of CHARGING comes from the policy.
+SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
+    State.PRECHARGE_PULSE: (ChargeMode.PRECHARGE, Precharge.PULSE),
+    State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
+    State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
+}
+#: After these a charge is over; a pause or a stop that is still being verified does not end it.
+SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.OFFLINE, State.TRIPPED, State.UNCONTROLLABLE})
+
+
+def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
+    """What to do now, and what to remember.
+
+    `now_s` is monotonic and never goes back between two calls. `memory` is what the call before returned (at first
+    `Memory()`) and is not changed. Depends on nothing else, so the same arguments always give the same result.
+    """
+    last_s, memory = memory.last_s, memory.copy()
+    memory.last_s = now_s
+    if memory.since_s is None:
+        memory.since_s = now_s
+    f = Facts(now_s, snapshot, memory, rules)
+    follow(f, last_s)
+    answer = hear(memory, snapshot.request, now_s) if snapshot.request is not None else ""
+    memory.faults = latches.update(f)
+    faults = latches.shown(memory.faults)
+    ended = _move(f, faults)
+    setpoint, chosen = _setpoint(f, faults)
+    return (
+        Decision(
+            state=memory.state,
+            reason=memory.reason,
+            command=_order(f, setpoint),
+            setpoint=setpoint,
+            step=chosen,
+            faults=faults,
+            alarm=memory.state is State.UNCONTROLLABLE,
+            session=ended or memory.session,
+            answer=answer,
+        ),
+        memory,
+    )
+
+
+def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
+    """Let the state follow the facts; the session that has ended by it, if any."""
+    memory, before = f.memory, f.memory.state
+    trigger, reason = course(f, faults)
+    memory.reason = reason
+    if trigger is None:
+        return None
+    memory.state = fire(before, trigger)
+    if memory.state is before:
+        return None
+    follow_state(f, before)
+    if memory.state is State.STOPPING:
+        memory.stop_reason = reason
+    if memory.session is None or memory.state not in SESSION_ENDS:
+        return None
+    ended = replace(memory.session, result=memory.stop_reason if before is State.STOPPING else reason)
+    memory.session = None
+    return ended
+
+
+def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step | None]:
+    """What the charger shall do in the present state, and the current step that goes with it."""
+    memory, rules = f.memory, f.rules
+    if memory.state not in ENERGISED:
+        return STANDBY, None
+    if not rules.manual:
+        return Setpoint(run=True), None
+    mode, precharge = SETPOINTS[memory.state]
+    if memory.state is State.CHARGING:
+        chosen, memory.raise_s = limits.choose(f, faults[0].effect if faults else None)
+    else:
+        chosen, memory.raise_s = Step(0, rules.steps_a[0], "precharge is always on the lowest step"), None
+    if memory.step is not None and memory.session is not None and chosen.index != memory.step.index:
+        memory.session = replace(memory.session, step_changes=memory.session.step_changes + 1)
+    memory.step = chosen
+    return Setpoint(run=True, current_limit=chosen.index, charge_mode=mode, precharge=precharge), chosen
+
+
+def _order(f: Facts, setpoint: Setpoint) -> Command | None:
+    """The standing order: a stop, the next value of the setpoint, or nothing."""
+    memory = f.memory
+    if memory.state in ENERGISED:
+        return next_order(f, setpoint)
+    return STOP if must_stop(f, memory.state) else None

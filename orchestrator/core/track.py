@@ -1,0 +1,101 @@
+"""What must be followed from step to step: the session's Ah, how long something has lasted, what a battery showed before."""
+
+from dataclasses import replace
+
+from orchestrator.core.checks.battery import WARMING_S
+from orchestrator.core.checks.obedience import NO_CURRENT_A
+from orchestrator.core.facts import CHARGER_STALE_S, Facts
+from orchestrator.core.finish import tapers
+from orchestrator.model import ENERGISED, ChargeMode, Operation, Session, State
+
+#: How far apart the kept temperatures are.
+WARMTH_EVERY_S = 10.0
+
+
+def follow(f: Facts, last_s: float | None) -> None:
+    """Bring the memory up to this step; `last_s` is the time of the one before."""
+    memory, reading = f.memory, f.reading
+    running = reading is not None and reading.operation is Operation.RUNNING
+    memory.running_s = _since(running, memory.running_s, f.now_s)
+    idle = running and reading is not None and reading.current_a < NO_CURRENT_A
+    charging = reading is not None and reading.charge_mode is ChargeMode.CHARGE
+    memory.idle_a_s = _since(idle and charging, memory.idle_a_s, f.now_s)
+    memory.taper_s = _since(memory.state is State.CHARGING and tapers(f), memory.taper_s, f.now_s)
+    memory.ran = memory.ran or (f.energised and running)
+    if reading is not None and reading.charge_mode is not None and reading.charge_mode != memory.mode:
+        memory.mode, memory.mode_s = int(reading.charge_mode), f.now_s
+    _follow_warmth(f)
+    _follow_battery(f)
+    _follow_session(f, last_s)
+
+
+def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  # noqa: FBT001 - the condition itself
+    """Since when something holds without a break."""
+    if not holds:
+        return None
+    return now_s if since_s is None else since_s
+
+
+def _follow_warmth(f: Facts) -> None:
+    """Keep the last minutes' temperatures, thinned out, for the rate of warming and for jumps."""
+    memory, newest = f.memory, f.snapshot.battery.temperature_c
+    if newest is None:
+        memory.sample, memory.sample_before, memory.warmth = None, None, ()
+        return
+    sample = (newest.t_s, newest.value)
+    if sample == memory.sample:
+        return
+    memory.sample_before, memory.sample = memory.sample, sample
+    if not memory.warmth or newest.t_s - memory.warmth[-1][0] >= WARMTH_EVERY_S:
+        kept = tuple(w for w in memory.warmth if newest.t_s - w[0] <= WARMING_S + WARMTH_EVERY_S)
+        memory.warmth = (*kept, sample)
+
+
+def _follow_battery(f: Facts) -> None:
+    """A battery that left, or whose BMU booted, comes back as one that is not known."""
+    memory = f.memory
+    if f.energised:
+        return
+    if memory.boots != f.battery.boots or not f.battery.online:
+        memory.full_pct = None
+    if memory.state is not State.STOPPING:
+        memory.boots = f.battery.boots
+
+
+def _follow_session(f: Facts, last_s: float | None) -> None:
+    """Count time and charge. A gap in the charger's readings counts as nothing beyond their age limit."""
+    memory, reading = f.memory, f.reading
+    if memory.session is None:
+        return
+    ah = wh = 0.0
+    if reading is not None and reading.t_s != memory.counted_t_s:
+        if memory.counted_t_s is not None:
+            hours = min(reading.t_s - memory.counted_t_s, CHARGER_STALE_S) / 3600
+            ah, wh = reading.current_a * hours, reading.current_a * reading.voltage_v * hours
+        memory.counted_t_s = reading.t_s
+    session = memory.session
+    passed_s = f.now_s - last_s if last_s is not None else 0.0
+    memory.session = replace(
+        session,
+        elapsed_s=f.now_s - session.started_s,
+        energised_s=session.energised_s + (passed_s if f.energised else 0.0),
+        charged_ah=session.charged_ah + ah,
+        charged_wh=session.charged_wh + wh,
+        soc_pct=f.soc if f.soc is not None else session.soc_pct,
+    )
+
+
+def follow_state(f: Facts, before: State) -> None:
+    """Set up what the new state counts from; called when the state has just changed from `before`."""
+    memory = f.memory
+    memory.since_s = f.now_s
+    memory.ran, memory.reached_s, memory.taper_s, memory.qualified_s = False, None, None, None
+    memory.mark_s, memory.mark_v = f.now_s, f.pack_v or 0.0
+    memory.step, memory.raise_s = None, None
+    if memory.state not in ENERGISED:
+        memory.order = None
+    elif before not in ENERGISED:
+        memory.resumed, memory.resume_s, memory.order = False, f.now_s, None
+        if memory.session is None:
+            memory.session = Session(started_s=f.now_s, soc_start_pct=f.soc, soc_pct=f.soc)
+            memory.counted_t_s = f.reading.t_s if f.reading else None
