@@ -54,8 +54,8 @@ def find(kind: Kind, text: str, base: Path) -> Place:
     if "/" in text or text.endswith((".yaml", ".yml")):
         path = Path(os.path.normpath(base / text))
         try:
-            if path.is_file():
-                return place(path)
+            if (base / text).is_file():
+                return Place(base / text, str(path))
         except OSError as error:  # e.g. a name that is too long
             raise UnfitError(f"{shown(text)}: {error.strerror}") from None
         raise UnfitError(f"there is no file {path}{_instead(kind, path)}")
@@ -68,7 +68,12 @@ def find(kind: Kind, text: str, base: Path) -> Place:
 def _instead(kind: Kind, path: Path) -> str:
     if path.stem in shipped_names(kind.folder):
         return f"; for the shipped {kind.about} write {path.stem}"
-    beside = sorted(other.name for other in path.parent.glob("*.y*ml")) if path.parent.is_dir() else []
+    return nearest_file(path)
+
+
+def nearest_file(path: Path) -> str:
+    """What may have been meant by the name of a file that is not there."""
     if not path.parent.is_dir():
         return f": there is no directory {path.parent}"
-    return f"; did you mean {near}?" if (near := nearest(path.name, beside)) else ""
+    near = nearest(path.name, sorted(other.name for other in path.parent.glob("*.y*ml")))
+    return f"; did you mean {near}?" if near else ""

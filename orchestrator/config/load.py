@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
-from orchestrator.config.files import KINDS, MAP, POLICY, STATION, Kind, Place, find, place
+from orchestrator.config.files import KINDS, MAP, POLICY, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.policy import Policy
 from orchestrator.config.reader import Reader
 from orchestrator.config.scalars import UnfitError, nearest
@@ -98,7 +98,8 @@ class _Loader:
             node = self._tree(where)
             others = _kinds(node)
             if others and kind not in others:
-                raise UnfitError(f"{self._name(where)} is for a {others[0].about}; needed is one for a {kind.about}")
+                text = f"{self._name(where)} has the key {others[0].key!r}; needed is a file with the key {kind.key!r}"
+                raise UnfitError(text)
             self._loaded[real] = INVALID if node is None else self._read(kind, where, node)
         return self._loaded[real]
 
@@ -122,7 +123,8 @@ class _Loader:
                 with where.path.open("rb") as stream:
                     node, findings = parse(self._name(where), stream.read(MAX_BYTES + 1))
             except OSError as error:
-                text = f"cannot be read: {error.strerror}"
+                near = nearest_file(where.path) if isinstance(error, FileNotFoundError) else ""
+                text = f"cannot be read: {error.strerror}{near}"
                 node, findings = None, [Finding(self._name(where), 1, 1, text)]
             self.findings += findings
             self._trees[real] = node

@@ -12,21 +12,21 @@ class Pack:
     cells_in_series: int = key("cells in series; the voltages of this file are checked against it", ge=1, le=200)
     voltage_v: Range = key("pack voltage: below it a charge is refused, above it is over-voltage", unit="V", gt=0)
     temperature_c: Range = key("outside of it charging pauses until well inside again", unit="°C", ge=-30, le=55)
-    soh_min_pct: float = key("a pack with less health is refused", unit="%", ge=0, le=100)
+    soh_min_pct: float = key("a pack with less health is refused", unit="%", ge=1, le=100)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
     """When a battery that has just arrived is charged."""
 
-    soc_below_pct: float = key("charge a battery that arrives with less than this", unit="%", gt=0, le=100)
+    soc_below_pct: float = key("charge a battery that arrives with less than this", unit="%", ge=1, le=100)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recharge:
     """When a battery that was charged full, and stayed, is charged again."""
 
-    soc_below_pct: float = key("charge again below this", unit="%", gt=0, lt=100)
+    soc_below_pct: float = key("charge again below this", unit="%", ge=1, lt=100)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +98,7 @@ class Taper:
 class Finish:
     """When a charge is over. The first that comes true ends it; hours and Ah are limits and end it as a fault."""
 
-    soc_pct: float = key("full at this state of charge", unit="%", gt=0, le=100)
+    soc_pct: float = key("full at this state of charge", unit="%", ge=1, le=100)
     taper: Taper | None = key("full when the current has tapered off", default=None)
     charger_full: bool = key("full when the charger itself says so (mode 5)", default=True)
     max_hours: float = key("a charge that takes longer is a fault", unit="h", gt=0, le=12)
@@ -110,12 +110,8 @@ class Thresholds:
     """Limits of the fault table. Each default is the loosest that is allowed: a policy may only be stricter."""
 
     temperature_trip_c: float = key("latch at or above this", unit="°C", le=55, gt=0, default=55.0)
-    temperature_rise_k_per_min: float = key(
-        "latch when it rises faster over 3 min", unit="K/min", gt=0, le=1, default=1.0
-    )
-    over_current_pct: float = key(
-        "latch above this share of the step's current", unit="%", gt=100, le=110, default=110.0
-    )
+    temperature_rise_k_per_min: float = key("latch when it rises faster over 3 min", unit="K/min", gt=0, le=1, default=1.0)
+    over_current_pct: float = key("latch above this share of the step's current", unit="%", gt=100, le=110, default=110.0)
     volts_differ_v: float = key("charger and BMU may differ by this …", unit="V", gt=0, le=1, default=1.0)
     volts_differ_pct: float = key("… or by this share, whichever is more", unit="%", gt=0, le=2, default=2.0)
     amps_differ_a: float = key("charger and BMU may differ by this …", unit="A", gt=0, le=1, default=1.0)

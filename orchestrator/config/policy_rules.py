@@ -77,9 +77,9 @@ def _recharge(recharge_pct: float, finish_pct: float) -> Problems:
 def _trip(trip_c: float, temperature_c: Range) -> Problems:
     if trip_c <= temperature_c.high:
         yield (
-            "faults.temperature_trip_c",
-            f"{trip_c:g} °C must be above pack.temperature_c's upper end, {temperature_c.high:g} °C: "
-            "the bay pauses there, and latches only when it gets hotter still",
+            "pack.temperature_c[1]",
+            f"{temperature_c.high:g} °C must be below faults.temperature_trip_c, {trip_c:g} °C: "
+            "at the one the bay pauses, at the other it latches",
         )
 
 

@@ -110,7 +110,8 @@ class Reader:
     def _range(self, node: Node, path: str, key: Key) -> object:
         if not isinstance(node, Items) or len(node.items) != 2:
             meant = scalars.range_meant(node.text) if isinstance(node, Scalar) else ""
-            self.report(path, f"write {meant or '[low, high]'}: {key.about}")
+            much = f", two numbers (2.5, not 2,5), not {len(node.items)}" if isinstance(node, Items) else ""
+            self.report(path, f"write {meant or '[low, high]'}{much}: {key.about}")
             return INVALID
         low, high = (self._element(item, float, f"{path}[{i}]", key) for i, item in enumerate(node.items))
         if not (isinstance(low, float) and isinstance(high, float)):
@@ -137,7 +138,7 @@ class Reader:
 
     def _mapping(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
         if not isinstance(node, Entries) or not node.entries:
-            self.report(path, f"needs names with their values: {key.about}")
+            self.report(path, f"needs names with their values, indented below it: {key.about}")
             return INVALID
         values = {}
         for name, value in node.entries:
@@ -156,7 +157,7 @@ class Reader:
         if isinstance(node, Refused):
             return INVALID
         if not isinstance(node, Entries):
-            self.report(path, f"needs the keys {', '.join(known)}")
+            self.report(path, f"needs the keys {', '.join(known)}, indented below it")
             return INVALID
         given = {name.text for name, _ in node.entries}
         values: dict[str, object] = {}
@@ -175,13 +176,13 @@ class Reader:
         """Says what an unknown key may have meant; if that is still free, its value is read as such."""
         known = slots(record)
         near = scalars.nearest(name.text, known) if len(self.findings) < MAX_FINDINGS else ""
-        hint = f"did you mean {near}? " if near else ""
+        hint = f"did you mean {near}? Allowed here: " if near else "allowed here: "
         inner = places(record, frozenset(self._references))
         where = [place for place in inner if place.rpartition(".")[2] == name.text]
         if where:
-            hint = f"it belongs below {' or '.join(place.rpartition('.')[0] for place in where)}, indented. "
+            hint = f"it belongs below {' or '.join(place.rpartition('.')[0] for place in where)}, indented; allowed here: "
         at = f" in {path}" if path else ""
-        self._report(name.mark, f"unknown key {name.text!r}{at}; {hint}Allowed here: {', '.join(known)}")
+        self._report(name.mark, f"unknown key {name.text!r}{at}; {hint}{', '.join(known)}")
         return known[near] if near and near not in taken and not where else None
 
     def _absent(self, slot: Slot, path: str) -> object:

@@ -4,10 +4,10 @@ YAML's own guessing is not used: to it `on` is true, `1:30` is 90, `012` is 10, 
 Here the key decides what is expected; whatever other YAML readers would take differently is refused.
 """
 
-import difflib
 import math
 import re
 from collections.abc import Callable, Iterable
+from difflib import SequenceMatcher
 from enum import Enum
 
 from orchestrator.config.yamltree import Scalar
@@ -20,6 +20,7 @@ _TRUE = {"true", "yes", "on", "y", "1"}
 _FALSE = {"false", "no", "off", "n", "0"}
 _RANGE = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:\.\.+|…|-|–|~|to|,|;|:|/)\s*([-+]?\d+(?:\.\d+)?)", re.ASCII)
 _MAX_DIGITS = 40  #: of a number; more is nonsense
+_ALIKE = 0.6  #: of 1; below, two words are not a slip of each other
 _MAX_WORD = 64  #: that is compared with others
 _MAX_PATH = 4096  #: bytes, Linux' PATH_MAX
 
@@ -37,16 +38,17 @@ def nearest(word: str, known: Iterable[str]) -> str:
     """The known word that was probably meant, or ""."""
     if len(word) > _MAX_WORD:
         return ""
-    by_folded = {k.casefold().replace("-", "_"): k for k in known}
-    found = difflib.get_close_matches(word.casefold().replace("-", "_"), by_folded, n=1, cutoff=0.6)
-    return by_folded[found[0]] if found else ""
+    folded = word.casefold().replace("-", "_")
+    score = {other: SequenceMatcher(None, folded, other.casefold().replace("-", "_")).ratio() for other in known}
+    best = max(score, key=score.__getitem__, default="")
+    return best if best and score[best] >= _ALIKE else ""
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """`did you mean X? ` if one is near, and all that is allowed."""
     known = tuple(known)
     near = nearest(word, known)
-    return (f"did you mean {near}? " if near else "") + f"Allowed: {', '.join(known)}"
+    return (f"did you mean {near}? Allowed: " if near else "allowed: ") + ", ".join(known)
 
 
 def quantity(value: float, unit: str) -> str:
@@ -116,7 +118,8 @@ def read_path(node: Scalar, key: Key) -> str:
     if len(text) > _MAX_PATH:
         raise UnfitError(f"a path has at most {_MAX_PATH} characters, this one {len(text)}")
     if key.is_path and "/" not in text:
-        raise UnfitError(f"{shown(text)} is not a whole path: write e.g. /dev/{text.lower()[:_MAX_DIGITS]}")
+        example = f"/dev/{text}" if text.startswith("tty") else "/dev/ttyUSB0"
+        raise UnfitError(f"{shown(text)} is not a whole path: write e.g. {example[:_MAX_DIGITS]}")
     return text
 
 
@@ -188,16 +191,17 @@ _HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"\d+(:\d+(\.\d+)?)+", re.A), _sexagesimal),
     (re.compile(r"[-+]?\.(nan|inf)|[-+]?(nan|inf|infinity)", re.I), lambda m: f"{m[0]} is not a number to charge by"),
     (re.compile(r"0x[\da-f]+", re.I | re.A), lambda m: f"write it in decimal: {int(m[0], 16)}, not {m[0]}"),
+    (re.compile(r"0o[0-7]+", re.A), lambda m: f"write it in decimal: {int(m[0], 8)}, not {m[0]}"),
     (
-        re.compile(r"0o?\d+", re.A),
-        lambda m: f"{m[0]} with a leading 0 may be read as octal: write {m[0].lstrip('0o') or 0}",
+        re.compile(r"0\d+", re.A),
+        lambda m: f"{m[0]} with a leading 0 may be read as octal: write {m[0].lstrip('0') or 0}",
     ),
     (re.compile(r"([-+]?\d+),(\d+)", re.A), lambda m: f"use a decimal point: {m[1]}.{m[2]}, not {m[0]}"),
     (re.compile(r"[-+]?\d[\d_.]*_[\d_.]*", re.A), lambda m: f"write {_number(m[0].replace('_', ''))} without '_'"),
     (re.compile(r"[-+]?[\d.]+e[-+]?\d+", re.I | re.A), lambda m: f"write the number out: {_number(m[0])}, not {m[0]}"),
     (re.compile(r"[-+]?(\d+\.|\.\d+|0+\d+\.\d*)", re.A), lambda m: f"write {_number(m[0])}, not {m[0]}"),
     (
-        re.compile(r"([-+]?\d+(\.\d+)?) *[^\d.,:\s].*", re.A),
+        re.compile(r"(?!0[xo])([-+]?\d+(\.\d+)?) *[^\d.,:\s].*", re.A),
         lambda m: f"only the number, without a unit: {m[1]}, not {m[0]}",
     ),
 )

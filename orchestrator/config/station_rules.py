@@ -163,7 +163,11 @@ def _bay_name(name: str) -> Problems:
 
 def _steps(steps_a: tuple[float, ...]) -> Problems:
     if len(steps_a) != STEPS:
-        yield "charger.steps_a", f"{len(steps_a)} values; the charger has {STEPS} current-limit steps, lowest first"
+        commas = " (a decimal has a point, 2.5, not a comma)" if len(steps_a) > STEPS else ""
+        yield (
+            "charger.steps_a",
+            f"{len(steps_a)} values; the charger has {STEPS} current-limit steps, lowest first{commas}",
+        )
     for i, (lower, upper) in enumerate(pairwise(steps_a), start=1):
         if upper <= lower:
             yield f"charger.steps_a[{i}]", f"{upper:g} A must be above the step before, {lower:g} A"
@@ -173,8 +177,7 @@ def _lowest_step(steps_a: tuple[float, ...], current_a: float) -> Problems:
     if steps_a[0] > current_a:
         yield (
             "charger.steps_a[0]",
-            f"even the lowest step, {steps_a[0]:g} A, is above limits.current_a, {current_a:g} A: "
-            "no step would be allowed",
+            f"even the lowest step, {steps_a[0]:g} A, is above limits.current_a, {current_a:g} A: no step would be allowed",
         )
 
 

@@ -35,20 +35,26 @@ _EXPLANATIONS: tuple[tuple[str, str, bool, str], ...] = (
     (
         r"expected ',' or '\]'",
         "",
-        False,
-        "the list that was opened with [ in line {line} is not closed: a ',' or ']' is missing before this",
+        True,
+        "the list that begins here is not closed: a ',' or ']' is missing before line {to_line}, column {to_column}",
     ),
     (
         r"expected ',' or '\}'",
         "",
-        False,
-        "the group that was opened with {{ in line {line} is not closed: a ',' or '}}' is missing before this",
+        True,
+        "the group that begins here is not closed: a ',' or '}}' is missing before line {to_line}, column {to_column}",
     ),
     (
         "sequence entries are not allowed here",
         "",
         False,
         "a list item '- ' cannot stand here: put it in a line of its own below its key",
+    ),
+    (
+        "expected <block end>, but found '(?P<what>[^<'][^']*|<scalar>)'",
+        "",
+        False,
+        "nothing can stand here, behind a value that has ended: a ',' missing, or quotes around a text?",
     ),
     (
         "expected <block end>",
@@ -60,8 +66,7 @@ _EXPLANATIONS: tuple[tuple[str, str, bool, str], ...] = (
         "expected <block end>",
         "",
         False,
-        "the indentation does not fit, or something stands behind a closed value: the group began in line {line}, "
-        "column {column}, all its keys belong there",
+        "the indentation does not fit: the group began in line {line}, column {column}, all its lines begin there",
     ),
     (
         "expected alphabetic or numeric character",
@@ -86,7 +91,9 @@ def explain(error: yaml.MarkedYAMLError) -> tuple[int, int, str]:
         match = re.search(pattern, problem)
         if match and re.search(within, context):
             mark = began if at_start else error.problem_mark
-            facts = {**match.groupdict(), "line": _line(began), "column": _column(began)}
+            there = error.problem_mark
+            facts: dict[str, object] = dict(match.groupdict(), line=_line(began), column=_column(began))
+            facts.update(to_line=_line(there), to_column=_column(there))
             return _line(mark), _column(mark), text.format(**facts)
     mark = error.problem_mark or began
     return _line(mark), _column(mark), f"not valid YAML: {', '.join(p for p in (error.context, problem) if p)}"
