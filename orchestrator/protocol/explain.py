@@ -17,7 +17,7 @@ from orchestrator.protocol.frame import (
     frame_size,
     why_bad,
 )
-from orchestrator.protocol.hextext import hex_of, parse_hex
+from orchestrator.protocol.hextext import byte_count, hex_of, parse_hex
 from orchestrator.protocol.meaning import NAMES, meaning_of, order_words
 
 #: The one example of the document that is no frame; who types it in wants to know that it is not their mistake.
@@ -78,12 +78,8 @@ def _frame(piece: bytes) -> Frame:
     return Frame(piece[4], piece[5], piece[6:-COUNTED])
 
 
-def _bytes(count: int) -> str:
-    return f"{count} byte" if count == 1 else f"{count} bytes"
-
-
 def _garbage(at: int, piece: bytes) -> Explained:
-    head = f"byte {at}: {_bytes(len(piece))} outside of any frame (no start AF FA)"
+    head = f"byte {at}: {byte_count(len(piece))} outside of any frame (no start AF FA)"
     rows: list[Row] = [("", piece[cut : cut + 16], "") for cut in range(0, len(piece), 16)]
     facts: dict[str, object] = {"offset": at, "hex": hex_of(piece), "frame": False, "valid": False}
     return Explained(ok=False, text=_text(head, rows, []), facts=facts)
@@ -92,7 +88,7 @@ def _garbage(at: int, piece: bytes) -> Explained:
 def _good(at: int, piece: bytes, frame: Frame, kinds: Kinds | None) -> Explained:
     rows, facts, problems = _fields(piece, frame, kinds)
     verdict = "a whole frame, but not as documented" if problems else "good"
-    head = f"byte {at}: {facts['name']}, {_bytes(len(piece))}, {verdict}"
+    head = f"byte {at}: {facts['name']}, {byte_count(len(piece))}, {verdict}"
     facts = {"offset": at, "hex": hex_of(piece), "frame": True, "valid": True, **facts, "problems": problems}
     return Explained(ok=not problems, text=_text(head, rows, problems), facts=facts)
 
@@ -118,7 +114,8 @@ def _hints(ahead: bytes, piece: bytes) -> list[str]:
     if piece == _MISPRINT:
         return [_MISPRINT_NOTE]
     end = ahead.find(END, OVERHEAD - 2)
-    if piece.endswith(END) or end < 0 or ahead.find(START, 2, end) > 0:
+    whole = declared_size(piece) == len(piece) and piece.endswith(END)
+    if whole or end < 0 or ahead.find(START, 2, end) > 0:
         return []
     return [
         f"an end AF A0 stands after {end + 2} bytes: the length of such a frame is 0x{end + 2 - OVERHEAD + COUNTED:02X}"
@@ -138,7 +135,7 @@ def _fields(piece: bytes, frame: Frame, kinds: Kinds | None) -> tuple[list[Row],
     rows = [
         ("start", piece[:2], ""),
         ("address", piece[2:3], "" if piece[2] == ADDRESS else f"wrong, expected {ADDRESS:02X}"),
-        ("length", piece[3:4], f"{piece[3]}: command, order, {_bytes(len(frame.data))} of data, checksum"),
+        ("length", piece[3:4], f"{piece[3]}: command, order, {byte_count(len(frame.data))} of data, checksum"),
         ("command", piece[4:5], f"{name} ({sender})"),
         ("order", piece[5:6], order),
         *(("" if at else "data", part, words) for at, (part, words) in enumerate(meaning.rows)),

@@ -8,6 +8,8 @@ after anything wrong resumes its hunt one byte past the false start.
 
 from dataclasses import dataclass
 
+from orchestrator.protocol.hextext import hex_of
+
 START = b"\xaf\xfa"
 END = b"\xaf\xa0"
 ADDRESS = 0x90  #: every charger's, for good (§3.2.3)
@@ -47,7 +49,7 @@ class Frame:
         return START + counted + bytes((checksum(counted),)) + END
 
     def __str__(self) -> str:
-        return self.encode().hex(" ").upper()
+        return hex_of(self.encode())
 
 
 def declared_size(candidate: bytes) -> int | None:
@@ -73,7 +75,7 @@ def why_bad(candidate: bytes) -> str:
     if said != summed:
         wrong.append(f"checksum 0x{said:02X}, expected 0x{summed:02X}")
     if end != END:
-        wrong.append(f"end {end.hex(' ').upper()}, expected {END.hex(' ').upper()}")
+        wrong.append(f"end {hex_of(end)}, expected {hex_of(END)}")
     return "; ".join(wrong)
 
 
@@ -120,7 +122,7 @@ class FrameDecoder:
         if not self._rejected:
             return ""
         shown = self._rejected[: declared_size(self._rejected) or _HEADER]
-        return f"{why_bad(self._rejected)} in {shown.hex(' ').upper()}"
+        return f"{why_bad(self._rejected)} in {hex_of(shown)}"
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that these bytes complete, in order."""

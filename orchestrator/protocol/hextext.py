@@ -1,4 +1,4 @@
-"""Hexadecimal as people paste it: `AF FA 90`, `AFFA90`, `0xAF,0xFA`, `[AF:FA]`, `\\xAF\\xFA`."""
+"""Bytes in words, and hexadecimal as people paste it: `AF FA 90`, `AFFA90`, `0xAF,0xFA`, `[AF:FA]`, `\\xAF\\xFA`."""
 
 import re
 
@@ -9,9 +9,14 @@ _DIGITS = re.compile(r"[0-9A-Fa-f]+")
 _STRANGE = re.compile(r"[^0-9A-Fa-f\s,;:|\-\[\](){}<>]+")
 
 
-def hex_of(data: bytes) -> str:
+def hex_of(data: bytes | bytearray) -> str:
     """How this package prints bytes: `AF FA 90`."""
     return data.hex(" ").upper()
+
+
+def byte_count(count: int) -> str:
+    """`1 byte`, `2 bytes`."""
+    return f"{count} byte" if count == 1 else f"{count} bytes"
 
 
 def parse_hex(text: str) -> bytes:

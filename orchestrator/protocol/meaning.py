@@ -14,6 +14,7 @@ from orchestrator.protocol.charger import (
     status_values,
 )
 from orchestrator.protocol.frame import ADDRESS, Frame
+from orchestrator.protocol.hextext import byte_count
 
 
 @dataclass(slots=True)
@@ -128,7 +129,7 @@ def _raw_reply(frame: Frame, kinds: Kinds | None) -> Meaning:
             f"kinds 0x{kinds[0]:02X} 0x{kinds[1]:02X} are answered with {expected} data bytes, got {count}"
         )
     elif count % 2:
-        meaning.problems.append(f"data of {count} bytes, but every value has two")
+        meaning.problems.append(f"data of {byte_count(count)}, but every value has two")
     else:
         meaning.rows.append((b"", "a reply does not say which values it holds: give the kinds of its request"))
     return meaning
@@ -178,5 +179,5 @@ def meaning_of(frame: Frame, kinds: Kinds | None) -> Meaning:
     if decode is None:
         meaning.problems.append(f"command 0x{frame.command:02X} is not documented")
     else:
-        meaning.problems.append(f"data of {len(frame.data)} bytes, expected {size}")
+        meaning.problems.append(f"data of {byte_count(len(frame.data))}, expected {size}")
     return meaning

@@ -7,6 +7,8 @@ understood on purpose. Everything is little-endian (§3).
 from dataclasses import dataclass
 from enum import IntEnum
 
+from orchestrator.protocol.hextext import byte_count, hex_of
+
 FRAME_BYTES = 8
 
 _READ = 0x40
@@ -127,10 +129,10 @@ class SdoMalformed:
 SdoReply = SdoValue | SdoWritten | SdoAbort | SdoMalformed
 
 
-def parse_reply(data: bytes) -> SdoReply:
-    """What a frame on a node's reply COB-ID says. Never raises."""
+def parse_reply(data: bytes | bytearray) -> SdoReply:
+    """What a frame on a node's reply COB-ID says. Never raises. (python-can hands out bytearrays.)"""
     if len(data) != FRAME_BYTES:
-        return SdoMalformed(f"{len(data)} bytes, expected {FRAME_BYTES}: {bytes(data).hex(' ').upper()}")
+        return SdoMalformed(f"{byte_count(len(data))}, expected {FRAME_BYTES}: {hex_of(data)}")
     command, index, sub = data[0], data[1] | data[2] << 8, data[3]
     size = _VALUE.get(command)
     if size is not None:
@@ -139,7 +141,7 @@ def parse_reply(data: bytes) -> SdoReply:
         return SdoWritten(index, sub)
     if command == _ABORT:
         return SdoAbort(index, sub, int.from_bytes(data[4:], "little"))
-    return SdoMalformed(f"command 0x{command:02X}, expected 43, 4B, 4F, 60 or 80: {bytes(data).hex(' ').upper()}")
+    return SdoMalformed(f"command 0x{command:02X}, expected 43, 4B, 4F, 60 or 80: {hex_of(data)}")
 
 
 #: CiA 301, table 22.

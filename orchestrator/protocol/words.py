@@ -1,6 +1,7 @@
 """From the BMU's words to measurements, by an object map."""
 
 from orchestrator.model import Measurement
+from orchestrator.protocol.hextext import byte_count
 from orchestrator.protocol.objects import FieldMap, ObjectEntry
 
 #: What a field's newest raw bits turned out to be: a value in range; None where the BMU says that it has none (so a
@@ -16,7 +17,7 @@ def raw_bits(field: FieldMap, word: int) -> int:
 def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[str, Decoded]:
     """Every field of an object, from the unsigned word that a reply of `size` bytes carried; asked for at `t_s`."""
     if size != entry.size:
-        why = f"0x{entry.index:04X}:{entry.sub:02X} declared {size} bytes, the map says {entry.size}"
+        why = f"0x{entry.index:04X}:{entry.sub:02X} declared {byte_count(size)}, the map says {entry.size}"
         return {field.name: why for field in entry.fields}
     return {field.name: _decode(field, word, t_s) for field in entry.fields}
 

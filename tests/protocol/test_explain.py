@@ -1,0 +1,271 @@
+"""What a person at a serial log, and a program, are told about pasted frames."""
+
+import json
+from textwrap import dedent
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.errors import HexError
+from orchestrator.protocol.explain import Explained, explain
+from orchestrator.protocol.frame import ADDRESS, MAX_DATA, Frame, FrameDecoder
+from orchestrator.protocol.hextext import hex_of
+from tests.protocol.vectors import CHARGER, GOOD, ChargerVector
+
+VECTOR = {vector.name: vector for vector in CHARGER}
+STOP = "AF FA 90 04 10 90 00 34 AF A0"
+
+
+def only(text: str, kinds: tuple[int, int] | None = None) -> Explained:
+    (one,) = explain(text, kinds)
+    return one
+
+
+def of(command: int, data: bytes, order: int = ADDRESS, kinds: tuple[int, int] | None = None) -> Explained:
+    return only(hex_of(Frame(command, order, data).encode()), kinds)
+
+
+def test_a_good_frame_is_told_field_by_field() -> None:
+    assert only("AF FA 90 09 03 90 13 93 09 07 00 03 E5 AF A0", (3, 4)).text == dedent("""\
+            byte 0: status reply, 15 bytes, good
+              start     AF FA
+              address   90
+              length    09     9: command, order, 6 bytes of data, checksum
+              command   03     status reply (charger → controller)
+              order     90     the charger meant
+              data      13 93  voltage 50.11 V
+                        09 07  current 23.11 A
+                        00 03  charge mode 3 (precharge)
+              checksum  E5     good
+              end       AF A0""")
+
+
+def test_the_documents_misprint_is_told_as_what_it_is() -> None:
+    told = only(hex_of(VECTOR["error_as_printed"].wire))
+    assert told.text == dedent("""\
+            byte 0: not a good frame: checksum 0x39, expected 0x68
+              start     AF FA
+              address   90
+              length    07     7: command, order, 4 bytes of data, checksum
+              command   1F     error (charger → controller: the frame that it received was bad)
+              order     03     what was wrong: length, command
+              data      11     length that it received
+                        10     command that it received
+                        05     order that it received
+                        89     checksum that it received
+              checksum  39     wrong, expected 68
+              end       AF A0
+              ! This is the example of §3.3.5: the document prints 0x39, the sum is 0x68. A charger would send 0x68.""")
+    assert (told.ok, told.facts["valid"], told.facts["checksum"]) == (False, False, {"got": 0x39, "expected": 0x68})
+
+
+@pytest.mark.parametrize("vector", GOOD, ids=str)
+def test_every_golden_frame_is_explained_to_a_program(vector: ChargerVector) -> None:
+    kinds = (vector.requested["kind1"], vector.requested["kind2"]) if vector.requested else None
+    told = only(hex_of(vector.wire), kinds)
+    assert told.ok
+    assert {"frame": True, "valid": True, "problems": [], "hex": hex_of(vector.wire)}.items() <= told.facts.items()
+    decoded = told.facts["decoded"]
+    assert isinstance(decoded, dict)
+    assert vector.decoded.items() <= decoded.items()
+
+
+FACTS = [
+    (0x01, b"\x03\x04", {"kind1": 3, "kind2": 4, "asks": ["voltage_v", "current_a", "charge_mode"]}),
+    (0x01, b"\x00\x00", {"kind1": 0, "kind2": 0, "asks": []}),
+    (0x02, b"\x01\x01", {"push": 1, "value": 1}),
+    (0x10, b"\x01", {"rest": 1}),
+]
+
+
+@pytest.mark.parametrize(("command", "data", "decoded"), FACTS)
+def test_what_is_sent_is_decoded(command: int, data: bytes, decoded: dict[str, object]) -> None:
+    assert of(command, data).facts["decoded"] == decoded
+
+
+@pytest.mark.parametrize(
+    ("command", "data", "line"),
+    [
+        (0x01, b"\x03\x04", "03     kind 1: voltage, current"),
+        (0x01, b"\x03\x04", "04     kind 2: charge mode"),
+        (0x01, b"\x00\x1f", "00     kind 1: none"),
+        (0x01, b"\x01\x00", "00     kind 2: none"),
+        (0x02, b"\x01\x00", "00     0: stop"),
+        (0x02, b"\x02\x04", "02     push: current limit"),
+        (0x02, b"\x02\x04", "04     4: step 5, the highest"),
+        (0x02, b"\x04\x03", "03     3: precharge"),
+        (0x02, b"\x08\x02", "02     2: continuous"),
+        (0x10, b"\x00", "00     stop: to standby, whatever it is doing"),
+        (0x10, b"\x01", "01     resume: from standby back to normal"),
+    ],
+)
+def test_every_kind_of_order_has_its_words(command: int, data: bytes, line: str) -> None:
+    told = of(command, data)
+    assert line in told.text
+    assert told.ok
+
+
+@pytest.mark.parametrize(
+    ("told", "problem"),
+    [
+        (of(0x02, b"\x04\x07"), "charge mode 7 (documented: 3, 4, 5)"),
+        (of(0x02, b"\x03\x01"), "push 0x03 (documented: 1, 2, 4, 8)"),
+        (of(0x02, b"\x01"), "data of 1 byte, expected 2"),
+        (of(0x10, b"\x02"), "rest 2 (documented: 0, 1)"),
+        (of(0x10, b""), "data of 0 bytes, expected 1"),
+        (of(0x10, b"\x00", order=0x91), "order 0x91, expected 0x90: it must equal the address"),
+        (of(0x44, bytes(12)), "command 0x44 is not documented"),
+        (of(0x03, bytes(6), kinds=(0x13, 0x1F)), "kinds 0x13 0x1F are answered with 16 data bytes, got 6"),
+        (of(0x03, bytes(5)), "data of 5 bytes, but every value has two"),
+        (of(0x03, b"\x00\x09", kinds=(0, 4)), "charge mode 9 (documented: 1 … 8)"),
+        (of(0x1F, bytes(3), order=1), "data of 3 bytes, expected 4"),
+    ],
+)
+def test_a_whole_frame_that_is_not_as_documented_says_so(told: Explained, problem: str) -> None:
+    assert (told.ok, told.facts["valid"], told.facts["problems"]) == (False, True, [problem])
+    assert "a whole frame, but not as documented" in told.text
+    assert told.text.endswith(f"! {problem}")
+
+
+# --- which values a reply holds --------------------------------------------------------------------------------------
+
+SHORT_REPLY = "AF FA 90 09 03 90 13 93 09 07 00 03 E5 AF A0"
+
+
+def test_a_reply_of_the_services_own_length_is_taken_for_its_kinds() -> None:
+    told = of(0x03, bytes.fromhex("13930907000100010004000400020001"))
+    assert told.facts["decoded"] == {
+        "kind1": 0x13,
+        "kind2": 0x1F,
+        "voltage_v": 50.11,
+        "current_a": 23.11,
+        "control_mode": 1,
+        "operation": 1,
+        "current_limit": 4,
+        "charge_mode": 4,
+        "precharge": 2,
+        "connection": 1,
+    }
+    assert "taken for the kinds 0x13 0x1F that the service asks for" in told.text
+
+
+def test_a_reply_to_nobody_knows_what_is_shown_as_words() -> None:
+    told = only(SHORT_REPLY)
+    assert (told.ok, told.facts["decoded"]) == (True, {"words": [5011, 2311, 3]})
+    assert "give the kinds of its request" in told.text
+
+
+def test_a_reply_is_decoded_by_the_request_before_it() -> None:
+    _, told = explain(f"AF FA 90 05 01 90 03 04 2D AF A0 {SHORT_REPLY}")
+    assert told.facts["decoded"] == {
+        "kind1": 3,
+        "kind2": 4,
+        "voltage_v": 50.11,
+        "current_a": 23.11,
+        "charge_mode": 3,
+    }
+
+
+def test_the_kinds_that_a_person_gives_win_over_those_of_a_request() -> None:
+    _, told = explain(f"AF FA 90 05 01 90 00 07 2D AF A0 {SHORT_REPLY}", (0x07, 0x00))
+    assert told.facts["decoded"] == {
+        "kind1": 7,
+        "kind2": 0,
+        "voltage_v": 50.11,
+        "current_a": 23.11,
+        "temperature_1_c": 0.3,
+    }
+    assert "temperature 1 0.3 °C" in told.text
+
+
+# --- bad frames and garbage ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        (
+            "AF FA 91 04 10 91 00 36 AF A0",
+            [
+                "not a good frame: address 0x91, expected 0x90",
+                "91     wrong, expected 90",
+                "91     order 0x91, expected",
+            ],
+        ),
+        (
+            "AF FA 90 04 10 90 00 34 AF A1",
+            ["not a good frame: end AF A1, expected AF A0", "AF A1  wrong, expected AF A0", "34     good"],
+        ),
+        (
+            "AF FA 90 03 10 90 00 34 AF A0",
+            [
+                "checksum 0x00, expected 0x33; end 34 AF, expected AF A0",
+                "! an end AF A0 stands after 10 bytes: the length of such a frame is 0x04",
+                "byte 9: 1 byte outside of any frame (no start AF FA)",
+            ],
+        ),
+        (
+            "AF FA 90 FF 10 90 00 34 AF A0",
+            [
+                "length 0xFF, expected 0x03 … 0x23",
+                "  rest      00 34 AF A0",
+                "! an end AF A0 stands after 10 bytes: the length of such a frame is 0x04",
+            ],
+        ),
+        ("AF FA 90 FF AF A0", ["  order     A0"]),
+        (
+            "AF FA 90 05 02",
+            ["byte 0: not a good frame: incomplete: 5 bytes, its length 0x05 makes it 11", "  command   02"],
+        ),
+        ("AF FA", ["byte 0: not a good frame: incomplete: 2 bytes, the smallest frame has 9"]),
+    ],
+)
+def test_a_bad_frame_says_what_is_wrong_with_it(text: str, lines: list[str]) -> None:
+    told = explain(text)
+    everything = "\n".join(one.text for one in told)
+    assert not any(one.ok for one in told)
+    for line in lines:
+        assert line in everything
+
+
+def test_garbage_between_frames_is_shown_where_it_stands() -> None:
+    told = explain(f"00 11 {STOP} {'55' * 17} {STOP} AF")
+    assert [(one.facts["offset"], one.facts["frame"]) for one in told] == [
+        (0, False),
+        (2, True),
+        (12, False),
+        (29, True),
+        (39, False),
+    ]
+    assert told[0].text == "byte 0: 2 bytes outside of any frame (no start AF FA)\n            00 11"
+    assert told[2].text.splitlines()[2].strip() == "55"
+
+
+def test_a_good_frame_inside_a_false_start_is_explained_too() -> None:
+    false_start, good = explain(f"AF FA 90 23 {STOP}")
+    assert (false_start.ok, good.ok, good.facts["offset"]) == (False, True, 4)
+    assert "an end AF A0 stands" not in false_start.text  # that end is another frame's
+
+
+def test_a_false_start_reaches_to_the_next_start_where_its_length_makes_no_sense() -> None:
+    false_start, good = explain(f"AF FA 90 00 01 {STOP}")
+    assert (false_start.facts["hex"], good.facts["hex"]) == ("AF FA 90 00 01", STOP)
+
+
+def test_text_that_is_not_hexadecimal_is_refused_with_its_place() -> None:
+    with pytest.raises(HexError, match="'x' at character 4"):
+        explain("AF x")
+
+
+@given(st.binary(min_size=1, max_size=MAX_DATA * 4))
+def test_any_bytes_are_explained_and_the_good_frames_are_the_decoders(data: bytes) -> None:
+    for stream in (data, b"\xaf\xfa\x90\x05" + data, Frame(0x03, ADDRESS, data[:MAX_DATA]).encode() + data):
+        told = explain(hex_of(stream))
+        decoder = FrameDecoder()
+        frames = decoder.feed(stream) + decoder.flush()
+        assert [one.facts["hex"] for one in told if one.facts["valid"]] == [str(frame) for frame in frames]
+        assert len([one for one in told if one.facts["frame"] and not one.facts["valid"]]) == decoder.bad_frames
+        for one in told:
+            assert json.loads(json.dumps(one.facts)) == one.facts
+            assert one.text
