@@ -1,0 +1,99 @@
+"""What a charger's port does next, and when. Pure: time is an argument, so that tests can jump.
+
+The line is used in slots of 200 ms. Without an order every slot is a poll; with one, orders and polls take turns. A
+stop waits for no slot: it goes out as soon as the line is free, and again every 500 ms while it is the standing order.
+In manual mode the rest of it (operation 0) always takes the next slot, whatever has been ordered meanwhile: a stop that
+was begun is finished, so that no resume can find the charger still set to run.
+"""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+from math import inf
+
+from orchestrator.model import STOP, Action, Command, ControlMode
+
+SLOT_S = 0.2  #: "200 ms or more is recommended" (protocol 2/2, §2.2.2)
+STOP_REPEAT_S = 0.5  #: a lost stop costs no more than this
+#: How long an order occupies the line: 11 bytes at 19200 baud take 5.7 ms; then a gap of 4 bytes, so that the charger
+#: can tell the next frame from this one.
+ORDER_S = 0.008
+
+
+class Turn(Enum):
+    """What a turn on the line is used for."""
+
+    POLL = auto()
+    ORDER = auto()  #: the standing order, other than stop
+    STOP = auto()  #: rest 0
+    OPERATION_STOP = auto()  #: operation 0, the second half of a stop in manual mode
+
+
+@dataclass(frozen=True, slots=True)
+class Due:
+    """The next turn and its time; a time in the past means: now."""
+
+    turn: Turn
+    at_s: float
+
+
+class Schedule:
+    """The turns of one port. Not locked: the port does that."""
+
+    __slots__ = ("_after_poll", "_free_s", "_half_stopped", "_manual", "_slot_s", "_stop_s", "_urgent", "order")
+
+    def __init__(self, control: ControlMode) -> None:
+        self._manual = control is ControlMode.MANUAL
+        self.order: Command | None = STOP  #: the standing order
+        self._stop_s = -inf  # when the last stop was begun
+        self.restart(-inf)
+
+    def restart(self, now_s: float) -> None:
+        """The port was opened, or something unforeseen happened: stop first, whatever was ordered before.
+
+        At most once a slot, so that an error that comes again each time does not flood the line.
+        """
+        self.order = STOP
+        self._urgent = True
+        self._half_stopped = False  # operation 0 is still to follow
+        self._after_poll = True  # the last slot was a poll
+        self._free_s = self._slot_s = self._stop_s = max(now_s, self._stop_s + SLOT_S)
+
+    def give(self, command: Command | None) -> bool:
+        """Replace the standing order. True if that is a new stop, for which nobody may sleep on."""
+        stop = command is not None and command.action is Action.STOP
+        new_stop = stop and not self.stopping
+        self.order = command
+        self._urgent = self._urgent or new_stop
+        return new_stop
+
+    @property
+    def stopping(self) -> bool:
+        """Whether the standing order is stop."""
+        return self.order is not None and self.order.action is Action.STOP
+
+    @property
+    def stop_unfinished(self) -> bool:
+        """Whether a frame of a stop is still to be written."""
+        return self._urgent or self._half_stopped
+
+    def next(self) -> Due:
+        """The next turn, if no new order comes before."""
+        if self._urgent:
+            return Due(Turn.STOP, self._free_s)
+        if self._half_stopped:
+            return Due(Turn.OPERATION_STOP, self._slot_s)
+        if self.stopping and self._stop_s + STOP_REPEAT_S <= self._slot_s:
+            return Due(Turn.STOP, self._stop_s + STOP_REPEAT_S)
+        if self.order is None or self.stopping or not self._after_poll:
+            return Due(Turn.POLL, self._slot_s)
+        return Due(Turn.ORDER, self._slot_s)
+
+    def took(self, turn: Turn, start_s: float, end_s: float) -> None:
+        """A turn was taken, from `start_s` to `end_s`."""
+        self._slot_s = start_s + SLOT_S
+        self._free_s = end_s if turn is Turn.POLL else end_s + ORDER_S
+        self._after_poll = turn is Turn.POLL
+        if turn is Turn.STOP:
+            self._stop_s, self._urgent, self._half_stopped = start_s, False, self._manual
+        elif turn is Turn.OPERATION_STOP:
+            self._half_stopped = False

@@ -1,0 +1,87 @@
+"""The last gate before the wire: a second, simpler opinion on every order, given right before it becomes bytes.
+
+It trusts nothing that the core concluded. It knows the station's hard limits, what the devices said lately (the grant)
+and what a charger can be told; whatever is not allowed by those is refused. Only a stop needs nobody's leave.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+
+from orchestrator.config.station import ChargerConfig, Limits
+from orchestrator.model import Action, Command, ControlMode, Snapshot
+
+#: Five polls. A charger that has not answered for so long may be doing anything.
+CHARGER_MAX_AGE_S = 1.0
+#: As long as a BMU's silence may be bridged with its last values (DESIGN §6).
+BATTERY_MAX_AGE_S = 1.5
+
+#: The values that each order may carry, by who sets the charger's values. What is not in here is refused.
+ALLOWED: Mapping[ControlMode, Mapping[Action, frozenset[int]]] = {
+    ControlMode.MANUAL: {
+        Action.RESUME: frozenset({0}),
+        Action.SET_LIMIT: frozenset({0, 1, 2, 3, 4}),
+        Action.SET_MODE: frozenset({3, 4, 5}),
+        Action.SET_PRECHARGE: frozenset({0, 1, 2}),
+        Action.RUN: frozenset({0}),
+    },
+    ControlMode.AUTOMATIC: {Action.RESUME: frozenset({0})},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """What the devices said, as evidence for orders that let current flow, and until when it may be relied on."""
+
+    expires_s: float  #: the first of these readings is too old from then on
+    voltage_v: float  #: the higher one of charger and pack
+    temperature_c: float  #: of the pack
+    current_limit: int | None  #: the step that the charger showed last
+
+
+def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
+    """The evidence in a snapshot; None if a reading is missing, not a number, too old or from the future."""
+    charger, volts, temperature = snapshot.charger, snapshot.battery.voltage_v, snapshot.battery.temperature_c
+    if charger is None or volts is None or temperature is None:
+        return None
+    if not all(map(isfinite, (charger.voltage_v, volts.value, temperature.value))):
+        return None
+    expires_s = min(charger.t_s + CHARGER_MAX_AGE_S, volts.t_s + BATTERY_MAX_AGE_S, temperature.t_s + BATTERY_MAX_AGE_S)
+    newest_s = max(charger.t_s, volts.t_s, temperature.t_s)
+    if not newest_s <= now_s < expires_s:
+        return None
+    return Grant(expires_s, max(charger.voltage_v, volts.value), temperature.value, charger.current_limit)
+
+
+def permit(command: Command, evidence: Grant | None, now_s: float, charger: ChargerConfig, limits: Limits) -> str:
+    """Why the order must not go out now; "" if it may. A stop always may.
+
+    `limits` are the hard ones of the station file; nothing here comes from a policy.
+    """
+    action, value = command.action, command.value
+    if action is Action.STOP:
+        return ""
+    if value not in ALLOWED[charger.control].get(action, ()):
+        return f"{action} {value} is no order for a charger in {charger.control.name.lower()} mode"
+    if evidence is None:
+        return f"{action}: no fresh reading of charger, pack voltage and pack temperature"
+    if not now_s < evidence.expires_s:
+        return f"{action}: the readings that it rests on are {now_s - evidence.expires_s:.1f} s too old"
+    if not evidence.voltage_v <= limits.voltage_v:
+        return f"{action}: {evidence.voltage_v:g} V is above the station's {limits.voltage_v:g} V"
+    if evidence.temperature_c not in limits.temperature_c:
+        return f"{action}: {evidence.temperature_c:g} °C is outside the station's {limits.temperature_c} °C"
+    if action is Action.SET_LIMIT:
+        return _too_much(action, value, charger, limits)
+    if action is Action.RUN:
+        return _too_much(action, evidence.current_limit, charger, limits)
+    return ""
+
+
+def _too_much(action: Action, step: int | None, charger: ChargerConfig, limits: Limits) -> str:
+    if step is None or not 0 <= step < len(charger.steps_a):
+        return f"{action}: what the charger's current limit {step} means is not known"
+    current_a = charger.steps_a[step]
+    if not current_a <= limits.current_a:
+        return f"{action}: step {step} is {current_a:g} A, above the station's {limits.current_a:g} A"
+    return ""
