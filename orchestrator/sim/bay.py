@@ -17,6 +17,7 @@ class Bay:
 
     charger: Charger
     pack: Pack
+    connected: bool = True  #: the battery is in the bay
     falsify: dict[str, Callable[[float], float]] = field(default_factory=dict)
 
     def advance(self, dt_s: float) -> None:
@@ -24,7 +25,7 @@ class Bay:
         while dt_s > 0:
             step_s = min(dt_s, MAX_STEP_S)
             self.pack.advance(step_s, self.charger.current_a)
-            self.charger.advance(step_s, self.pack)
+            self.charger.advance(step_s, self.pack if self.connected else None)
             # The pack sees the new current at once: charger and BMU are measured on one cable.
             self.pack.current_a = self.charger.current_a
             dt_s -= step_s

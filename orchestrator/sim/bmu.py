@@ -46,9 +46,7 @@ def words(readout: Readout, layout: Layout) -> dict[int, int]:
         0x6000: _word([(volts, 16), (amps, 16)], first_high=True),  # the sample fixes this one
         0x6001: _word([(readout.status, 16), (minutes[0], 16)], first_high=high),
         0x6002: _word([(minutes[1], 16), (round(readout.soc_pct), 8), (round(readout.soh_pct), 8)], first_high=high),
-        0x6003: _word(
-            [(round(readout.remaining_ah * 100), 16), (round(readout.available_wh * 10), 16)], first_high=high
-        ),
+        0x6003: _word([(round(readout.remaining_ah * 100), 16), (round(readout.available_wh * 10), 16)], first_high=high),
         0x6004: round(readout.temperature_c * 10) & 0xFFFF,
     }
 

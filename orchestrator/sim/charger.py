@@ -60,6 +60,7 @@ class Charger:
     precharge: Precharge = Precharge.OFF
 
     # what is going on
+    battery: bool = True  #: there is one at its terminals
     voltage_v: float = 0.0
     current_a: float = 0.0
     full: bool = False
@@ -145,7 +146,7 @@ class Charger:
             return self.halted
         if self.resting or self.full:
             return ChargeMode.FULL
-        return self.mode
+        return self.mode if self.battery or not self.run else ChargeMode.BATTERY_SEARCH
 
     @property
     def connection(self) -> Connection:
@@ -157,6 +158,7 @@ class Charger:
     def advance(self, dt_s: float, pack: Pack | None) -> None:
         """Let `dt_s` pass and set the output for the pack as it is now; `current_a` is what will flow next."""
         self.stage_s += dt_s
+        self.battery = pack is not None
         if pack is None:
             self.voltage_v = self.current_a = 0.0
             if self.control_mode is ControlMode.AUTOMATIC:

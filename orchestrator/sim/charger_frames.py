@@ -3,7 +3,9 @@
 It shares nothing with `orchestrator.protocol`: where the two disagree, one of them has misread the document.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 
 from orchestrator.sim.charger import Charger
 
@@ -18,6 +20,21 @@ LENGTH_ERROR, COMMAND_ERROR, ORDER_ERROR, CHECKSUM_ERROR = 1, 2, 4, 8
 
 #: Frames are never longer than this (§3.2.7: at most 20 bytes of data).
 MAX_LENGTH = 23
+
+
+class Kind(IntEnum):
+    """What a status reply can hold, in the order of §4.1.1: five bits of kind 1, then five of kind 2."""
+
+    VOLTAGE = 0
+    CURRENT = 1
+    TEMPERATURE_1 = 2
+    TEMPERATURE_2 = 3
+    CONTROL_MODE = 4
+    OPERATION = 5
+    CURRENT_LIMIT = 6
+    CHARGE_MODE = 7
+    PRECHARGE = 8
+    CONNECTION = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,26 +112,30 @@ def complaint(request: Request, errors: int) -> bytes:
     return frame(ERROR, errors, bytes((request.length, request.command, request.order, request.checksum)))
 
 
-def status(charger: Charger, kind1: int, kind2: int) -> bytes:
-    """0x03: the requested values, in list order, two bytes each; no values for the bits that mean nothing."""
+def status(charger: Charger, kind1: int, kind2: int, lies: Mapping[Kind, int]) -> bytes:
+    """0x03: the requested values, in list order, two bytes each; no values for the bits that mean nothing.
+
+    `lies` replaces values, whatever the charger is doing.
+    """
+    wanted = kind1 & 0x1F | (kind2 & 0x1F) << 5
     values = _values(charger)
-    wanted = [values[0][bit] for bit in range(5) if kind1 >> bit & 1] + [
-        values[1][bit] for bit in range(5) if kind2 >> bit & 1
-    ]
-    return frame(REPLY, ADDRESS, b"".join(value.to_bytes(2, "big") for value in wanted))
+    answers = (lies.get(kind, values[kind]) for kind in Kind if wanted >> kind & 1)
+    return frame(REPLY, ADDRESS, b"".join(value.to_bytes(2, "big") for value in answers))
 
 
-def _values(charger: Charger) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """The ten values of §4.1.1 by kind and bit; the two temperatures have no information since 2022-01."""
+def _values(charger: Charger) -> tuple[int, ...]:
+    """The ten values of §4.1.1, in its order; the two temperatures have no information since 2022-01."""
     return (
-        (_hundredths(charger.voltage_v), _hundredths(charger.current_a), 0, 0, charger.control_mode),
-        (
-            charger.operation,
-            charger.current_limit,
-            charger.charge_mode,
-            charger.precharge,
-            charger.connection,
-        ),
+        _hundredths(charger.voltage_v),
+        _hundredths(charger.current_a),
+        0,
+        0,
+        charger.control_mode,
+        charger.operation,
+        charger.current_limit,
+        charger.charge_mode,
+        charger.precharge,
+        charger.connection,
     )
 
 

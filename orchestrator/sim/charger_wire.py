@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.sim.charger import Charger
-from orchestrator.sim.charger_frames import CHECKSUM_ERROR, REST, SET, STATUS, Ear, Request, complaint, status
+from orchestrator.sim.charger_frames import CHECKSUM_ERROR, REST, SET, STATUS, Ear, Kind, Request, complaint, status
 from orchestrator.sim.line import Line, Noise
 
 #: A frame that pauses for this long (some 60 byte times) has been cut off.
@@ -53,6 +53,7 @@ class ChargerWire:
         self.mute_rx = False  #: hears nothing
         self.mute_tx = False  #: says nothing
         self.complains = False  #: answers every frame with 0x1F, checksum error
+        self.lies: dict[Kind, int] = {}  #: values that its status replies say, whatever is true
         self.on_bytes: Callable[[float, bytes], None] | None = None  #: called with (monotonic s, bytes) as they come
         self.path = ""
         self._loop = loop
@@ -138,7 +139,8 @@ class ChargerWire:
             self._say(complaint(request, request.errors or CHECKSUM_ERROR))
         elif request.command == STATUS:
             counters.polls += 1
-            self._say(status(self.charger, *request.data))
+            kind1, kind2 = request.data
+            self._say(status(self.charger, kind1, kind2, self.lies))
         elif request.command == SET:
             counters.orders += 1
             self.charger.push(*request.data)

@@ -7,9 +7,11 @@ charger did because of them, and what the pack has become, stays.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from orchestrator.model import ChargeMode
+from orchestrator.model import ChargeMode, ControlMode
 from orchestrator.sim.can_wire import NodeFaults
 from orchestrator.sim.charger import Push
+from orchestrator.sim.charger_frames import Kind
+from orchestrator.sim.pack import DRIVEN_K_PER_S
 from orchestrator.sim.rig import Rig
 
 #: SDO abort: "object does not exist in the object dictionary".
@@ -76,15 +78,22 @@ def _frozen_temperature(rig: Rig, _: float | None) -> None:
 
 
 def _over_temperature(rig: Rig, value: float | None) -> None:
-    _pin_temperature(rig, 48.0 if value is None else value)
+    _drive_temperature(rig, 48.0 if value is None else value)
 
 
 def _under_temperature(rig: Rig, value: float | None) -> None:
-    _pin_temperature(rig, -5.0 if value is None else value)
+    _drive_temperature(rig, -5.0 if value is None else value)
 
 
-def _pin_temperature(rig: Rig, celsius: float) -> None:
-    rig.bay.pack.temperature_c = rig.bay.pack.ambient_c = celsius
+def _drive_temperature(rig: Rig, target_c: float) -> None:
+    """The first step is there at once, the rest comes as fast as a pack's temperature can change."""
+    pack = rig.bay.pack
+    pack.driven_c = target_c
+    pack.temperature_c += min(max(target_c - pack.temperature_c, -DRIVEN_K_PER_S), DRIVEN_K_PER_S)
+
+
+def _temperature_jump(rig: Rig, value: float | None) -> None:
+    rig.bay.falsify["temperature_c"] = lambda celsius: celsius + (15.0 if value is None else value)
 
 
 def _over_voltage(rig: Rig, value: float | None) -> None:
@@ -140,6 +149,19 @@ def _bmu_reboot(rig: Rig, _: float | None) -> None:
     rig.bmu.reboot()
 
 
+def _illegal_value(rig: Rig, value: float | None) -> None:
+    rig.wire.lies[Kind.CHARGE_MODE] = 9 if value is None else int(value)
+
+
+def _mode_taken_over(rig: Rig, _: float | None) -> None:
+    rig.bay.charger.control_mode = ControlMode.AUTOMATIC
+
+
+def _battery_removed(rig: Rig, _: float | None) -> None:
+    rig.bay.connected = False
+    rig.bmu.port.faults.mute = True
+
+
 def _port_gone(rig: Rig, _: float | None) -> None:
     rig.wire.close()
 
@@ -147,20 +169,19 @@ def _port_gone(rig: Rig, _: float | None) -> None:
 def _heal(rig: Rig, _: float | None) -> None:
     charger, pack = rig.bay.charger, rig.bay.pack
     charger.reversed = charger.rogue = charger.ignores_stop = False
-    charger.halted, charger.gain = None, 1.0
+    charger.halted, charger.gain, charger.control_mode = None, 1.0, rig.as_built.control_mode
     charger.deaf_to.clear()
     pack.bias_v, pack.leaky = 0.0, False
-    if pack.ambient_c != ROOM_C:
-        _pin_temperature(rig, ROOM_C)
+    if pack.driven_c is not None:
+        pack.driven_c = rig.as_built.ambient_c
     rig.bay.falsify.clear()
+    rig.bay.connected = True
+    rig.wire.lies.clear()
     rig.wire.mute_rx = rig.wire.mute_tx = rig.wire.complains = False
     rig.bmu.port.faults = NodeFaults()
     if not rig.wire.is_open:
         rig.wire.open()
 
-
-#: What `heal` brings the surroundings back to.
-ROOM_C = 20.0
 
 FAULTS = {
     "reverse_polarity": Fault("the charger says that the battery is connected the wrong way round", _reverse_polarity),
@@ -174,9 +195,10 @@ FAULTS = {
     "wrong_size": Fault("the BMU tells the temperature in the wrong size", _wrong_size),
     "implausible_soc": Fault("the BMU says 140 % state of charge", _implausible_soc),
     "stale_reading": Fault("the BMU's answers come 2 s late", _stale_reading),
+    "temperature_jump": Fault("the BMU says 15 K more from one reading to the next", _temperature_jump),
     "frozen_temperature": Fault("the BMU goes on saying the temperature of now", _frozen_temperature),
-    "over_temperature": Fault("the pack is 48 °C hot", _over_temperature),
-    "under_temperature": Fault("the pack is −5 °C cold", _under_temperature),
+    "over_temperature": Fault("the pack heats up to 48 °C, 4 K at once and 4 K in each second", _over_temperature),
+    "under_temperature": Fault("the pack cools down to −5 °C, 4 K at once and 4 K in each second", _under_temperature),
     "over_voltage": Fault("the pack's voltage rises 4 V above the charger's end of charge", _over_voltage),
     "over_current": Fault("the charger delivers half as much again as its limit", _over_current),
     "volts_disagree": Fault("the BMU says 3 V less than the charger", _volts_disagree),
@@ -186,6 +208,9 @@ FAULTS = {
     "rogue_run": Fault("the charger starts by itself after standing still for 2 s", _rogue_run),
     "command_ignored": Fault("the charger falls to its lowest limit and takes no other", _command_ignored),
     "precharge_no_rise": Fault("what flows into the pack is lost inside: its voltage stays", _precharge_no_rise),
+    "illegal_value": Fault("the charger says mode 9, which does not exist", _illegal_value),
+    "mode_taken_over": Fault("somebody turns the charger's rotary switch to automatic", _mode_taken_over),
+    "battery_removed": Fault("the battery is taken out of the bay", _battery_removed),
     "ignore_stop": Fault("the charger no longer obeys a stop", _ignore_stop),
     "bmu_reboot": Fault("the BMU restarts and forgets its settings", _bmu_reboot),
     "port_gone": Fault("the serial adapter is unplugged", _port_gone),

@@ -24,7 +24,7 @@ class Line:
 LINES = {
     "perfect": Line(),
     "real": Line(byte_s=BYTE_S),
-    "bytewise": Line(bytewise=True),
+    "bytewise": Line(byte_s=BYTE_S, bytewise=True),
     "delayed": Line(answer_s=0.08),
     "lossy": Line(loss=0.05),
     "garbage": Line(garbage=0.5),

@@ -28,10 +28,13 @@ NMC = (
 )
 
 #: The same below 0 %, over the share of the deep discharge that is gone (−1 … 0): steep at first, then flatter.
-DEEP = ((-2.0, 0.0), (-1.0, 2.54), (-0.66, 2.77), (0.0, 3.00))
+DEEP = ((-2.0, 0.0), (-1.0, 2.54), (-0.57, 2.76), (0.0, 3.00))
 
 #: Where a BMU of this kind sets its status bits: volts of a cell and °C; wider than what any charge policy allows.
-HIGH_CELL_V, LOW_CELL_V, HIGH_C, LOW_C = 4.25, 2.30, 60.0, -20.0
+HIGH_CELL_V, LOW_CELL_V, HIGH_C, LOW_C = 4.25, 2.80, 60.0, -20.0
+
+#: How fast a fault can heat or cool a pack: not faster than a sensor's reading can be believed.
+DRIVEN_K_PER_S = 4.0
 
 Curve = tuple[tuple[float, float], ...]
 
@@ -80,6 +83,7 @@ class Pack:
     current_a: float = 0.0  #: positive while charging
     bias_v: float = 0.0  #: added to the open-circuit voltage by a fault
     leaky: bool = False  #: a fault: charge that flows in is lost inside
+    driven_c: float | None = None  #: a fault drives the temperature here and holds it there
 
     @property
     def usable_ah(self) -> float:
@@ -112,10 +116,22 @@ class Pack:
         if not self.leaky:
             self.charge_ah += current_a * dt_s / 3600
         self.current_a = current_a
-        loss_w = current_a * current_a * self.resistance_ohm
+        if self.driven_c is None:
+            self._warm(dt_s)
+        else:
+            self._drive(dt_s, self.driven_c)
+
+    def _warm(self, dt_s: float) -> None:
+        loss_w = self.current_a * self.current_a * self.resistance_ohm
         settled_c = self.ambient_c + loss_w / self.cooling_w_per_k
         fade = math.exp(-dt_s * self.cooling_w_per_k / self.heat_j_per_k)
         self.temperature_c = settled_c + (self.temperature_c - settled_c) * fade
+
+    def _drive(self, dt_s: float, target_c: float) -> None:
+        step_k = DRIVEN_K_PER_S * dt_s
+        self.temperature_c += min(max(target_c - self.temperature_c, -step_k), step_k)
+        if self.temperature_c == target_c == self.ambient_c:
+            self.driven_c = None  # back where nature would have it
 
     def status(self) -> int:
         """The status bits that the pack's own state sets."""

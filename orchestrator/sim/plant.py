@@ -60,6 +60,8 @@ class Plant:
         pack = PACKS[args.pack]()
         if args.soc is not None:
             pack.set_soc(args.soc)
+        if args.temperature is not None:
+            pack.temperature_c = pack.ambient_c = args.temperature
         charger = Charger(ControlMode.AUTOMATIC if args.automatic else ControlMode.MANUAL)
         setup = Setup(
             node_id=args.node + number % self._per_bus,
@@ -201,10 +203,9 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--node", type=lambda text: int(text, 0), default=0x10, help="node id of each bus's first BMU")
     parser.add_argument("--pack", choices=PACKS, default="48v")
     parser.add_argument("--soc", type=float, help="state of charge at first, %%; -100 … 0 is deep discharge")
+    parser.add_argument("--temperature", type=float, help="of the packs and their surroundings, °C")
     parser.add_argument("--line", choices=LINES, default="real", help="what the serial lines do to bytes")
-    parser.add_argument(
-        "--layout", choices=("first-high", "first-low"), default="first-high", help="of the BMU's words"
-    )
+    parser.add_argument("--layout", choices=("first-high", "first-low"), default="first-high", help="of the BMU's words")
     parser.add_argument("--automatic", action="store_true", help="the chargers' rotary switches are on 5, not on 1")
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real time the batteries live")
     args = parser.parse_args(argv)

@@ -17,7 +17,7 @@ def demo() -> Pack:
     pack = Pack(
         cells=13,
         capacity_ah=0.15,
-        deep_ah=0.0027,
+        deep_ah=0.0024,
         resistance_ohm=0.08,
         heat_j_per_k=900.0,
         cooling_w_per_k=1.0,

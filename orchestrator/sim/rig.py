@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from orchestrator.model import ControlMode
 from orchestrator.sim.bay import Bay
 from orchestrator.sim.bmu import Bmu, Layout
 from orchestrator.sim.can_wire import CanWire
@@ -27,11 +28,20 @@ class Setup:
     speed: float = 1.0  #: model seconds in one real second
 
 
+@dataclass(frozen=True, slots=True)
+class AsBuilt:
+    """What a fault may change and healing brings back."""
+
+    control_mode: ControlMode
+    ambient_c: float
+
+
 class Rig:
     """A bay of the model with its charger on a pty and its BMU on a bus. Belongs to the loop's thread."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, can_wire: CanWire, bay: Bay, setup: Setup) -> None:
         self.bay = bay
+        self.as_built = AsBuilt(bay.charger.control_mode, bay.pack.ambient_c)
         self.injected_s: float | None = None  #: when the newest fault was injected, `time.monotonic()`
         self._loop = loop
         self._speed = setup.speed
