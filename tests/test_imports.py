@@ -1,0 +1,264 @@
+"""The one direction of the code, as tables: who imports whom, who owns a library, who may touch the outside world.
+
+The rules read the source, so that an import inside a function or for typing only counts like any other.
+"""
+
+import ast
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = "orchestrator"
+ROOT = Path(__file__).resolve().parent.parent / PACKAGE
+
+#: Part of the package → the parts, or single modules of them, that it may import besides itself.
+EDGES: dict[str, tuple[str, ...]] = {
+    "errors": (),
+    "keys": (),
+    "model": (),
+    "protocol": ("errors", "keys", "model"),
+    "config": ("errors", "keys", "model", "protocol.objects"),
+    "interlock": ("config.policy", "config.station", "errors", "keys", "model"),
+    "core": ("config.policy", "config.station", "errors", "keys", "model"),
+    "link": ("errors", "keys", "model", "protocol"),
+    # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
+    "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
+    "service": ("config", "core", "devices", "errors", "interlock", "keys", "link", "model", "protocol"),
+    # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
+    "sim": ("model", "protocol.objects"),
+    "cli": (
+        "config", "core", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service", "sim",
+    ),
+    "__main__": ("cli",),
+}  # fmt: skip
+
+#: Third-party library → its owners; nobody else imports it, and nothing else is imported at all.
+OWNERS: dict[str, tuple[str, ...]] = {
+    "can": ("link.can", "sim"),
+    "canopen": ("link.can",),
+    "durand": ("sim",),
+    "rich": ("cli.demo", "sim"),
+    "serial": ("link.serial",),
+    "transitions": ("core.machine",),
+    "yaml": ("config",),
+}
+
+#: These give the same answer to the same arguments, for ever: of the standard library they may use only LIBRARY.
+PURE = ("core", "errors", "interlock", "keys", "model", "protocol")
+LIBRARY = frozenset({
+    "abc", "bisect", "collections", "contextlib", "dataclasses", "decimal", "enum", "fractions", "functools", "heapq",
+    "itertools", "math", "operator", "re", "statistics", "string", "struct", "types", "typing",
+})  # fmt: skip
+#: … and none of these built-in functions.
+IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "open", "print"})
+
+CLOCK_READERS = ("cli", "service", "sim")
+CLOCKS = frozenset(
+    name + suffix for name in ("time", "monotonic", "perf_counter", "process_time", "thread_time") for suffix in ("", "_ns")
+) | {"clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "strftime"}  # fmt: skip
+
+MAX_FILE_LINES = 300
+MAX_FUNCTION_LINES = 40
+
+
+@dataclass(frozen=True)
+class Module:
+    """One source file; `name` is dotted and without the package: "core.step"."""
+
+    name: str
+    source: str
+    is_package: bool = False
+
+    @property
+    def part(self) -> str:
+        return self.name.partition(".")[0]
+
+    def nodes(self) -> Iterator[ast.AST]:
+        return ast.walk(ast.parse(self.source, self.name))
+
+    def imports(self) -> Iterator[tuple[int, str]]:
+        """Line and dotted name of all that is imported; `from a import b` is "a.b"."""
+        for node in self.nodes():
+            if isinstance(node, ast.Import):
+                yield from ((node.lineno, alias.name) for alias in node.names)
+            elif isinstance(node, ast.ImportFrom):
+                origin = ".".join(filter(None, (*self._above(node.level), node.module)))
+                yield from ((node.lineno, f"{origin}.{alias.name}") for alias in node.names)
+
+    def _above(self, level: int) -> tuple[str, ...]:
+        """The package that a relative import of this level starts from."""
+        if not level:
+            return ()
+        path = (PACKAGE, *filter(None, self.name.split(".")))
+        return path[: len(path) - level + self.is_package]
+
+
+def product() -> Iterator[Module]:
+    for path in sorted(ROOT.rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        is_package = parts[-1] == "__init__"
+        yield Module(".".join(parts[:-1] if is_package else parts), path.read_text(encoding="utf-8"), is_package)
+
+
+def within(name: str, places: tuple[str, ...]) -> bool:
+    return any(name == place or name.startswith(f"{place}.") for place in places)
+
+
+def edges(module: Module) -> Iterator[str]:
+    """Parts import only what lies before them."""
+    allowed = EDGES.get(module.part)
+    if module.name and allowed is None:
+        yield f"{module.name}: this part has no row in EDGES"
+        return
+    for line, name in module.imports():
+        package, _, target = name.partition(".")
+        if package == PACKAGE and target != "__version__" and not within(target, (module.part, *(allowed or ()))):
+            yield f"{module.name}:{line}: may not import {name}"
+
+
+def owners(module: Module) -> Iterator[str]:
+    """One module per library; libraries without an owner do not come in."""
+    for line, name in module.imports():
+        library = name.partition(".")[0]
+        if library in sys.stdlib_module_names or library == PACKAGE:
+            continue
+        if not within(module.name, OWNERS.get(library, ())):
+            yield f"{module.name}:{line}: {library} belongs to {OWNERS.get(library, 'nobody')}"
+
+
+def purity(module: Module) -> Iterator[str]:
+    """Pure parts have no clock, log, thread, file, socket, chance or environment."""
+    if not within(module.name, PURE):
+        return
+    for line, name in module.imports():
+        library = name.partition(".")[0]
+        if library in sys.stdlib_module_names and library not in LIBRARY:
+            yield f"{module.name}:{line}: {library} is not for a pure part"
+    for node in module.nodes():
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in IMPURE_CALLS:
+            yield f"{module.name}:{node.lineno}: {node.func.id}() is not for a pure part"
+
+
+def clocks(module: Module) -> Iterator[str]:
+    """Time is an argument everywhere but where the loops are."""
+    if within(module.name, CLOCK_READERS):
+        return
+    for line, name in module.imports():
+        library, _, what = name.partition(".")
+        if library == "datetime" or (library == "time" and what in CLOCKS):
+            yield f"{module.name}:{line}: {name} reads a clock"
+    for node in module.nodes():
+        if isinstance(node, ast.Import) and any(alias.name == "time" and alias.asname for alias in node.names):
+            yield f"{module.name}:{node.lineno}: time under another name"
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):  # noqa: SIM102 - one question a line
+            if node.value.id == "time" and node.attr in CLOCKS:
+                yield f"{module.name}:{node.lineno}: time.{node.attr} reads a clock"
+
+
+def light_packages(module: Module) -> Iterator[str]:
+    """Where single modules of a part may be imported, its __init__ brings in nothing else."""
+    piecemeal = {target.partition(".")[0] for allowed in EDGES.values() for target in allowed if "." in target}
+    if module.is_package and module.name in ("", *piecemeal):
+        yield from (f"{module.name}:{line}: imports {name}" for line, name in module.imports())
+
+
+def sizes(module: Module) -> Iterator[str]:
+    """Files and functions that fit into a head."""
+    lines = module.source.count("\n")
+    if lines > MAX_FILE_LINES:
+        yield f"{module.name}: {lines} lines, allowed are {MAX_FILE_LINES}"
+    for node in module.nodes():
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            length = (node.end_lineno or node.lineno) - node.lineno + 1
+            if length > MAX_FUNCTION_LINES:
+                yield f"{module.name}:{node.lineno}: {node.name}() has {length} lines, allowed are {MAX_FUNCTION_LINES}"
+
+
+Rule = Callable[[Module], Iterator[str]]
+RULES: tuple[Rule, ...] = (edges, owners, purity, clocks, light_packages, sizes)
+
+
+def name_of(value: object) -> str:
+    return getattr(value, "__name__", "")
+
+
+@pytest.mark.parametrize("rule", RULES, ids=name_of)
+def test_the_product_keeps_the_rule(rule: Rule) -> None:
+    modules = list(product())
+    assert "model" in {module.name for module in modules}, "the product was not found"
+    assert [complaint for module in modules for complaint in rule(module)] == []
+
+
+def test_the_edges_point_one_way() -> None:
+    parts = {part: {target.partition(".")[0] for target in allowed} for part, allowed in EDGES.items()}
+    assert set(TopologicalSorter(parts).static_order()) == set(EDGES)
+
+
+#: (rule, module, source that breaks the rule)
+BROKEN: tuple[tuple[Rule, str, str], ...] = (
+    (edges, "model", "from orchestrator.errors import LinkError"),
+    (edges, "core.step", "from orchestrator.config.load import load"),
+    (edges, "core.step", "from orchestrator.config import load"),
+    (edges, "core.step", "import orchestrator.protocol.charger"),
+    (edges, "core.step", "import orchestrator"),
+    (edges, "core.step", "from orchestrator import service"),
+    (edges, "core.step", "from ..protocol import charger"),
+    (edges, "core.step", "def f():\n    from orchestrator.link.serial import Port"),
+    (edges, "devices.charger", "if TYPE_CHECKING:\n    from orchestrator.link.serial import Port"),
+    (edges, "sim.charger", "from orchestrator.protocol.frame import FrameDecoder"),
+    (edges, "core.step", "from orchestrator.modelling import x"),
+    (edges, "weather", "x = 1"),
+    (owners, "service.loop", "import serial"),
+    (owners, "service.loop", "from serial.rs485 import RS485Settings"),
+    (owners, "link.serial", "import can"),
+    (owners, "link.canopen", "import can"),
+    (owners, "sim.bmu", "import canopen"),
+    (owners, "core.step", "from transitions import Machine"),
+    (owners, "cli", "import yaml"),
+    (owners, "service.status", "import rich.table"),
+    (owners, "service.loop", "import requests"),
+    (owners, "service.loop", "from tests.waiting import wait_until"),
+    (purity, "core.step", "import time"),
+    (purity, "core.step", "from logging import getLogger"),
+    (purity, "core.step", "def f():\n    import os"),
+    (purity, "core.checks.pair", "import threading"),
+    (purity, "protocol.frame", "import socket"),
+    (purity, "interlock", "import random"),
+    (purity, "interlock", "open('x')"),
+    (purity, "protocol.frame", "print('x')"),
+    (clocks, "link.serial", "from time import monotonic"),
+    (clocks, "link.serial", "import time\nnow_s = time.monotonic()"),
+    (clocks, "devices.charger", "import time\nclock = time.perf_counter_ns"),
+    (clocks, "devices.charger", "import time as t"),
+    (clocks, "config.load", "from datetime import datetime"),
+    (light_packages, "config", "from orchestrator.config.load import load"),
+    (light_packages, "", "import orchestrator.cli"),
+    (sizes, "core.step", "x = 1\n" * 301),
+    (sizes, "core.step", "def f():\n" + "    x = 1\n" * 40),
+)
+
+
+@pytest.mark.parametrize(("rule", "name", "source"), BROKEN, ids=name_of)
+def test_a_broken_rule_is_seen(rule: Rule, name: str, source: str) -> None:
+    assert list(rule(Module(name, source, is_package=rule is light_packages)))
+
+
+#: (module, source that keeps all rules)
+KEPT: tuple[tuple[str, str], ...] = (
+    ("core.step", "from orchestrator.config.policy import Policy"),
+    ("core.step", "from orchestrator.config import policy"),
+    ("core.step", "from .machine import Machine\nfrom ..model import State\nimport math"),
+    ("core.machine", "from transitions import Machine"),
+    ("link.serial", "import serial.rs485\nimport time\ntime.sleep(1)"),
+    ("service.loop", "import time\nfrom orchestrator import __version__\nnow_s = time.monotonic()"),
+    ("cli.demo", "from rich.live import Live"),
+)
+
+
+@pytest.mark.parametrize(("name", "source"), KEPT, ids=name_of)
+def test_what_is_allowed_is_not_complained_about(name: str, source: str) -> None:
+    assert [complaint for rule in RULES for complaint in rule(Module(name, source))] == []
