@@ -30,8 +30,11 @@ EDGES: dict[str, tuple[str, ...]] = {
     "service": ("config", "core", "devices", "errors", "interlock", "keys", "link", "model", "protocol"),
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
+    "show": (),
+    "demo": ("config", "errors", "keys", "model", "service", "show", "sim"),
     "cli": (
-        "config", "core", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service", "sim",
+        "config", "core", "demo", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service",
+        "show", "sim",
     ),
     "__main__": ("cli",),
 }  # fmt: skip
@@ -41,7 +44,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
     "durand": ("sim",),
-    "rich": ("cli.demo", "sim"),
+    "rich": ("demo",),
     "serial": ("link.serial",),
     "transitions": ("core.machine",),
     "yaml": ("config",),
@@ -56,7 +59,7 @@ LIBRARY = frozenset({
 #: … and none of these built-in functions.
 IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "open", "print"})
 
-CLOCK_READERS = ("cli", "service", "sim")
+CLOCK_READERS = ("cli", "demo", "service", "sim")
 CLOCKS = frozenset(
     name + suffix for name in ("time", "monotonic", "perf_counter", "process_time", "thread_time") for suffix in ("", "_ns")
 ) | {"clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "strftime"}  # fmt: skip
@@ -255,7 +258,7 @@ KEPT: tuple[tuple[str, str], ...] = (
     ("core.machine", "from transitions import Machine"),
     ("link.serial", "import serial.rs485\nimport time\ntime.sleep(1)"),
     ("service.loop", "import time\nfrom orchestrator import __version__\nnow_s = time.monotonic()"),
-    ("cli.demo", "from rich.live import Live"),
+    ("demo", "from rich.live import Live"),
 )
 
 

@@ -77,7 +77,9 @@ def test_the_command_is_there(installed: Path) -> None:
 def test_the_installed_package_finds_what_ships(installed: Path, tmp_path: Path) -> None:
     code = "import sys; sys.path.insert(0, sys.argv[1]); from orchestrator.config import shipped; "
     code += "print(shipped.__file__, *shipped.shipped_names('policies'))"
-    run = subprocess.run((sys.executable, "-c", code, installed), cwd=tmp_path, check=True, capture_output=True, text=True)
+    run = subprocess.run(
+        (sys.executable, "-c", code, installed), cwd=tmp_path, check=True, capture_output=True, text=True
+    )
     source, *names = run.stdout.split()
     assert Path(source).is_relative_to(installed)
     assert names == sorted(path.stem for path in (ROOT / "policies").glob("*.yaml"))
