@@ -1,0 +1,258 @@
+"""The serial port over real ptys: what it does, and the sentence for everything that can go wrong."""
+
+import errno
+import fcntl
+import os
+import subprocess
+import sys
+import termios
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import serial
+
+from orchestrator.errors import LinkError
+from orchestrator.link.serial import BYTE_S, SerialLine
+from tests.link.ptys import Pty, plugged
+from tests.waiting import wait_until
+
+
+@pytest.fixture
+def pty(tmp_path: Path) -> Iterator[Pty]:
+    with plugged(tmp_path / "port") as made:
+        yield made
+
+
+@pytest.fixture
+def line(pty: Pty) -> Iterator[SerialLine]:
+    opened = SerialLine.open(pty.path)
+    yield opened
+    opened.close()
+
+
+def failure(path: str, *, kernel_rs485: bool = False) -> str:
+    with pytest.raises(LinkError) as caught:
+        SerialLine.open(path, kernel_rs485=kernel_rs485)
+    return str(caught.value)
+
+
+# --- what it does ----------------------------------------------------------------------------------------------------
+
+
+def test_bytes_cross_in_both_directions_unchanged(pty: Pty, line: SerialLine) -> None:
+    every_byte = bytes(range(256))
+    line.write(every_byte)
+    assert os.read(pty.master, 512) == every_byte
+    os.write(pty.master, every_byte)
+    assert line.read(1.0) == every_byte
+
+
+def test_the_line_is_19200_8n1_without_flow_control(pty: Pty, line: SerialLine) -> None:
+    iflag, _, cflag, _, ispeed, ospeed, _ = termios.tcgetattr(line.fileno())
+    assert ispeed == ospeed == termios.B19200
+    assert cflag & termios.CSIZE == termios.CS8
+    assert not cflag & (termios.PARENB | termios.CSTOPB | termios.CRTSCTS)
+    assert not iflag & (termios.IXON | termios.IXOFF)
+
+
+def test_what_came_in_before_the_port_was_opened_is_forgotten(pty: Pty) -> None:
+    first = SerialLine.open(pty.path)
+    os.write(pty.master, b"old")
+    wait_until(lambda: _waiting(first.fileno()) == 3)
+    first.close()
+    second = SerialLine.open(pty.path)
+    assert second.read(0.0) == b""
+    second.close()
+
+
+def test_a_read_returns_what_there_is_without_waiting_for_more(pty: Pty, line: SerialLine) -> None:
+    os.write(pty.master, b"ab")
+    begun_s = time.monotonic()
+    assert line.read(5.0) == b"ab"
+    assert time.monotonic() - begun_s < 1.0
+
+
+def test_a_read_of_a_silent_line_ends_with_its_deadline(line: SerialLine) -> None:
+    begun_s = time.monotonic()
+    assert line.read(0.1, expected=20) == b""
+    assert 0.099 <= time.monotonic() - begun_s < 0.5
+
+
+def test_a_read_sleeps_over_the_time_that_the_bytes_need_on_the_wire(pty: Pty, line: SerialLine) -> None:
+    os.write(pty.master, b"here already")
+    begun_s = time.monotonic()
+    assert line.read(5.0, expected=100) == b"here already"
+    assert 100 * BYTE_S <= time.monotonic() - begun_s < 1.0
+
+
+def test_the_sleep_never_outlasts_the_deadline(line: SerialLine) -> None:
+    begun_s = time.monotonic()
+    assert line.read(0.05, expected=10_000) == b""
+    assert time.monotonic() - begun_s < 0.5
+
+
+# --- one owner -------------------------------------------------------------------------------------------------------
+
+
+def test_a_port_has_one_owner_and_is_free_once_closed(pty: Pty, line: SerialLine) -> None:
+    assert "in use: another program holds it, or two bays name the same port" in failure(pty.path)
+    line.close()
+    line.close()
+    SerialLine.open(pty.path).close()
+
+
+def test_a_port_held_by_another_process_is_busy_until_that_ends(pty: Pty) -> None:
+    hold = "import fcntl, sys; f = open(sys.argv[1], 'rb', 0); fcntl.flock(f, fcntl.LOCK_EX); print(flush=True); input()"
+    holder = subprocess.Popen([sys.executable, "-c", hold, pty.path], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert holder.stdout is not None
+    holder.stdout.readline()
+    assert "in use" in failure(pty.path)
+    holder.communicate(b"\n")
+    SerialLine.open(pty.path).close()
+
+
+def test_a_stop_tool_that_takes_no_lock_can_write_to_a_port_that_is_in_use(pty: Pty, line: SerialLine) -> None:
+    tool = os.open(pty.path, os.O_WRONLY | os.O_NOCTTY)  # would be EBUSY with TIOCEXCL, but for root
+    os.write(tool, b"stop")
+    os.close(tool)
+    assert os.read(pty.master, 16) == b"stop"
+    tiocgexcl = 0x80045440
+    assert fcntl.ioctl(line.fileno(), tiocgexcl, bytes(4)) == bytes(4)
+
+
+# --- what goes wrong -------------------------------------------------------------------------------------------------
+
+
+def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+    text = failure(str(tmp_path / "ttyUSB7"))
+    assert text.startswith(f"{tmp_path}/ttyUSB7: no such port: check that the adapter is plugged in")
+
+
+def test_a_port_that_the_user_may_not_open(pty: Pty) -> None:
+    device = os.path.realpath(pty.path)
+    Path(device).chmod(0)
+    with _somebody_else():
+        text = failure(device)
+    assert text == f"{device}: permission denied: add the user that runs this to the group dialout, then log in again"
+
+
+@pytest.mark.parametrize("kind", ["file", "directory", "null"])
+def test_what_is_no_serial_port(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "directory").mkdir()
+    (tmp_path / "null").symlink_to("/dev/null")
+    assert "it is no serial port: check the name in the station file" in failure(str(tmp_path / kind))
+
+
+def test_a_driver_that_cannot_switch_the_direction(pty: Pty) -> None:
+    text = failure(pty.path, kernel_rs485=True)
+    assert "cannot switch the direction of an RS-485 line (rs485: kernel); use an adapter that switches" in text
+    SerialLine.open(pty.path).close()  # it was given back
+
+
+def test_an_error_without_a_sentence_of_its_own_is_told_in_the_kernels_words(
+    pty: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def loops(*_: object) -> int:
+        raise OSError(errno.ELOOP, "loops")
+
+    monkeypatch.setattr(os, "open", loops)  # no device here fails like that
+    assert failure(pty.path) == f"{pty.path}: cannot be opened (Too many levels of symbolic links)"
+
+
+def test_an_unplugged_adapter_is_told_by_reading_and_by_writing(pty: Pty, line: SerialLine) -> None:
+    pty.unplug()
+    for use in (lambda: line.read(1.0), lambda: line.read(1.0, expected=5), lambda: line.write(b"x")):
+        with pytest.raises(LinkError, match=r"port: the adapter was unplugged or lost its power, or another program"):
+            use()
+    line.close()
+
+
+def test_a_plugged_in_adapter_opens_under_the_same_name(pty: Pty, line: SerialLine) -> None:
+    pty.unplug()
+    assert "no such port" in failure(pty.path)
+    line.close()
+    pty.plug()
+    again = SerialLine.open(pty.path)
+    again.write(b"back")
+    assert os.read(pty.master, 16) == b"back"
+    again.close()
+
+
+def test_a_stalled_line_is_told_without_burning_the_processor(pty: Pty, line: SerialLine) -> None:
+    pty.fill()
+    burnt_s, begun_s = time.thread_time(), time.monotonic()
+    with pytest.raises(LinkError, match=r"port: stalled, it took nothing for 0\.2 s; unplug the adapter"):
+        line.write(b"order")
+    assert 0.2 <= time.monotonic() - begun_s < 1.0
+    assert time.thread_time() - burnt_s < 0.1
+
+
+def test_an_order_that_a_stalled_line_kept_does_not_come_out_later(pty: Pty, line: SerialLine) -> None:
+    line.write(bytes(8192))  # the device's end of the pty has room for the first 4096 of these: they count as sent
+    line.write(b"old order")
+    filled = pty.fill()
+    with pytest.raises(LinkError, match="stalled"):
+        line.write(b"new order")
+    os.set_blocking(pty.master, False)
+    left = _read_all(pty.master)
+    assert len(left) < filled
+    assert b"order" not in left
+
+
+def test_every_use_after_close_is_a_link_error(line: SerialLine) -> None:
+    line.close()
+    for use in (line.fileno, lambda: line.write(b"x"), lambda: line.read(0.1)):
+        with pytest.raises(LinkError):
+            use()
+
+
+def test_close_never_fails(line: SerialLine) -> None:
+    os.close(line.fileno())
+    line.close()
+    with pytest.raises(LinkError):
+        line.fileno()
+
+
+@pytest.mark.parametrize("raised", [termios.error(errno.EIO, "gone"), TypeError("fd is None"), ValueError("fd is -1")])
+def test_whatever_pyserial_raises_is_translated(
+    line: SerialLine, monkeypatch: pytest.MonkeyPatch, raised: Exception
+) -> None:
+    def fails(*_: object) -> None:
+        raise raised
+
+    monkeypatch.setattr(serial.Serial, "write", fails)  # these come of races that no test can win reliably
+    with pytest.raises(LinkError, match="unplugged"):
+        line.write(b"x")
+
+
+# --- helpers ---------------------------------------------------------------------------------------------------------
+
+
+def _waiting(fd: int) -> int:
+    return int.from_bytes(fcntl.ioctl(fd, termios.FIONREAD, bytes(4)), sys.byteorder)
+
+
+def _read_all(fd: int) -> bytes:
+    everything = b""
+    try:
+        while data := os.read(fd, 65536):
+            everything += data
+    except BlockingIOError:
+        pass
+    return everything
+
+
+@contextmanager
+def _somebody_else() -> Iterator[None]:
+    """Root may open anything, so be nobody for a while."""
+    before = os.geteuid()
+    if before == 0:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(before)
