@@ -62,7 +62,8 @@ IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "
 CLOCK_READERS = ("cli", "demo", "service", "sim")
 CLOCKS = frozenset({
     "clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "monotonic", "monotonic_ns", "perf_counter",
-    "perf_counter_ns", "process_time", "process_time_ns", "strftime", "thread_time", "thread_time_ns", "time", "time_ns",
+    "perf_counter_ns", "process_time", "process_time_ns", "strftime", "thread_time", "thread_time_ns", "time",
+    "time_ns",
 })  # fmt: skip
 
 MAX_FILE_LINES = 300
