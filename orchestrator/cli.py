@@ -1,0 +1,188 @@
+"""The command line: `orchestrator VERB`. Exit status 0: well; 1: the answer is no; 2: used wrongly.
+
+Each verb imports what it needs when it runs, so that none waits for another's libraries.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+from orchestrator import __version__
+from orchestrator.errors import ConfigError, OrchestratorError
+
+REQUESTS = {
+    "start": "let a bay charge (again): after a stop, a pause or a reset",
+    "pause": "stop charging until `start`; the session goes on",
+    "stop": "stop charging; only `start` begins again",
+    "reset": "clear latched faults whose cause is gone; `start` then begins again",
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one verb and return the exit status."""
+    arguments = _parser().parse_args(argv)
+    try:
+        return int(arguments.run(arguments))
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except OrchestratorError as error:
+        print(f"orchestrator: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="orchestrator",
+        description="Supervises battery charging bays: reads BMUs over CANopen, drives chargers over RS-232/RS-485.",
+    )
+    parser.add_argument("--version", action="version", version=f"orchestrator {__version__}")
+    verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
+    _add_service_verbs(verbs)
+    _add_tool_verbs(verbs)
+    return parser
+
+
+def _add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    run = verbs.add_parser("run", help="run the service for a station, until it is told to end")
+    run.add_argument("station", nargs="?", default="station.yaml", help="the station file (default: %(default)s)")
+    run.set_defaults(run=_run)
+    status = verbs.add_parser("status", help="what every bay does, and why")
+    status.add_argument("bay", nargs="?", help="only this bay")
+    status.add_argument("--json", action="store_true", help="the status document, for programs")
+    status.add_argument("--watch", action="store_true", help="again and again, until interrupted")
+    _add_socket(status)
+    status.set_defaults(run=_status)
+    for verb, about in REQUESTS.items():
+        request = verbs.add_parser(verb, help=about)
+        request.add_argument("bay", nargs="*", help="the bays")
+        request.add_argument("--all", action="store_true", help="every bay of the station")
+        _add_socket(request)
+        request.set_defaults(run=_request, verb=verb)
+
+
+def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    check = verbs.add_parser("check", help="every error of policies, stations and object maps, with its line")
+    check.add_argument("file", nargs="+", help="files; what each is, it says itself")
+    check.set_defaults(run=_check)
+    decode = verbs.add_parser("decode", help="explain frames of the charger's protocol")
+    decode.add_argument("hex", nargs="+", help="bytes in hexadecimal, e.g. AF FA 90 04 10 90 00 34 AF A0")
+    decode.add_argument("--json", action="store_true", help="for programs")
+    decode.set_defaults(run=_decode)
+    probe = verbs.add_parser("probe", help="ask the devices of a station once and show everything they say")
+    probe.add_argument("station", help="the station file")
+    probe.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
+    probe.add_argument("--nmt", choices=NMT, help="first send this NMT command to the bay's BMU")
+    probe.set_defaults(run=_probe)
+    demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
+    demo.add_argument("--fault", metavar="NAME", help="inject a fault in mid-charge; 'list' shows the names")
+    demo.add_argument("--plain", action="store_true", help="lines instead of a live picture")
+    demo.set_defaults(run=_demo)
+
+
+NMT = ("start", "stop", "reset-node", "reset-communication")
+
+
+def _add_socket(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--socket", help="the service's control socket (default: $ORCHESTRATOR_SOCKET)")
+
+
+def _socket(arguments: argparse.Namespace) -> Path:
+    name = arguments.socket or os.environ.get("ORCHESTRATOR_SOCKET")
+    if not name:
+        raise OrchestratorError("name the service's control socket with --socket PATH or $ORCHESTRATOR_SOCKET")
+    return Path(name)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from orchestrator.config.load import load_station
+    from orchestrator.service.supervisor import serve
+
+    return serve(load_station(arguments.station))
+
+
+def _status(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.control import ask
+
+    path = _socket(arguments)
+    while True:
+        answer = ask(path, {"verb": "status", "bay": arguments.bay})
+        answer.pop("ok")
+        _show_status(answer, as_json=arguments.json, clear=arguments.watch and sys.stdout.isatty())
+        if not arguments.watch:
+            return 0
+        time.sleep(1.0)
+
+
+def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
+    from orchestrator.show import table
+
+    if as_json:
+        print(json.dumps(document, ensure_ascii=False), flush=True)
+        return
+    journal = cast("dict[str, str]", document["journal"])
+    text = table(cast("list[dict[str, object]]", document["bays"]))
+    if journal["problem"]:
+        text += f"\nWARNING: {journal['problem']}"
+    print(f"\x1b[H\x1b[2J{document['station']}\n{text}" if clear else text, flush=True)
+
+
+def _request(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.control import ask
+
+    if bool(arguments.bay) == arguments.all:
+        print(f"orchestrator {arguments.verb}: name bays, or --all", file=sys.stderr)
+        return 2
+    bays = None if arguments.all else arguments.bay
+    answer = ask(_socket(arguments), {"verb": arguments.verb, "bays": bays})
+    results = cast("dict[str, str]", answer["results"])
+    for bay, refusal in results.items():
+        print(f"{bay}: {refusal or f'{arguments.verb} accepted'}", file=sys.stderr if refusal else sys.stdout)
+    return 1 if any(results.values()) else 0
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from orchestrator.config.load import check
+
+    findings = check(arguments.file)
+    for finding in findings:
+        print(finding, file=sys.stderr)
+    return 1 if findings else 0
+
+
+def _decode(arguments: argparse.Namespace) -> int:
+    from orchestrator.protocol.explain import explain
+
+    explained = explain(" ".join(arguments.hex))
+    if arguments.json:
+        print(json.dumps([item.facts for item in explained], ensure_ascii=False))
+    else:
+        print("\n\n".join(item.text for item in explained))
+    return 0 if all(item.ok for item in explained) else 1
+
+
+def _probe(arguments: argparse.Namespace) -> int:
+    from orchestrator.config.load import load_station
+    from orchestrator.service.probe import probe
+
+    return probe(load_station(arguments.station), arguments.bay, arguments.nmt)
+
+
+def _demo(arguments: argparse.Namespace) -> int:
+    try:
+        from orchestrator.demo import demo
+    except ImportError as error:
+        raise OrchestratorError(
+            f"the demo needs the package {error.name}: pip install 'charging-station-orchestrator[demo]'"
+        ) from None
+    return demo(arguments.fault, plain=arguments.plain)

@@ -1,0 +1,128 @@
+"""One bay in the running service: its devices' newest views in, one decision out, carried out and written down."""
+
+import traceback
+from threading import Event
+from time import time
+from typing import Protocol
+
+from orchestrator.config.station import Bay
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
+from orchestrator.core.step import step
+from orchestrator.interlock import Grant, grant
+from orchestrator.model import (
+    STOP,
+    BatteryLink,
+    BatteryReading,
+    ChargerLink,
+    ChargerReading,
+    Command,
+    Decision,
+    Request,
+    Snapshot,
+    State,
+)
+from orchestrator.service.journal import Journal
+from orchestrator.service.records import SnapshotRecorder, decision_lines
+from orchestrator.service.status import bay_status
+
+#: The states that a charger was verified for: it stands by.
+VERIFIED = frozenset({State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE})
+
+
+class Charger(Protocol):
+    """What a bay needs of a charger's port (`devices.charger.ChargerPort`)."""
+
+    @property
+    def view(self) -> tuple[ChargerReading | None, ChargerLink]:
+        """The newest reading and how the line is doing."""
+
+    def order(self, command: Command | None, grant: Grant | None = None) -> None:
+        """Leave a standing order."""
+
+
+class Battery(Protocol):
+    """What a bay needs of a BMU (`devices.battery.BatteryNode`)."""
+
+    @property
+    def view(self) -> tuple[BatteryReading, BatteryLink]:
+        """The newest values and how the bus is doing."""
+
+
+class Asked:
+    """An operator's request on its way through the control loop; `answer` is set when `done` is."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.answer = ""
+        self.done = Event()
+
+
+class BayRunner:
+    """Runs `step()` for one bay. Used by the control loop's thread only, but for `ask` and `status`."""
+
+    def __init__(self, bay: Bay, charger: Charger, battery: Battery, journal: Journal) -> None:
+        self.name = bay.name
+        self.last_s = 0.0  #: when the last step was taken
+        self.decision: Decision | None = None
+        self._rules = Rules.of(bay)
+        self._memory = Memory()
+        self._charger, self._battery, self._journal = charger, battery, journal
+        self._snapshot = Snapshot()
+        self._recorder = SnapshotRecorder()
+        self._asked: list[Asked] = []
+        self._internal = ""
+
+    @property
+    def verified(self) -> bool:
+        """The charger stands by, by its own word, and nothing is ordered."""
+        decision = self.decision
+        return decision is not None and decision.state in VERIFIED and decision.command is None
+
+    def ask(self, asked: Asked) -> None:
+        """Hand in an operator's request; it is answered by the next step."""
+        self._asked.append(asked)
+
+    def run(self, now_s: float) -> None:
+        """Take one step. An exception of our own code stops the bay and is told to the next step."""
+        asked = self._asked.pop(0) if self._asked else None
+        try:
+            self._step(now_s, asked.request if asked else None)
+        except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
+            self._charger.order(STOP)
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            self._internal = f"{error!r} in {where.name}, line {where.lineno}"
+            self._journal.say(f"{self.name}: internal error, stopping: {self._internal}")
+            if asked:
+                asked.answer = f"internal error: {self._internal}"
+        if asked:
+            asked.answer = asked.answer or (self.decision.answer if self.decision else "")
+            asked.done.set()
+
+    def _step(self, now_s: float, request: Request | None) -> None:
+        reading, charger_link = self._charger.view
+        values, battery_link = self._battery.view
+        snapshot = Snapshot(reading, charger_link, values, battery_link, request, self._internal)
+        before, memory = self.decision, self._memory
+        decision, self._memory = step(now_s, snapshot, memory, self._rules)
+        self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
+        self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
+        if before is None or decision != before:
+            self._write_down(before, decision)
+        line = self._recorder.line(snapshot, memory, before, decision)
+        if line is not None:
+            self._journal.put(self.name, line)
+
+    def _write_down(self, before: Decision | None, decision: Decision) -> None:
+        for line in decision_lines(before, decision):
+            self._journal.put(self.name, line)
+        if before is None or before.state is not decision.state:
+            came_from = f"{before.state} → " if before else ""
+            self._journal.say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
+
+    def status(self) -> dict[str, object]:
+        """The bay's part of the status document."""
+        decision = self.decision
+        if decision is None:
+            decision = Decision(State.STARTING, "the service has just started")
+        return bay_status(self.name, self._snapshot, decision, self.last_s, time())

@@ -1,0 +1,148 @@
+"""The control socket: who may ask, how, and what is answered. One JSON object a line, in and out.
+
+Only the owner of the service (and root) can open the socket, a request is bounded in size and time, and clients are served
+one after another, so that no number of them can hold the bays up: the control loop never waits for a client.
+"""
+
+import json
+import os
+import socket
+import struct
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from orchestrator.errors import OrchestratorError, ServiceError
+
+#: The longest request, and how long a client may take over one.
+MAX_REQUEST = 4096
+CLIENT_S = 1.0
+
+Answer = Mapping[str, object]
+Handler = Callable[[Mapping[str, object]], Answer]
+
+
+class ControlSocket:
+    """Listens on a Unix socket and answers each request with `handler`; its OrchestratorErrors become answers, too."""
+
+    def __init__(self, path: Path, handler: Handler) -> None:
+        self._path, self._handler = path, handler
+        self._listener = _listen(path)
+        self._thread = threading.Thread(target=self._run, name="control", daemon=True)
+
+    def start(self) -> None:
+        """Begin to answer."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop listening and take the socket's name away."""
+        with suppress(OSError):
+            self._listener.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        self._path.unlink(missing_ok=True)
+
+    def _run(self) -> None:
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return  # closed
+            with client, suppress(OSError):
+                client.settimeout(CLIENT_S)
+                client.sendall(_line(self._answer(client)))
+
+    def _answer(self, client: socket.socket) -> Answer:
+        try:
+            _check_peer(client)
+            return {"ok": True, **self._handler(parse_request(_read_line(client)))}
+        except OrchestratorError as error:
+            return {"ok": False, "error": str(error)}
+        except Exception as error:  # noqa: BLE001 - a request must never end the thread that answers them
+            return {"ok": False, "error": f"internal: {error!r}"}
+
+
+def parse_request(line: bytes) -> Mapping[str, object]:
+    """A request's object; ServiceError for anything else."""
+    try:
+        request = json.loads(line)
+    except (ValueError, RecursionError):
+        raise ServiceError("a request is one JSON object on one line") from None
+    if not isinstance(request, dict):
+        raise ServiceError("a request is one JSON object on one line")
+    return request
+
+
+def _read_line(client: socket.socket) -> bytes:
+    data = b""
+    while b"\n" not in data:
+        part = client.recv(MAX_REQUEST)
+        data += part
+        if len(data) > MAX_REQUEST or not part:
+            raise ServiceError(f"a request is one line of at most {MAX_REQUEST} bytes")
+    return data
+
+
+def _check_peer(client: socket.socket) -> None:
+    _, uid, _ = struct.unpack("3i", client.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
+    if uid not in (0, os.getuid()):
+        raise ServiceError("only the owner of the service may use this socket")
+
+
+def _listen(path: Path) -> socket.socket:
+    """The listening socket, owner-only from the first moment on; a dead one in its place is removed."""
+    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if is_alive(path):
+        raise ServiceError(
+            f"another service answers on {path}: stop it first, or give this station another control.socket"
+        )
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    mask = os.umask(0o177)
+    try:
+        path.unlink(missing_ok=True)
+        listener.bind(str(path))
+    except OSError as error:
+        listener.close()
+        raise ServiceError(f"the control socket {path} cannot be opened: {error.strerror or error}") from None
+    finally:
+        os.umask(mask)
+    listener.listen(8)
+    return listener
+
+
+def is_alive(path: Path) -> bool:
+    """Whether somebody answers on a socket of this name."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.settimeout(CLIENT_S)
+            probe.connect(str(path))
+        except OSError:
+            return False
+    return True
+
+
+def _line(answer: Answer) -> bytes:
+    return json.dumps(answer, ensure_ascii=False).encode() + b"\n"
+
+
+def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> dict[str, object]:
+    """Send one request to a running service and return its answer.
+
+    Raises ServiceError where no service answers, or where the answer is no.
+    """
+    try:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+            client.settimeout(timeout_s)
+            client.connect(str(path))
+            client.sendall(_line(request))
+            with client.makefile("rb") as stream:
+                answer = json.loads(stream.readline())
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or "no answer"
+        raise ServiceError(
+            f"no service answers on {path} ({reason}): is it running, and is this its control.socket? "
+            "Name it with --socket or $ORCHESTRATOR_SOCKET"
+        ) from None
+    if not answer.get("ok"):
+        raise ServiceError(str(answer.get("error", "the service refused")))
+    return dict(answer)

@@ -1,0 +1,131 @@
+"""What the journal says: one decision after another, turned into lines. Pure; the writing is the journal's."""
+
+from collections.abc import Iterator
+from dataclasses import asdict
+
+from orchestrator.core.memory import Memory
+from orchestrator.model import (
+    BatteryReading,
+    Command,
+    Decision,
+    Session,
+    Snapshot,
+    State,
+)
+
+Line = tuple[str, dict[str, object]]  #: kind, fields
+
+#: States in which every step is the same until something happens.
+QUIET = frozenset({State.IDLE, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
+#: A whole snapshot, with the memory, at least this often: a reader may begin at each of them.
+WHOLE_EVERY = 250
+
+
+def decision_lines(before: Decision | None, now: Decision) -> Iterator[Line]:
+    """What has changed from one decision to the next, for people and programs."""
+    if before is None or now.state is not before.state:
+        yield "transition", {"from": before.state if before else None, "to": now.state, "reason": now.reason}
+    if before is None or now.command != before.command:
+        yield "command", command_fields(now.command)
+    yield from _fault_lines(before, now)
+    yield from _session_lines(before, now)
+    if before is None or _gist(now) != _gist(before):
+        yield "decision", {"state": now.state, "reason": now.reason, "step": asdict(now.step) if now.step else None}
+
+
+def command_fields(command: Command | None) -> dict[str, object]:
+    """A standing order as the journal and the status show it."""
+    return {"action": command.action, "value": command.value} if command else {"action": None}
+
+
+def _gist(decision: Decision) -> tuple[object, ...]:
+    """A decision without the figures in its sentences, which change all the time."""
+    return decision.state, decision.step, decision.setpoint, decision.alarm
+
+
+def _fault_lines(before: Decision | None, now: Decision) -> Iterator[Line]:
+    old = {fault.id: fault for fault in before.faults} if before else {}
+    new = {fault.id: fault for fault in now.faults}
+    for name, fault in new.items():
+        if name not in old or old[name].effect is not fault.effect:
+            yield "fault", {"id": name, "event": "raised", "effect": fault.effect.name, "text": fault.text}
+    for name, fault in old.items():
+        if name not in new:
+            yield "fault", {"id": name, "event": "cleared", "effect": fault.effect.name, "text": fault.text}
+
+
+def _session_lines(before: Decision | None, now: Decision) -> Iterator[Line]:
+    was = before.session if before and before.session and not before.session.result else None
+    if now.session is None:
+        return
+    if was is None and not now.session.result:
+        yield "session", {"event": "begin", **session_fields(now.session)}
+    elif now.session.result:
+        yield "session", {"event": "end", **session_fields(now.session)}
+
+
+def session_fields(session: Session) -> dict[str, object]:
+    """A session in figures that a person can read."""
+    return {
+        "elapsed_s": round(session.elapsed_s, 1),
+        "energised_s": round(session.energised_s, 1),
+        "charged_ah": round(session.charged_ah, 4),
+        "charged_wh": round(session.charged_wh, 2),
+        "soc_start_pct": session.soc_start_pct,
+        "soc_pct": session.soc_pct,
+        "step_changes": session.step_changes,
+        "result": session.result,
+    }
+
+
+class SnapshotRecorder:
+    """Turns the steps of one bay into `snapshot` lines: whole now and then, else only what differs from the line before.
+
+    In a quiet state nothing is written until something happens; then a whole line begins anew.
+    """
+
+    def __init__(self) -> None:
+        self._last: Snapshot | None = None
+        self._since_whole = 0
+
+    def line(self, snapshot: Snapshot, memory: Memory, before: Decision | None, now: Decision) -> Line | None:
+        """The line for a step that was taken with `snapshot` and `memory`; None where nothing needs to be said."""
+        same = before is not None and _gist(before) == _gist(now) and before.faults == now.faults
+        if same and now.state in QUIET and before is not None and before.state in QUIET and snapshot.request is None:
+            self._last = None
+            return None
+        if self._last is None or self._since_whole >= WHOLE_EVERY:
+            fields: dict[str, object] = {"whole": True, **asdict(snapshot), "memory": asdict(memory)}
+            self._since_whole = 0
+        else:
+            fields = _difference(self._last, snapshot)
+            self._since_whole += 1
+        self._last = snapshot
+        return "snapshot", fields
+
+
+def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
+    """Only the parts that are not the same; of the battery's values only those that are new."""
+    fields: dict[str, object] = {}
+    if new.charger is not old.charger:
+        fields["charger"] = asdict(new.charger) if new.charger else None
+    if new.charger_link is not old.charger_link:
+        fields["charger_link"] = asdict(new.charger_link)
+    if new.battery is not old.battery:
+        fields["battery"] = _new_values(old.battery, new.battery)
+    if new.battery_link is not old.battery_link:
+        fields["battery_link"] = asdict(new.battery_link)
+    if new.request is not old.request:
+        fields["request"] = new.request
+    if new.internal != old.internal:
+        fields["internal"] = new.internal
+    return fields
+
+
+def _new_values(old: BatteryReading, new: BatteryReading) -> dict[str, object]:
+    values: dict[str, object] = {}
+    for name in BatteryReading.__slots__:
+        value = getattr(new, name)
+        if value is not getattr(old, name):
+            values[name] = asdict(value) if value is not None else None
+    return values

@@ -1,0 +1,179 @@
+"""The running service: one thread a serial port, one a CAN bus, and this loop, which wakes on every new reading.
+
+Theory of operation. Devices replace their view and put their bay's number into a queue; the loop takes a step for every bay
+that has news, and for every bay at least each TICK_S, so that what did *not* come is noticed, too. The queue is the only
+thing that the loop waits for. Signals only put into it. At the end every bay is stopped and verified.
+"""
+
+import signal
+from collections.abc import Callable, Mapping
+from functools import partial
+from queue import Empty, SimpleQueue
+from time import monotonic, time
+from types import FrameType
+
+from orchestrator.config.station import Bay, Rs485, Station
+from orchestrator.devices.battery import BatteryNode
+from orchestrator.devices.bus import BatteryBus
+from orchestrator.devices.bus_budget import BusBudget
+from orchestrator.devices.charger import ChargerPort
+from orchestrator.errors import ServiceError
+from orchestrator.link.can import CanBus
+from orchestrator.link.serial import SerialLine
+from orchestrator.model import Request
+from orchestrator.service.bay import Asked, BayRunner
+from orchestrator.service.control import ControlSocket
+from orchestrator.service.journal import Journal
+from orchestrator.service.status import station_status
+
+#: A bay without news is looked at this often; what has gone stale is noticed within it.
+TICK_S = 0.1
+#: How long the end of the service waits for every charger to be verified.
+STOP_S = 3.0
+#: An operator's request is answered by the next step; longer than this means that the loop hangs.
+ANSWER_S = 2.0
+
+
+class Supervisor:
+    """The service for one station. `run` returns when the service was told to end."""
+
+    def __init__(self, station: Station) -> None:
+        self._station = station
+        self._wake: SimpleQueue[int | None] = SimpleQueue()
+        self._ending = ""
+        self._journal = Journal(station.journal.directory, station.journal.max_mb, monotonic, time)
+        self._ports: list[ChargerPort] = []
+        self._buses: list[BatteryBus] = []
+        self._bays: list[BayRunner] = []
+        self._build()
+        self._control = ControlSocket(station.control.socket, self._answer)
+
+    def _build(self) -> None:
+        """Devices for every bay; nothing is opened yet."""
+        nodes: dict[str, list[BatteryNode]] = {name: [] for name in self._station.can}
+        buses = {
+            name: CanBus(name, settings, [bay.battery.node_id for bay in self._station.bays if bay.battery.can == name])
+            for name, settings in self._station.can.items()
+        }
+        budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
+        for number, bay in enumerate(self._station.bays):
+            poke: Callable[[], None] = partial(self._wake.put, number)
+            port = _charger_port(bay, poke)
+            node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
+            nodes[bay.battery.can].append(node)
+            self._ports.append(port)
+            self._bays.append(BayRunner(bay, port, node, self._journal))
+        self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
+
+    @property
+    def _devices(self) -> tuple[ChargerPort | BatteryBus, ...]:
+        return (*self._ports, *self._buses)
+
+    def run(self) -> int:
+        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1."""
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._on_signal)
+        self._journal.start()
+        self._control.start()
+        for worker in self._devices:
+            worker.start()
+        self._journal.say(
+            f"{self._station.station}: {len(self._bays)} bays, control socket {self._station.control.socket}"
+        )
+        while not self._ending:
+            self._turn()
+        self._journal.say(f"{self._ending}: stopping every bay")
+        return self._end()
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self._ending = self._ending or signal.Signals(number).name
+        self._wake.put(None)
+
+    def _turn(self) -> None:
+        """Wait for news, then step the bays that have some, and those that have been left alone for a tick."""
+        for number in self._news():
+            self._bays[number].run(monotonic())
+        now_s = monotonic()
+        for bay in self._bays:
+            if now_s - bay.last_s >= TICK_S:
+                bay.run(monotonic())
+
+    def _news(self) -> set[int]:
+        numbers: set[int | None] = set()
+        try:
+            numbers.add(self._wake.get(timeout=TICK_S / 2))
+            while True:
+                numbers.add(self._wake.get_nowait())
+        except Empty:
+            return {number for number in numbers if number is not None}
+
+    def _end(self) -> int:
+        """Stop every bay, wait until each charger is verified, close everything."""
+        for bay in self._bays:
+            bay.ask(Asked(Request.STOP))
+        end_s = monotonic() + STOP_S
+        for bay in self._bays:
+            bay.run(monotonic())
+        while monotonic() < end_s and not all(bay.verified for bay in self._bays):
+            self._turn()
+        unverified = [bay.name for bay in self._bays if not bay.verified]
+        self._control.close()
+        for worker in self._devices:
+            worker.close()
+        verdict = f"NOT verified: {', '.join(unverified)}" if unverified else "every charger stands by, verified"
+        self._journal.say(f"ended: {verdict}")
+        self._journal.close()
+        return 1 if unverified else 0
+
+    # --- what the control socket asks, in its own thread ----------------------------------------------------------------
+
+    def _answer(self, request: Mapping[str, object]) -> dict[str, object]:
+        verb = request.get("verb")
+        if verb == "status":
+            bays = [bay.status() for bay in self._named(request.get("bay"))]
+            return station_status(self._station, bays, self._journal.problem)
+        if verb in set(Request):
+            bays_named = request.get("bays")
+            chosen = self._bays if bays_named is None else [b for name in _names(bays_named) for b in self._named(name)]
+            return {"results": self._ask(chosen, Request(str(verb)))}
+        raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
+
+    def _named(self, name: object) -> list[BayRunner]:
+        if name is None:
+            return self._bays
+        found = [bay for bay in self._bays if bay.name == name]
+        if not found:
+            raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
+        return found
+
+    def _ask(self, bays: list[BayRunner], request: Request) -> dict[str, str]:
+        """Hand the request to each bay and gather what they say; "" is yes."""
+        asked = {bay.name: Asked(request) for bay in bays}
+        for bay in bays:
+            bay.ask(asked[bay.name])
+            self._wake.put(self._bays.index(bay))
+        end_s = monotonic() + ANSWER_S
+        late = "the control loop has not answered: look at the service's log"
+        return {name: one.answer if one.done.wait(end_s - monotonic()) else late for name, one in asked.items()}
+
+
+def _names(value: object) -> list[object]:
+    if not isinstance(value, list):
+        raise ServiceError("'bays' is a list of names, or null for all")
+    return value
+
+
+def _charger_port(bay: Bay, poke: Callable[[], None]) -> ChargerPort:
+    kernel = bay.charger.rs485 is Rs485.KERNEL
+    return ChargerPort(
+        bay.charger,
+        bay.limits,
+        open_line=partial(SerialLine.open, bay.charger.port, kernel_rs485=kernel),
+        clock=monotonic,
+        on_change=poke,
+    )
+
+
+def serve(station: Station) -> int:
+    """Run the service for `station` until it is told to end; the exit status."""
+    return Supervisor(station).run()
