@@ -41,12 +41,14 @@ def words(readout: Readout, layout: Layout) -> dict[int, int]:
         NO_MINUTES if value is None else min(round(value), NO_MINUTES - 1)
         for value in (readout.time_to_full_min, readout.time_to_empty_min)
     ]
+    soc, soh = round(readout.soc_pct), round(readout.soh_pct)
+    hundredths_ah, tenths_wh = round(readout.remaining_ah * 100), round(readout.available_wh * 10)
     high = layout is Layout.FIRST_HIGH
     return {
         0x6000: _word([(volts, 16), (amps, 16)], first_high=True),  # the sample fixes this one
         0x6001: _word([(readout.status, 16), (minutes[0], 16)], first_high=high),
-        0x6002: _word([(minutes[1], 16), (round(readout.soc_pct), 8), (round(readout.soh_pct), 8)], first_high=high),
-        0x6003: _word([(round(readout.remaining_ah * 100), 16), (round(readout.available_wh * 10), 16)], first_high=high),
+        0x6002: _word([(minutes[1], 16), (soc, 8), (soh, 8)], first_high=high),
+        0x6003: _word([(hundredths_ah, 16), (tenths_wh, 16)], first_high=high),
         0x6004: round(readout.temperature_c * 10) & 0xFFFF,
     }
 

@@ -45,7 +45,10 @@ class PlantProcess:
         return self._process.pid
 
     def ask(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """One command, one answer; RuntimeError where the plant says that it cannot, TimeoutError where it says nothing."""
+        """One command, one answer.
+
+        RuntimeError with the plant's reason where it cannot, TimeoutError where it says nothing.
+        """
         if self._process.stdin is None:
             raise RuntimeError("the emulated station has no stdin")
         self._process.stdin.write(json.dumps(command).encode() + b"\n")
@@ -83,7 +86,9 @@ class PlantProcess:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
     def _hear(self, within_s: float) -> dict[str, Any]:

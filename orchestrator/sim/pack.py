@@ -124,8 +124,8 @@ class Pack:
     def _warm(self, dt_s: float) -> None:
         loss_w = self.current_a * self.current_a * self.resistance_ohm
         settled_c = self.ambient_c + loss_w / self.cooling_w_per_k
-        fade = math.exp(-dt_s * self.cooling_w_per_k / self.heat_j_per_k)
-        self.temperature_c = settled_c + (self.temperature_c - settled_c) * fade
+        share = -math.expm1(-dt_s * self.cooling_w_per_k / self.heat_j_per_k)
+        self.temperature_c += (settled_c - self.temperature_c) * share
 
     def _drive(self, dt_s: float, target_c: float) -> None:
         step_k = DRIVEN_K_PER_S * dt_s

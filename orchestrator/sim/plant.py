@@ -37,6 +37,7 @@ from orchestrator.sim.rig import Rig, Setup
 
 #: hop_limit 0: nothing leaves this machine.
 CAN = '{"interface": "udp_multicast", "channel": "239.74.163.2", "port": 43113, "hop_limit": 0}'
+LAYOUTS = {"first-high": Layout.FIRST_HIGH, "first-low": Layout.FIRST_LOW}
 #: Bays that nobody asks are advanced this often.
 TICK_S = 0.1
 #: CANopen node ids end here.
@@ -67,7 +68,7 @@ class Plant:
             node_id=args.node + number % self._per_bus,
             link=args.dir / f"bay-{number + 1}",
             line=LINES[args.line],
-            layout=Layout[args.layout.upper().replace("-", "_")],
+            layout=LAYOUTS[args.layout],
             speed=args.speed,
         )
         return Rig(self._loop, self._wires[number // self._per_bus], Bay(charger, pack), setup)
@@ -205,7 +206,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--soc", type=float, help="state of charge at first, %%; -100 … 0 is deep discharge")
     parser.add_argument("--temperature", type=float, help="of the packs and their surroundings, °C")
     parser.add_argument("--line", choices=LINES, default="real", help="what the serial lines do to bytes")
-    parser.add_argument("--layout", choices=("first-high", "first-low"), default="first-high", help="of the BMU's words")
+    parser.add_argument("--layout", choices=LAYOUTS, default="first-high", help="of the BMUs' words")
     parser.add_argument("--automatic", action="store_true", help="the chargers' rotary switches are on 5, not on 1")
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real time the batteries live")
     args = parser.parse_args(argv)

@@ -1,0 +1,85 @@
+"""A bare client for each of the two emulated lines; it knows nothing of the product."""
+
+import contextlib
+import os
+import select
+import socket
+import time
+import tty
+from collections.abc import Iterator
+
+import can
+
+DEADLINE_S = 5.0
+
+
+class Port:
+    """The controller's end of a pty."""
+
+    def __init__(self, path: str) -> None:
+        self.fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
+        tty.setraw(self.fd)
+
+    def write(self, text: str) -> None:
+        os.write(self.fd, bytes.fromhex(text))
+
+    def read(self, count: int, within_s: float = DEADLINE_S) -> str:
+        """Exactly `count` bytes as hex, or what came within the time."""
+        heard, deadline_s = b"", time.monotonic() + within_s
+        while len(heard) < count and select.select([self.fd], [], [], max(deadline_s - time.monotonic(), 0))[0]:
+            heard += os.read(self.fd, count - len(heard))
+        return heard.hex(" ").upper()
+
+    def ask(self, text: str, count: int) -> str:
+        self.write(text)
+        return self.read(count)
+
+    def close(self) -> None:
+        os.close(self.fd)
+
+
+def framed(body: str) -> str:
+    """A whole frame around address, length, command, order and data, worked out as §3.2 says."""
+    data = bytes.fromhex(body)
+    return (b"\xaf\xfa" + data + bytes((sum(data) % 256,)) + b"\xaf\xa0").hex(" ").upper()
+
+
+def udp_keys() -> dict[str, object]:
+    """A multicast bus of our own that does not leave this machine."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        port = probe.getsockname()[1]
+    return {"interface": "udp_multicast", "channel": "239.74.163.2", "port": port, "hop_limit": 0}
+
+
+@contextlib.contextmanager
+def on_bus(**keys: object) -> Iterator["Client"]:
+    bus = can.Bus(**keys)  # type: ignore[arg-type]  # python-can types each key by its interface
+    try:
+        yield Client(bus)
+    finally:
+        bus.shutdown()
+
+
+class Client:
+    """A CAN node that sends what it is told and waits for frames."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self.bus = bus
+
+    def send(self, cob_id: int, text: str) -> None:
+        self.bus.send(can.Message(arbitration_id=cob_id, data=bytes.fromhex(text), is_extended_id=False))
+
+    def wait(self, cob_id: int, within_s: float = DEADLINE_S) -> str | None:
+        """The next frame with this COB-ID as hex, None when there is none in time."""
+        deadline_s = time.monotonic() + within_s
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            message = self.bus.recv(left_s)
+            if message is not None and message.arbitration_id == cob_id:
+                return bytes(message.data).hex(" ").upper()
+        return None
+
+    def ask(self, cob_id: int, text: str, within_s: float = DEADLINE_S) -> str | None:
+        """An SDO request and its answer."""
+        self.send(cob_id, text)
+        return self.wait(cob_id - 0x80, within_s)
