@@ -46,10 +46,14 @@ def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
         return None
     if not all(map(isfinite, (charger.voltage_v, volts.value, temperature.value))):
         return None
-    expires_s = min(charger.t_s + CHARGER_MAX_AGE_S, volts.t_s + BATTERY_MAX_AGE_S, temperature.t_s + BATTERY_MAX_AGE_S)
-    newest_s = max(charger.t_s, volts.t_s, temperature.t_s)
-    if not newest_s <= now_s < expires_s:
+    lifetimes = (
+        (charger.t_s, charger.t_s + CHARGER_MAX_AGE_S),
+        (volts.t_s, volts.t_s + BATTERY_MAX_AGE_S),
+        (temperature.t_s, temperature.t_s + BATTERY_MAX_AGE_S),
+    )
+    if not all(t_s <= now_s < end_s for t_s, end_s in lifetimes):
         return None
+    expires_s = min(end_s for _, end_s in lifetimes)
     return Grant(expires_s, max(charger.voltage_v, volts.value), temperature.value, charger.current_limit)
 
 
