@@ -110,8 +110,12 @@ class Thresholds:
     """Limits of the fault table. Each default is the loosest that is allowed: a policy may only be stricter."""
 
     temperature_trip_c: float = key("latch at or above this", unit="°C", le=55, gt=0, default=55.0)
-    temperature_rise_k_per_min: float = key("latch when it rises faster over 3 min", unit="K/min", gt=0, le=1, default=1.0)
-    over_current_pct: float = key("latch above this share of the step's current", unit="%", gt=100, le=110, default=110.0)
+    temperature_rise_k_per_min: float = key(
+        "latch when it rises faster over 3 min", unit="K/min", gt=0, le=1, default=1.0
+    )
+    over_current_pct: float = key(
+        "latch above this share of the step's current", unit="%", gt=100, le=110, default=110.0
+    )
     volts_differ_v: float = key("charger and BMU may differ by this …", unit="V", gt=0, le=1, default=1.0)
     volts_differ_pct: float = key("… or by this share, whichever is more", unit="%", gt=0, le=2, default=2.0)
     amps_differ_a: float = key("charger and BMU may differ by this …", unit="A", gt=0, le=1, default=1.0)

@@ -29,4 +29,6 @@ def _ports(node: Node) -> list[str]:
 
 
 def _get(node: Node | None, key: str) -> Node | None:
-    return next((value for name, value in node.entries if name.text == key), None) if isinstance(node, Entries) else None
+    return (
+        next((value for name, value in node.entries if name.text == key), None) if isinstance(node, Entries) else None
+    )

@@ -180,7 +180,9 @@ class Reader:
         inner = places(record, frozenset(self._references))
         where = [place for place in inner if place.rpartition(".")[2] == name.text]
         if where:
-            hint = f"it belongs below {' or '.join(place.rpartition('.')[0] for place in where)}, indented; allowed here: "
+            hint = (
+                f"it belongs below {' or '.join(place.rpartition('.')[0] for place in where)}, indented; allowed here: "
+            )
         at = f" in {path}" if path else ""
         self._report(name.mark, f"unknown key {name.text!r}{at}; {hint}{', '.join(known)}")
         return known[near] if near and near not in taken and not where else None

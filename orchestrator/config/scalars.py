@@ -173,6 +173,10 @@ def _number(text: str) -> str:
     return f"{value:.10f}".rstrip("0").rstrip(".") if math.isfinite(value) and abs(value) < 1e15 else ""
 
 
+def _instead(number: str, text: str) -> str:
+    return f"write {number}, not {text}" if number else ""
+
+
 def _sexagesimal(match: re.Match[str]) -> str:
     parts = [float(part) for part in match[0].split(":")]
     whole = "h:min:s" if len(parts) > 2 else "h:min or min:s"
@@ -197,11 +201,11 @@ _HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
         lambda m: f"{m[0]} with a leading 0 may be read as octal: write {m[0].lstrip('0') or 0}",
     ),
     (re.compile(r"([-+]?\d+),(\d+)", re.A), lambda m: f"use a decimal point: {m[1]}.{m[2]}, not {m[0]}"),
-    (re.compile(r"[-+]?\d[\d_.]*_[\d_.]*", re.A), lambda m: f"write {_number(m[0].replace('_', ''))} without '_'"),
-    (re.compile(r"[-+]?[\d.]+e[-+]?\d+", re.I | re.A), lambda m: f"write the number out: {_number(m[0])}, not {m[0]}"),
-    (re.compile(r"[-+]?(\d+\.|\.\d+|0+\d+\.\d*)", re.A), lambda m: f"write {_number(m[0])}, not {m[0]}"),
+    (re.compile(r"[-+]?\d[\d_.]*_[\d_.]*", re.A), lambda m: _instead(_number(m[0].replace("_", "")), m[0])),
+    (re.compile(r"[-+]?[\d.]+e[-+]?\d+", re.I | re.A), lambda m: _instead(_number(m[0]), m[0])),
+    (re.compile(r"[-+]?(\d+\.|\.\d+|0+\d+\.\d*)", re.A), lambda m: _instead(_number(m[0]), m[0])),
     (
-        re.compile(r"(?!0[xo])([-+]?\d+(\.\d+)?) *[^\d.,:\s].*", re.A),
+        re.compile(r"(?!0[xo]|[\d.]+[eE][-+]?\d)([-+]?\d+(\.\d+)?) *[^\d.,:\s].*", re.A),
         lambda m: f"only the number, without a unit: {m[1]}, not {m[0]}",
     ),
 )
@@ -216,6 +220,6 @@ def _why_no_number(node: Scalar, key: Key) -> str:
         return f"write {text.strip()} without quotes"
     if len(text) <= _MAX_DIGITS:
         for pattern, say in _HABITS:
-            if match := pattern.fullmatch(text.strip()):
-                return say(match)
+            if (match := pattern.fullmatch(text.strip())) and (said := say(match)):
+                return said
     return f"{shown(text)} is not {kind}"

@@ -24,7 +24,9 @@ class ChargerConfig:
 
     port: str = key("the serial port, best a stable name below /dev/serial/by-path", is_path=True)
     control: ControlMode = key("manual (rotary switch on 1) or automatic (2 … 5: only stop and resume)")
-    steps_a: tuple[float, ...] = key("what the five current-limit steps mean on this charger, lowest first", unit="A", gt=0)
+    steps_a: tuple[float, ...] = key(
+        "what the five current-limit steps mean on this charger, lowest first", unit="A", gt=0
+    )
     rs485: Rs485 = key("off, or kernel for a driver that switches the direction", default=Rs485.OFF)
 
 
@@ -35,10 +37,16 @@ class BatteryConfig:
     can: str = key("the name of one of the station's CAN buses")
     node_id: int = key("the BMU's CANopen node id: its board switch + 0x10", ge=1, le=127)
     map: ObjectMap = key("the object map: a shipped name or a path")
-    sweep_s: float = key("how often volts, amps, status and temperature are read", unit="s", ge=0.02, le=0.5, default=0.05)
+    sweep_s: float = key(
+        "how often volts, amps, status and temperature are read", unit="s", ge=0.02, le=0.5, default=0.05
+    )
     sdo_timeout_s: float = key("an SDO answer that takes longer counts as none", unit="s", ge=0.05, le=0.5, default=0.3)
-    heartbeat_s: float | None = key("heartbeat period asked of the BMU; null: none", unit="s", ge=0.1, le=2, default=0.5)
-    tpdo_s: float | None = key("TPDO event period asked of the BMU; null: SDO only", unit="s", ge=0.05, le=1, default=None)
+    heartbeat_s: float | None = key(
+        "heartbeat period asked of the BMU; null: none", unit="s", ge=0.1, le=2, default=0.5
+    )
+    tpdo_s: float | None = key(
+        "TPDO event period asked of the BMU; null: SDO only", unit="s", ge=0.05, le=1, default=None
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

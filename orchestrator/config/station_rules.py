@@ -177,7 +177,8 @@ def _lowest_step(steps_a: tuple[float, ...], current_a: float) -> Problems:
     if steps_a[0] > current_a:
         yield (
             "charger.steps_a[0]",
-            f"even the lowest step, {steps_a[0]:g} A, is above limits.current_a, {current_a:g} A: no step would be allowed",
+            f"even the lowest step, {steps_a[0]:g} A, is above limits.current_a, {current_a:g} A: "
+            "no step would be allowed",
         )
 
 

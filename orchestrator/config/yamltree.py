@@ -71,7 +71,7 @@ Node = Scalar | Items | Entries | Refused
 def parse(file: str, data: bytes) -> tuple[Node | None, list[Finding]]:
     """The tree of `data`, and all that is wrong with it as YAML; no tree if it cannot be read to its end."""
     if len(data) > MAX_BYTES:
-        text = f"the file has {len(data)} bytes; at most {MAX_BYTES} are read"
+        text = f"the file has more than {MAX_BYTES} bytes: this is not one of our files"
         return None, [Finding(file, 1, 1, text)]
     try:
         text = data.decode("utf-8-sig")
