@@ -1,5 +1,6 @@
 # Every target does its own set-up: it finds a Python, makes .venv and fills it from the locked lists in requirements/.
-# The set-up is stamped, so the second call costs nothing. `make PYTHON=/usr/bin/python3.12 test` chooses the Python.
+# The set-up is stamped, so the second call costs nothing. `make PYTHON=/usr/bin/python3.12 test` chooses the Python
+# for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test check format bench lock clean
@@ -30,8 +31,8 @@ format: .venv/dev.stamp  ## rewrite the files as `make check` wants them
 bench: .venv/demo.stamp  ## measure reaction times, memory and CPU beside a naive controller
 	$(BIN)/python -m benchmarks $(ARGS)
 
-lock: .venv/dev.stamp  ## choose the dependencies' versions anew: requirements/*.txt
-	sh requirements/lock.sh
+lock:  ## choose the dependencies' versions anew: requirements/*.txt
+	PYTHON='$(PYTHON)' sh requirements/lock.sh
 
 clean:  ## remove everything that the other targets made
 	rm -rf .venv build dist *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -6,8 +6,8 @@ cd "$(dirname "$0")/.."
 
 tools=$(mktemp -d)
 trap 'rm -rf "$tools"' EXIT
-.venv/bin/python -m venv "$tools"
-"$tools/bin/pip" install --quiet 'pip-tools==7.6.2'
+"${PYTHON:-python3}" -m venv "$tools"
+"$tools/bin/pip" install --quiet --disable-pip-version-check 'pip-tools==7.6.2'
 
 lock() { # OUTPUT SOURCE [OPTION]...
     output=requirements/$1
