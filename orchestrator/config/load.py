@@ -11,7 +11,7 @@ from orchestrator.config.reader import Reader
 from orchestrator.config.scalars import UnfitError, nearest
 from orchestrator.config.schema import INVALID
 from orchestrator.config.station import Station
-from orchestrator.config.yamltree import MAX_BYTES, Entries, Node, parse
+from orchestrator.config.yamltree import MAX_BYTES, Entries, Node, Refused, parse
 from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
 
@@ -78,7 +78,7 @@ class _Loader:
     def check(self, where: Place) -> None:
         """Reads a file of a kind that it says itself."""
         node = self._tree(where)
-        if node is None:
+        if node is None or isinstance(node, Refused):
             return
         if kinds := _kinds(node):
             self.load(kinds[0], where)
@@ -100,10 +100,12 @@ class _Loader:
             if others and kind not in others:
                 text = f"{self._name(where)} has the key {others[0].key!r}; needed is a file with the key {kind.key!r}"
                 raise UnfitError(text)
-            self._loaded[real] = INVALID if node is None else self._read(kind, where, node)
+            self._loaded[real] = self._read(kind, where, node)
         return self._loaded[real]
 
-    def _read(self, kind: Kind, where: Place, node: Node) -> object:
+    def _read(self, kind: Kind, where: Place, node: Node | None) -> object:
+        if node is None or isinstance(node, Refused):
+            return INVALID
         base = where.path.parent
         named: dict[type, Callable[[str], object]] = {
             Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),

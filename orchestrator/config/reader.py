@@ -154,8 +154,6 @@ class Reader:
 
     def _record(self, node: Node, record: type, path: str) -> object:
         known = slots(record)
-        if isinstance(node, Refused):
-            return INVALID
         if not isinstance(node, Entries):
             self.report(path, f"needs the keys {', '.join(known)}, indented below it")
             return INVALID

@@ -205,7 +205,7 @@ _HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"[-+]?[\d.]+e[-+]?\d+", re.I | re.A), lambda m: _instead(_number(m[0]), m[0])),
     (re.compile(r"[-+]?(\d+\.|\.\d+|0+\d+\.\d*)", re.A), lambda m: _instead(_number(m[0]), m[0])),
     (
-        re.compile(r"(?!0[xo]|[\d.]+[eE][-+]?\d)([-+]?\d+(\.\d+)?) *[^\d.,:\s].*", re.A),
+        re.compile(r"(?!0[xo]|[\d.]+[eE][-+]?\d)([-+]?\d+(\.\d+)?) *[^\d.,:_\s].*", re.A),
         lambda m: f"only the number, without a unit: {m[1]}, not {m[0]}",
     ),
 )

@@ -130,6 +130,16 @@ def test_a_key_of_a_deeper_group_is_sent_there() -> None:
     assert places(Outer, frozenset()) == ("inners.from", "inners.word", "inner.from", "inner.word")
 
 
+def test_a_finding_at_an_unwritten_key_is_placed_at_its_nearest_parent() -> None:
+    _, _, reader = _read("flag: true\ninner: {from: 1}\n")
+    reader.report("inner.word", "too short")
+    reader.report("span[1]", "too wide")
+    assert [str(finding) for finding in reader.findings] == [
+        "dir/f.yaml:2:8: error: inner.word: too short",
+        "dir/f.yaml:1:1: error: span[1]: too wide",
+    ]
+
+
 def test_findings_are_bounded() -> None:
     _, findings, _ = _read("".join(f"key-{i}: 1\n" for i in range(1000)))
     assert len(findings) == MAX_FINDINGS

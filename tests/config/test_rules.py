@@ -45,11 +45,6 @@ BOUNDARIES = [
     ("policy", "start:\n  soc_below_pct: 98", "start:\n  soc_below_pct: 100", ""),
     ("policy", "finish:\n  soc_pct: 100", "finish:\n  soc_pct: 97", "start.soc_below_pct"),
     ("policy", "recharge:\n  soc_below_pct: 95", "recharge:\n  soc_below_pct: 99.9", ""),
-    (
-        "policy",
-        "soc_below_pct: 90\nrecharge:\n  soc_below_pct: 100\n",
-        "recharge.soc_below_pct",
-    ),
     ("policy", "temperature_trip_c: 55", "temperature_trip_c: 45.1", ""),
     ("policy", "temperature_trip_c: 55", "temperature_trip_c: 45", "pack.temperature_c[1]"),
     ("policy", "from: 0, to: 10, step: 0", "from: -5, to: 10, step: 0", ""),

@@ -44,6 +44,7 @@ def test_a_number_is_a_plain_decimal(text: str, value: float) -> None:
         (".nan", ".nan is not a number to charge by"),
         ("-.INF", "-.INF is not a number to charge by"),
         ("1_000", "write 1000, not 1_000"),
+        ("1.2_3.4", "'1.2_3.4' is not a number in V"),
         ("58,4", "use a decimal point: 58.4, not 58,4"),
         ("58.4V", "only the number, without a unit: 58.4, not 58.4V"),
         ("58.4 V", "only the number, without a unit: 58.4, not 58.4 V"),
