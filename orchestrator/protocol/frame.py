@@ -155,7 +155,7 @@ class FrameDecoder:
                 at = data.find(START, at + 1)
         keep = at
         if at < 0:  # the last byte may be the first half of a start
-            keep = len(data) - (not final and data.endswith(START[:1], done))
+            keep = len(data) - (not final and data.endswith(START[:1]))
         self.skipped_bytes += keep - done
         self._pending = data[keep:]
         return frames

@@ -75,6 +75,7 @@ def test_a_refusal_for_no_known_reason_is_still_a_refusal() -> None:
         ("", "0 bytes, expected 8: "),
         ("43 00 60", "3 bytes, expected 8: 43 00 60"),
         ("43 00 60 00 F8 FF 40", "7 bytes, expected 8: 43 00 60 00 F8 FF 40"),
+        ("43 00 60 00 F8 FF 40 09 00", "9 bytes, expected 8: 43 00 60 00 F8 FF 40 09 00"),
         ("41 00 60 00 FF FF FF 7F", "command 0x41, expected 43, 4B, 4F, 60 or 80: 41 00 60 00 FF FF FF 7F"),
         ("00 31 32 33 34 35 36 37", "command 0x00, expected 43, 4B, 4F, 60 or 80: 00 31 32 33 34 35 36 37"),
     ],
