@@ -1,0 +1,251 @@
+"""One BMU on a CAN bus, without I/O: frames and the time come in, requests go out, `view` is what is known of it.
+
+Fast objects are read every sweep, slow ones once a second; one request in flight (`sdo_client.py` keeps late answers
+out), the next as soon as the answer is there and the bus's budget allows. A silent node is asked twice a second.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from math import inf
+
+from orchestrator.config.station import BatteryConfig
+from orchestrator.devices.battery_view import BatteryView
+from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup, TimerWrite
+from orchestrator.devices.bus_budget import BusBudget
+from orchestrator.devices.emergency import emergency_cob_id, emergency_text
+from orchestrator.devices.node_health import NodeHealth
+from orchestrator.devices.polled import Polled
+from orchestrator.devices.read_plan import ReadPlan
+from orchestrator.devices.sdo_client import Key, SdoClient, Verdict
+from orchestrator.model import BatteryLink, BatteryReading
+from orchestrator.protocol.objects import TpdoEntry
+from orchestrator.protocol.sdo import (
+    NMT_COB_ID,
+    NmtCommand,
+    NmtState,
+    SdoAbort,
+    SdoMalformed,
+    SdoValue,
+    SdoWritten,
+    heartbeat_cob_id,
+    nmt_frame,
+    parse_reply,
+    read_request,
+    reply_cob_id,
+    request_cob_id,
+    tpdo_cob_id,
+)
+
+Send = Callable[[int, bytes], None]
+
+ANSWER_LIMIT_S = 1.5  #: without a valid answer for so long the node is not online (DESIGN §6)
+SILENT_S = 0.5  #: pause between requests to a node that is not online: it shall not cost the others' time
+
+
+class BatteryNode:
+    """A BMU. Everything but `view` belongs to the thread of its bus.
+
+    `view` is replaced as a whole; `on_change()` is called after each replacement with news in it (a heartbeat is none).
+    """
+
+    def __init__(self, bus: str, config: BatteryConfig, budget: BusBudget, on_change: Callable[[], None]) -> None:
+        self.node_id = config.node_id
+        self.trouble = ""  #: what is wrong with the bus, in words, though it is open
+        self.next_due_s = -inf  #: when `turn()` has something to do, frames apart
+        self._config = config
+        self._budget = budget
+        self._place = f"BMU 0x{config.node_id:02X} on {bus}"
+        self._plan = ReadPlan(config, budget)
+        self._client = SdoClient(config.sdo_timeout_s)
+        self._setup = BmuSetup(config)
+        self._health = NodeHealth()
+        self._answer_s = -inf  # when the newest valid answer came
+        self._not_before_s = -inf  # when a silent node may be asked again
+        self._slot_s: float | None = None  # when the bus's budget lets the next request go out, if that is reserved
+        self._view = BatteryView(f"{self._place}: not asked yet", on_change)
+        self._handlers = self._frame_handlers()
+
+    def _frame_handlers(self) -> dict[int, Callable[[bytes, float], None]]:
+        handlers: dict[int, Callable[[bytes, float], None]] = {
+            reply_cob_id(self.node_id): self._on_sdo,
+            heartbeat_cob_id(self.node_id): self._on_heartbeat,
+            emergency_cob_id(self.node_id): self._on_emergency,
+        }
+        if self._config.tpdo_s is not None:
+            for tpdo in self._config.map.tpdos:
+                handlers[tpdo_cob_id(tpdo.number, self.node_id)] = partial(self._on_tpdo, tpdo)
+        return handlers
+
+    @property
+    def cob_ids(self) -> tuple[int, ...]:
+        """The frames that `on_frame` wants."""
+        return tuple(self._handlers)
+
+    @property
+    def view(self) -> tuple[BatteryReading, BatteryLink]:
+        """What is known now. From any thread."""
+        return self._view.current
+
+    @property
+    def words(self) -> Mapping[Key, tuple[int, int] | None]:
+        """The newest raw word of each object and the size that its answer declared; None where none came."""
+        return {polled.key: polled.word for polled in self._plan.objects}
+
+    # --- what the bus calls -------------------------------------------------------------------------------------------
+
+    def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
+        """A frame with one of `cob_ids` came."""
+        self._health.frame(now_s)
+        self._handlers[cob_id](data, now_s)
+        self._publish()
+
+    def turn(self, now_s: float, send: Send) -> None:
+        """Do what is due: give up what took too long, notice silence, send the next request by `send(cob_id, data)`."""
+        self._watch(now_s)
+        if self._client.pending is None:
+            self.next_due_s = self._ask(now_s, send)
+        if self._client.pending is not None:
+            self.next_due_s = self._client.deadline_s
+        if self._view.link.online:
+            self.next_due_s = min(self.next_due_s, self._answer_s + ANSWER_LIMIT_S)
+        self._publish()
+
+    def fail(self, problem: str, now_s: float) -> None:
+        """The bus, or our own code, failed: what was asked is lost, and the reason is shown until an answer comes."""
+        self._client.drop()
+        self._slot_s = None
+        self._answer_s = -inf
+        self._not_before_s = self.next_due_s = now_s + SILENT_S
+        self._view.set(online=False, problem=problem)
+        self._publish()
+
+    # --- the schedule -------------------------------------------------------------------------------------------------
+
+    def _watch(self, now_s: float) -> None:
+        expired = self._client.expire(now_s)
+        link = self._view.link
+        if link.online:
+            if now_s - self._answer_s >= ANSWER_LIMIT_S:
+                self._view.set(online=False, problem=self._why_silent())
+            elif link.heartbeat_s is not None and link.heartbeat_t_s is not None:
+                self._setup.watch(now_s, link.heartbeat_t_s)
+        elif expired:
+            self._view.set(problem=self._why_silent())
+
+    def _why_silent(self) -> str:
+        if self._view.link.nmt_state == NmtState.STOPPED:
+            why = "an NMT command has stopped it; NMT start wakes it"
+        else:
+            why = self.trouble or self._health.silence(self._config.sdo_timeout_s)
+        return f"{self._place} does not answer: {why}"
+
+    def _ask(self, now_s: float, send: Send) -> float:
+        """Send the next request if one is due, and return when to come here again."""
+        if now_s < self._not_before_s:
+            return self._not_before_s
+        if self._setup.start_due:
+            self._setup.start_due = False
+            send(NMT_COB_ID, nmt_frame(NmtCommand.START, self.node_id))
+            return now_s
+        write = self._setup.next_write(now_s) if self._view.link.online else None
+        if write is not None and self._client.may_ask(write.key):
+            return self._request(write, now_s, send)
+        chosen = self._plan.choose(now_s, self._client)
+        return self._request(chosen, now_s, send) if isinstance(chosen, Polled) else chosen
+
+    def _request(self, what: TimerWrite | Polled, now_s: float, send: Send) -> float:
+        if self._slot_s is None:
+            self._slot_s = self._budget.reserve(now_s)
+        if now_s < self._slot_s:
+            return self._slot_s
+        self._slot_s = None
+        if isinstance(what, Polled):
+            frame = read_request(*what.key)
+            self._plan.asked(what, now_s)
+        else:
+            frame = what.frame()
+            self._setup.sent(now_s)
+        self._client.ask(what.key, now_s, write=isinstance(what, TimerWrite))
+        if not self._view.link.online:
+            self._not_before_s = now_s + SILENT_S
+        send(request_cob_id(self.node_id), frame)
+        return now_s
+
+    # --- what frames say ----------------------------------------------------------------------------------------------
+
+    def _on_sdo(self, data: bytes, now_s: float) -> None:
+        self.next_due_s = now_s
+        reply = parse_reply(data)
+        verdict = self._client.take(reply, now_s)
+        self._health.answer(verdict, reply.reason if isinstance(reply, SdoMalformed) else "")
+        if verdict is Verdict.ACCEPTED and not isinstance(reply, SdoMalformed):
+            self._accept(reply, now_s)
+        else:
+            self._view.dropped()
+
+    def _accept(self, reply: SdoValue | SdoWritten | SdoAbort, now_s: float) -> None:
+        self._answer_s = now_s
+        self._not_before_s = -inf
+        if not self._health.problem:
+            self._view.set(online=True, problem="")
+        if self._client.writing:
+            self._configured(now_s, written=isinstance(reply, SdoWritten))
+            return
+        polled = self._plan[reply.index, reply.sub]
+        if isinstance(reply, SdoAbort):
+            polled.abort = reply
+        elif isinstance(reply, SdoValue):
+            self._view.measured(polled.from_sdo(reply.value, reply.size, self._client.asked_s))
+        if self._view.link.abort or polled.abort:
+            abort = next((polled.abort for polled in self._plan.objects if polled.abort), None)
+            self._view.set(abort=str(abort or ""), abort_code=abort.code if abort else 0)
+
+    def _configured(self, now_s: float, *, written: bool) -> None:
+        write = self._setup.answered(written=written)
+        if write.key != HEARTBEAT:
+            return
+        if not written:  # not every BMU allows it: then there is nothing to watch
+            self._view.set(heartbeat_s=None, heartbeat_t_s=None)
+        elif self._view.link.heartbeat_s is None:  # else asking again would make a lost one look alive
+            self._view.set(heartbeat_s=write.period_s, heartbeat_t_s=now_s)
+
+    def _on_heartbeat(self, data: bytes, now_s: float) -> None:
+        if len(data) != 1:
+            self._view.dropped()
+        elif data[0] == NmtState.BOOT_UP:
+            self._booted(now_s)
+        else:
+            self._view.set(nmt_state=data[0])
+            self._view.set(heartbeat_t_s=now_s, news=False)
+
+    def _booted(self, now_s: float) -> None:
+        """Nothing holds any more that was known, asked or configured before."""
+        self._view.booted(now_s)
+        self._client.clear()
+        self._setup.restart()
+        self._plan.restart(now_s)
+        self._not_before_s = -inf
+        self.next_due_s = now_s
+
+    def _on_emergency(self, data: bytes, _now_s: float) -> None:
+        text = emergency_text(data)
+        if text is None:
+            self._view.dropped()
+        else:
+            self._view.set(emergency=text)
+
+    def _on_tpdo(self, tpdo: TpdoEntry, data: bytes, now_s: float) -> None:
+        objects = [self._plan[index, 0] for index in tpdo.objects]
+        if len(data) != sum(polled.entry.size for polled in objects):
+            self._view.dropped()
+            return
+        begin = 0
+        for polled in objects:
+            end = begin + polled.entry.size
+            self._view.measured(polled.from_tpdo(int.from_bytes(data[begin:end], "little"), now_s))
+            begin = end
+
+    def _publish(self) -> None:
+        if problem := self._health.problem:
+            self._view.set(online=False, problem=f"{self._place}: {problem}")
+        self._view.publish()

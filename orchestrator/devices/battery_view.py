@@ -1,0 +1,68 @@
+"""What is known of a BMU: replaced as a whole with every change, so that another thread can take it at any time."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from orchestrator.devices.polled import Fields
+from orchestrator.model import BatteryLink, BatteryReading, Measurement
+from orchestrator.protocol.sdo import NmtState
+
+
+class BatteryView:
+    """A reading and a link that are being worked on, and the newest pair that was published."""
+
+    __slots__ = ("_news", "_on_change", "current", "link", "reading")
+
+    def __init__(self, problem: str, on_change: Callable[[], None]) -> None:
+        self.reading = BatteryReading()
+        self.link = BatteryLink(problem=problem)
+        self.current = (self.reading, self.link)  #: what other threads may look at
+        self._on_change = on_change
+        self._news = False
+
+    def measured(self, fields: Fields) -> None:
+        """Take the plausible values over; a value that is not keeps the one before it, with its age, and says why."""
+        values: dict[str, Measurement | None] = {}
+        implausible = {name: why for name, why in self.link.implausible.items() if name not in fields}
+        for name, value in fields.items():
+            if isinstance(value, str):
+                implausible[name] = value
+            elif value is None or (old := getattr(self.reading, name)) is None or value.t_s >= old.t_s:
+                values[name] = value
+        if values:
+            self.reading = replace(self.reading, **values)
+            self._news = True
+        self.set(implausible=implausible)
+
+    def booted(self, now_s: float) -> None:
+        """Nothing holds any more of what was known before."""
+        old = self.link
+        self.reading = BatteryReading()
+        self.link = BatteryLink(
+            online=old.online,
+            problem=old.problem,
+            boots=old.boots + 1,
+            boot_t_s=now_s,
+            nmt_state=int(NmtState.BOOT_UP),
+            bad_frames=old.bad_frames,
+        )
+        self._news = True
+
+    def dropped(self) -> None:
+        """A frame was thrown away."""
+        self.set(bad_frames=self.link.bad_frames + 1, news=False)
+
+    def set(self, *, news: bool = True, **changes: object) -> None:
+        """Change fields of the link; without `news` nobody is called for it."""
+        changed = {name: value for name, value in changes.items() if getattr(self.link, name) != value}
+        if changed:
+            self.link = replace(self.link, **changed)  # type: ignore[arg-type]  # one helper for fields of all types
+            self._news |= news
+
+    def publish(self) -> None:
+        """Let the others see it."""
+        if self.reading is not self.current[0] or self.link is not self.current[1]:
+            self.current = (self.reading, self.link)
+        if self._news:
+            self._news = False
+            self._on_change()

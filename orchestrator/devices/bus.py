@@ -1,0 +1,129 @@
+"""The BMUs of one CAN bus and the thread that reads them; it opens the bus, and opens it anew when it fails."""
+
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Protocol
+
+from orchestrator.devices.battery import BatteryNode
+from orchestrator.errors import LinkError
+from orchestrator.protocol.sdo import NmtCommand
+
+REOPEN_S = 1.0  #: pause before a bus that failed is opened again
+TICK_S = 0.1  #: longest wait for a frame: so soon an NMT command goes out and `close()` is noticed
+STALL_S = 0.5  #: without a turn for so long the loop hangs; five ticks
+
+
+class CanPort(Protocol):
+    """What of `link/can.py` is needed here."""
+
+    name: str
+    trouble: str
+
+    def subscribe(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
+        """Have the frames with this id handed on."""
+
+    def open(self) -> None:
+        """LinkError if it does not work."""
+
+    def close(self) -> None:
+        """Never raises."""
+
+    def receive(self, timeout_s: float) -> None:
+        """Hand one frame on, if one comes in time; LinkError if the bus is broken."""
+
+    def send(self, cob_id: int, data: bytes) -> None:
+        """LinkError if the bus is broken, RefusedError for a frame that may not be sent."""
+
+    def nmt(self, node_id: int, command: NmtCommand) -> None:
+        """From any thread; RefusedError for a node that is not of this station."""
+
+
+class BatteryBus:
+    """One bus with its BMUs. `clock` gives monotonic seconds."""
+
+    def __init__(self, port: CanPort, nodes: Sequence[BatteryNode], clock: Callable[[], float]) -> None:
+        self._port = port
+        self._nodes = tuple(nodes)
+        self._clock = clock
+        self._closing = threading.Event()
+        self._open = False
+        self._trouble = ""
+        self._turn_s = clock()
+        self._thread = threading.Thread(target=self._run, name=f"can-{port.name}", daemon=True)
+        for node in self._nodes:
+            for cob_id in node.cob_ids:
+                port.subscribe(cob_id, partial(self._on_frame, node))
+
+    def start(self) -> None:
+        """Begin to read. Failing to open the bus is shown in every node's link, not raised."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread and close the bus. An NMT command that was just given may be lost."""
+        self._closing.set()
+        self._thread.join()
+
+    def nmt(self, node_id: int, command: NmtCommand) -> None:
+        """Ask a node to start, stop or reset; RefusedError for a node that is not of this station. From any thread."""
+        self._port.nmt(node_id, command)
+
+    def stalled(self, now_s: float) -> bool:
+        """True when the loop hangs or has ended. While the bus is closed, all nodes offline, it may take its time."""
+        return not self._closing.is_set() and (
+            not self._thread.is_alive() or (self._open and now_s - self._turn_s > STALL_S)
+        )
+
+    def _run(self) -> None:
+        while not self._closing.is_set():
+            try:
+                self._port.open()
+                self._open, self._turn_s = True, self._clock()
+                while not self._closing.is_set():
+                    self._turn()
+            except LinkError as error:
+                self._failed(str(error))
+            except Exception as error:  # noqa: BLE001 - the thread must not die, and the reason be seen
+                self._failed(f"CAN bus {self._port.name}: internal error: {error!r}")
+            self._open = False
+            self._port.close()
+            self._closing.wait(REOPEN_S)
+
+    def _turn(self) -> None:
+        now_s = self._turn_s = self._clock()
+        due_s = now_s + TICK_S
+        for node in self._nodes:
+            if node.next_due_s <= now_s:
+                try:
+                    node.turn(now_s, self._port.send)
+                except LinkError:
+                    raise
+                except Exception as error:  # noqa: BLE001 - one node's fault must not take the others' bus
+                    self._node_failed(node, error)
+            if node.next_due_s < due_s:  # twice as fast as min(), and this is the innermost loop
+                due_s = node.next_due_s
+        self._port.receive(due_s - now_s)
+        if self._port.trouble != self._trouble:
+            self._trouble = self._port.trouble
+            for node in self._nodes:
+                node.trouble = self._trouble
+
+    def _on_frame(self, node: BatteryNode, cob_id: int, data: bytes) -> None:
+        try:
+            node.on_frame(cob_id, data, self._clock())
+        except Exception as error:  # noqa: BLE001 - as above
+            self._node_failed(node, error)
+
+    def _node_failed(self, node: BatteryNode, error: Exception) -> None:
+        self._show(node, f"BMU 0x{node.node_id:02X} on {self._port.name}: internal error: {error!r}")
+
+    def _failed(self, problem: str) -> None:
+        for node in self._nodes:
+            self._show(node, problem)
+
+    def _show(self, node: BatteryNode, problem: str) -> None:
+        try:
+            node.fail(problem, self._clock())
+        except Exception:  # the view says it already; only who was to be told of it failed as well
+            logging.getLogger(__name__).exception("%s", problem)

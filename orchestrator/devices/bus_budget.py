@@ -1,0 +1,61 @@
+"""How much of a CAN bus our SDO reads may take, and how that is shared.
+
+An exchange is two frames of 8 bytes with an 11-bit id. Such a frame has 111 bits with the pause behind it, of which 98
+can be stuffed: at worst 24 bits more. Two of them are 270 bits, so that 30 % of 250 kbit/s are 277 exchanges a second.
+"""
+
+from dataclasses import dataclass
+
+FRAME_BITS = 111 + 24
+EXCHANGE_BITS = 2 * FRAME_BITS
+SHARE = 0.30  #: of the bus's bit rate, the most that SDO traffic may take
+PLANNED = 0.9  #: of that share, what the sweeps are planned for: without slack the queue would only grow
+BURST = 4  #: exchanges that may follow each other at once; below the 10 frames that SocketCAN's queue takes
+SLOW_S = 1.0  #: how often the slow objects are read
+
+
+@dataclass(frozen=True, slots=True)
+class _Share:
+    fast: int
+    slow: int
+    sweep_s: float
+
+
+class BusBudget:
+    """Shares a bus between its nodes: stretches all sweeps by one factor, and spaces the requests."""
+
+    def __init__(self, bitrate: int) -> None:
+        self.capacity_hz = SHARE * bitrate / EXCHANGE_BITS
+        self._shares: list[_Share] = []
+        self._stretch = 1.0
+        self._least_s = 0.0  # the period of every object, where even one a second is too much
+        self._spacing_s = 1.0 / self.capacity_hz
+        self._next_s = float("-inf")  # when all that is reserved has had its time
+
+    def join(self, fast: int, slow: int, sweep_s: float) -> None:
+        """A node with so many fast and slow objects, the former wanted every `sweep_s`. All sweeps may stretch."""
+        self._shares.append(_Share(fast, slow, sweep_s))
+        plan_hz = PLANNED * self.capacity_hz
+        fast_hz = sum(share.fast / share.sweep_s for share in self._shares)
+        left_hz = plan_hz - sum(share.slow for share in self._shares) / SLOW_S
+        self._stretch = max(1.0, fast_hz / left_hz) if left_hz > 0 else float("inf")
+        if self._stretch * max(share.sweep_s for share in self._shares) > SLOW_S:
+            self._least_s = sum(share.fast + share.slow for share in self._shares) / plan_hz
+
+    def fast_s(self, sweep_s: float) -> float:
+        """How often a fast object may be read that is wanted every `sweep_s`."""
+        return self._least_s or sweep_s * self._stretch
+
+    @property
+    def slow_s(self) -> float:
+        """How often a slow object may be read."""
+        return max(SLOW_S, self._least_s)
+
+    def reserve(self, now_s: float) -> float:
+        """Count one exchange, and return when it may begin: now, or after those that were reserved before it.
+
+        Reservations are served in the order in which they were made, so that no node is ever passed over.
+        """
+        begin_s = max(now_s, self._next_s - (BURST - 1) * self._spacing_s)
+        self._next_s = max(now_s, self._next_s) + self._spacing_s
+        return begin_s

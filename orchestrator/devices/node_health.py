@@ -1,0 +1,57 @@
+"""Whether the frames of one node id look like those of one healthy node."""
+
+from orchestrator.devices.sdo_client import Verdict
+
+BABBLE_HZ = 500  #: frames a second; a node that is read as fast as allowed sends a tenth of that
+#: Second answers are added up, answers as they should be taken off: with a second node on the id every exchange has
+#: one too many, and the sum climbs; one frame that the bus repeated falls off again.
+_STRAY, _CLEAN, _DOUBLED, _MOST = 2, 1, 6, 8
+
+
+class NodeHealth:
+    """Counts what is odd about a node."""
+
+    __slots__ = ("_babbling", "_doubled", "_frames", "_last", "_reason", "_strays", "_window_s")
+
+    def __init__(self) -> None:
+        self._frames = 0
+        self._window_s = 0.0
+        self._babbling = False
+        self._strays = 0
+        self._doubled = False
+        self._last: Verdict | None = None
+        self._reason = ""
+
+    def frame(self, now_s: float) -> None:
+        """A frame of any kind came."""
+        self._frames += 1
+        elapsed_s = now_s - self._window_s
+        if elapsed_s >= 1.0:
+            self._babbling = self._frames > BABBLE_HZ * elapsed_s
+            self._frames, self._window_s = 0, now_s
+
+    def answer(self, verdict: Verdict, reason: str = "") -> None:
+        """An SDO answer came; `reason` says what is wrong with a malformed one."""
+        self._last, self._reason = verdict, reason
+        if verdict is Verdict.STRAY:
+            self._strays = min(_MOST, self._strays + _STRAY)
+        elif verdict is Verdict.ACCEPTED:
+            self._strays = max(0, self._strays - _CLEAN)
+        self._doubled = self._strays >= _DOUBLED or (self._doubled and self._strays > 0)
+
+    @property
+    def problem(self) -> str:
+        """Why its answers must not be relied upon, although it answers; "" if nothing is odd."""
+        if self._doubled:
+            return "requests are answered twice: two BMUs have this node id, or another master reads it, too"
+        if self._babbling:
+            return f"it sends more than {BABBLE_HZ} frames a second"
+        return ""
+
+    def silence(self, timeout_s: float) -> str:
+        """The best guess why no answer was accepted for some time."""
+        if self._last is Verdict.LATE:
+            return f"its answers come later than {timeout_s:g} s (sdo_timeout_s)"
+        if self._last is Verdict.MALFORMED:
+            return f"its newest answer is not understood: {self._reason}"
+        return "check its power, the cable, the bit rate and its node switch (node id = switch + 0x10)"

@@ -1,0 +1,65 @@
+"""One object of a BMU that is read again and again, and what came of it last."""
+
+from collections.abc import Mapping
+from math import inf
+
+from orchestrator.devices.sdo_client import Key
+from orchestrator.model import Measurement
+from orchestrator.protocol.objects import ObjectEntry
+from orchestrator.protocol.sdo import SdoAbort
+from orchestrator.protocol.words import Decoded, decode_word
+
+Fields = Mapping[str, Decoded]
+
+#: SDO and TPDO are two samples of one quantity, up to a second apart: they may differ by this share of its range …
+TOLERANCE = 0.05
+#: … and have to differ more in so many SDO reads in a row, a second apart, before neither is believed.
+CONFLICTS = 2
+
+
+class Polled:
+    """An object's schedule and its newest word."""
+
+    __slots__ = ("_differed", "_tpdo_fields", "abort", "conflict", "due_s", "entry", "key", "tpdo_t_s", "word")
+
+    def __init__(self, entry: ObjectEntry) -> None:
+        self.entry = entry
+        self.key: Key = (entry.index, entry.sub)
+        self.forget(due_s=-inf)
+
+    def forget(self, due_s: float) -> None:
+        """The node booted: what it said before counts no more."""
+        self.due_s = due_s  #: when it is to be read next
+        self.word: tuple[int, int] | None = None  #: newest raw word of an SDO answer, and the size that it declared
+        self.abort: SdoAbort | None = None  #: set while the node refuses to have it read
+        self.tpdo_t_s = -inf  #: when a TPDO brought it last
+        self.conflict: dict[str, Decoded] = {}  #: fields of which SDO and TPDO tell different stories
+        self._tpdo_fields: Fields = {}
+        self._differed = 0
+
+    def from_tpdo(self, word: int, now_s: float) -> Fields:
+        """The fields, from the object's word in a TPDO that came at `now_s`."""
+        fields = decode_word(self.entry, word, self.entry.size, now_s)
+        self.tpdo_t_s, self._tpdo_fields = now_s, fields
+        return fields | self.conflict
+
+    def from_sdo(self, word: int, size: int, asked_s: float) -> Fields:
+        """The fields, from an SDO answer to the request of `asked_s`. Where TPDOs bring them, too, both must agree."""
+        self.abort, self.word = None, (word, size)
+        fields = decode_word(self.entry, word, size, asked_s)
+        if self._tpdo_fields:
+            different = self._different(fields)
+            self._differed = self._differed + 1 if different else 0
+            self.conflict = different if self._differed >= CONFLICTS else {}
+            self._tpdo_fields = {}
+        return fields | self.conflict
+
+    def _different(self, fields: Fields) -> dict[str, Decoded]:
+        different: dict[str, Decoded] = {}
+        for field in self.entry.fields:
+            tpdo, sdo = self._tpdo_fields.get(field.name), fields.get(field.name)
+            if isinstance(tpdo, Measurement) and isinstance(sdo, Measurement):
+                tolerance = TOLERANCE * (field.range.high - field.range.low)
+                if abs(tpdo.value - sdo.value) > tolerance:
+                    different[field.name] = f"{field.name}: a TPDO says {tpdo.value:g}, the SDO read {sdo.value:g}"
+        return different

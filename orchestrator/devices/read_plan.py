@@ -1,0 +1,57 @@
+"""Which object of a BMU is read next: the most overdue one that may be asked for."""
+
+from orchestrator.config.station import BatteryConfig
+from orchestrator.devices.bus_budget import BusBudget
+from orchestrator.devices.polled import Polled
+from orchestrator.devices.sdo_client import Key, SdoClient
+from orchestrator.protocol.objects import Sweep
+
+TPDO_PERIODS = 3  #: an object that no TPDO brought for so many periods is read every sweep again
+
+
+class ReadPlan:
+    """The objects of one BMU, by the map of its station file, and their periods, by the budget of the bus."""
+
+    __slots__ = ("_budget", "_by_key", "_sweep_s", "_tpdo_s", "objects")
+
+    def __init__(self, config: BatteryConfig, budget: BusBudget) -> None:
+        self.objects = tuple(Polled(entry) for entry in config.map.objects)
+        self._by_key = {polled.key: polled for polled in self.objects}
+        self._budget = budget
+        self._sweep_s, self._tpdo_s = config.sweep_s, config.tpdo_s
+        fast = sum(entry.sweep is Sweep.FAST for entry in config.map.objects)
+        budget.join(fast, len(self.objects) - fast, config.sweep_s)
+
+    def __getitem__(self, key: Key) -> Polled:
+        return self._by_key[key]
+
+    def restart(self, now_s: float) -> None:
+        """The node booted: everything is due, nothing that it said before counts."""
+        for polled in self.objects:
+            polled.forget(due_s=now_s)
+
+    def choose(self, now_s: float, client: SdoClient) -> Polled | float:
+        """The object to read now, or the time at which to ask again."""
+        due = min(self.objects, key=_due_s)
+        if due.due_s > now_s:
+            return due.due_s
+        if client.may_ask(due.key):
+            return due
+        # Any answer to another one will show that nothing more of this one can come.
+        others = [polled for polled in self.objects if client.may_ask(polled.key)]
+        if others:
+            return min(others, key=_due_s)
+        if now_s < client.quiet_s:
+            return client.quiet_s
+        client.clear()
+        return due
+
+    def asked(self, polled: Polled, now_s: float) -> None:
+        """It is read now; when is it due again?"""
+        by_tpdo = self._tpdo_s is not None and now_s - polled.tpdo_t_s < TPDO_PERIODS * self._tpdo_s
+        slow = by_tpdo or polled.entry.sweep is Sweep.SLOW
+        polled.due_s = now_s + (self._budget.slow_s if slow else self._budget.fast_s(self._sweep_s))
+
+
+def _due_s(polled: Polled) -> float:
+    return polled.due_s

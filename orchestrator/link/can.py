@@ -1,0 +1,222 @@
+"""A CAN bus by python-can and canopen: the only module that uses them.
+
+There is no Notifier: it dies of the first exception. One thread of ours calls `receive()` and `send()`. Whatever the
+libraries raise becomes a LinkError; then the bus is closed and, after a pause, a new one is opened: a Network that has
+seen its interface go down stays deaf.
+"""
+
+import errno
+import logging
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.errors import LinkError, RefusedError
+from orchestrator.link import can_text
+from orchestrator.link.can_gate import refusal
+from orchestrator.protocol.sdo import NMT_COB_ID, NmtCommand, nmt_frame
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+
+FrameCallback = Callable[[int, bytes], None]
+
+#: A bus without a wire (`virtual`, `udp_multicast`) may have no bit rate in its settings: CANopen's highest, then.
+DEFAULT_BITRATE = 1_000_000
+#: Longer than any driver needs to take one frame; a line that is stalled must not stall the thread.
+SEND_TIMEOUT_S = 0.02
+#: So many unreadable frames in a row are no noise any more: build the bus anew.
+MAX_GARBAGE = 16
+
+#: What we add where the station file is silent, by interface.
+PROTECTIVE: Mapping[str, Mapping[str, object]] = {
+    # python-can's own 1 ms is a busy loop (5 % of a core when idle); a read may come this much late.
+    "slcan": {"timeout": 0.01},
+    # Nothing leaves this machine.
+    "udp_multicast": {"hop_limit": 0},
+}
+
+
+class CanBus:
+    """One bus of the station file. All but `nmt()` belongs to the thread that called `open()`.
+
+    `settings` go to python-can as they are, nothing is taken from the environment or from python-can's own
+    configuration files. `nodes` are the node ids that may be written to at all (`link/can_gate.py`).
+    """
+
+    def __init__(self, name: str, settings: Mapping[str, object], nodes: Collection[int]) -> None:
+        self.name = name
+        self.trouble = ""  #: error-passive, bus-off, nobody acknowledges: in words; "" once a frame comes again
+        self.foreign = 0  #: frames that are none of ours
+        self.garbage = 0  #: what the driver could not read
+        self._settings = {**PROTECTIVE.get(str(settings.get("interface")), {}), **settings}
+        self._nodes = frozenset(nodes)
+        self._callbacks: dict[int, FrameCallback] = {}
+        self._orders: deque[tuple[int, NmtCommand]] = deque()
+        self._garbage_run = 0
+        self._bus: can.BusABC | None = None
+        self._network: canopen.Network | None = None
+
+    @property
+    def bitrate(self) -> int:
+        """The wire's bit/s, for the budget of its use; DEFAULT_BITRATE where the settings do not say it."""
+        bitrate = self._settings.get("bitrate")
+        return bitrate if isinstance(bitrate, int) else DEFAULT_BITRATE
+
+    @property
+    def nodes_seen(self) -> tuple[int, ...]:
+        """The node ids of all that was heard since the bus was opened, ours or not."""
+        return tuple(self._network.scanner.nodes) if self._network else ()
+
+    def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
+        """Call `callback(cob_id, data)` for each data frame with this id; it holds for every later bus, too."""
+        self._callbacks[cob_id] = callback
+
+    def open(self) -> None:
+        """Open the bus and wrap it in a canopen Network; LinkError if that does not work. May take seconds (slcan)."""
+        try:
+            self._bus = _open_bus(self._settings)
+            self._network = _new_network(self._bus, self.send)
+        except Exception as error:
+            self.close()
+            raise self._failed(error) from error
+        for cob_id, callback in self._callbacks.items():
+            self._network.subscribe(cob_id, _without_time(callback))
+        self._garbage_run = 0
+
+    def close(self) -> None:
+        """Shut the bus down. Never raises: a bus that broke cannot be closed in any better way."""
+        bus, self._bus, self._network = self._bus, None, None
+        if bus is not None:
+            try:
+                bus.shutdown()
+            except Exception as error:  # noqa: BLE001 - see above
+                logging.getLogger(__name__).debug("closing %s: %s", self.name, error)
+
+    def nmt(self, node_id: int, command: NmtCommand) -> None:
+        """Ask a node to start, stop or reset. From any thread; it is sent in the bus thread's next turn.
+
+        RefusedError, at once, for a node that is not of this station.
+        """
+        self._check(NMT_COB_ID, nmt_frame(command, node_id))
+        self._orders.append((node_id, command))
+
+    def send(self, cob_id: int, data: bytes) -> None:
+        """Write one frame; RefusedError if it is none of those that may be written, LinkError if the bus is broken.
+
+        A full transmit queue is no broken bus but a BMU that is not there: the frame is lost and `trouble` says so.
+        """
+        self._check(cob_id, data)
+        if self._bus is None:
+            raise LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
+        try:
+            self._bus.send(_new_message(cob_id, data), SEND_TIMEOUT_S)
+        except Exception as error:
+            if not _is_queue_full(error):
+                raise self._failed(error) from error
+            self.trouble = can_text.QUEUE_FULL
+
+    def receive(self, timeout_s: float) -> None:
+        """Send what `nmt()` left, then wait for one frame and hand it on. What a callback raises comes out here."""
+        if self._bus is None or self._network is None:
+            raise LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
+        while self._orders:
+            _send_nmt(self._network, *self._orders.popleft())
+        try:
+            message = self._bus.recv(max(timeout_s, 0.0))
+        except Exception as error:  # noqa: BLE001 - drivers raise anything; it ends here
+            self._unreadable(error)
+            return
+        self._garbage_run = 0
+        if message is not None:
+            self._dispatch(message, self._network)
+
+    def _check(self, cob_id: int, data: bytes) -> None:
+        if reason := refusal(cob_id, data, self._nodes):
+            raise RefusedError(f"{can_text.place(self.name, self._settings)}: not sent: {reason}")
+
+    def _dispatch(self, message: "can.Message", network: "canopen.Network") -> None:
+        if message.is_error_frame:
+            self._error_frame(message)
+            return
+        self.trouble = ""
+        if message.arbitration_id not in self._callbacks:
+            self.foreign += 1
+        if not (message.is_extended_id or message.is_remote_frame):
+            network.notify(message.arbitration_id, message.data, message.timestamp)
+
+    def _error_frame(self, message: "can.Message") -> None:
+        said = can_text.error_frame(message.arbitration_id, bytes(message.data))
+        if said is None:
+            return
+        self.trouble = can_text.filled(said, self._settings)
+        if said == can_text.BUS_OFF:
+            raise LinkError(f"{can_text.place(self.name, self._settings)}: {self.trouble}")
+
+    def _unreadable(self, error: Exception) -> None:
+        """A frame that the driver chokes on is noise, whatever it raises; an errno, or many in a row, is a failure."""
+        self.garbage += 1
+        self._garbage_run += 1
+        if can_text.errno_of(error) is not None or self._garbage_run >= MAX_GARBAGE:
+            raise self._failed(error) from error
+        flush = getattr(self._bus, "flush", None)
+        if flush is not None:  # slcan keeps what it could not decode, and would choke on it again
+            try:
+                flush()
+            except Exception as broken:
+                raise self._failed(broken) from broken
+
+    def _failed(self, error: Exception) -> LinkError:
+        return LinkError(can_text.failure(self.name, self._settings, error))
+
+
+# --- the libraries; imported here because that takes 0.2 s, which the chargers' first poll must not wait for ----------
+
+
+def _open_bus(settings: Mapping[str, Any]) -> "can.BusABC":
+    import can  # noqa: PLC0415 - see above
+
+    # What they would log, we say in a LinkError, once.
+    logging.getLogger("can").setLevel(logging.CRITICAL)
+    return can.Bus(ignore_config=True, **settings)
+
+
+def _new_network(bus: "can.BusABC", send: FrameCallback) -> "canopen.Network":
+    import canopen  # noqa: PLC0415 - see above
+
+    logging.getLogger("canopen").setLevel(logging.CRITICAL)
+
+    class Network(canopen.Network):
+        """Everything that canopen sends by itself goes through our own `send`, hence through the gate."""
+
+        def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:  # noqa: FBT001, FBT002 - its own
+            if remote:
+                raise RefusedError(f"remote frame 0x{can_id:X}: never sent")
+            send(can_id, bytes(data))
+
+    network = Network(bus)
+    # Nobody here speaks LSS, and canopen would keep every frame with its COB-ID for ever.
+    network.unsubscribe(network.lss.LSS_RX_COBID)
+    return network
+
+
+def _new_message(cob_id: int, data: bytes) -> "can.Message":
+    import can  # noqa: PLC0415 - see above
+
+    return can.Message(arbitration_id=cob_id, is_extended_id=False, data=data)
+
+
+def _send_nmt(network: "canopen.Network", node_id: int, command: NmtCommand) -> None:
+    master = type(network.nmt)(node_id)  # the network's own one speaks to all nodes at once
+    master.network = network
+    master.send_command(command)
+
+
+def _without_time(callback: FrameCallback) -> Callable[[int, bytearray, float], None]:
+    """The frame's own time stamp is the wall clock's; ours is monotonic and taken by who reads the frame."""
+    return lambda cob_id, data, _timestamp: callback(cob_id, bytes(data))
+
+
+def _is_queue_full(error: Exception) -> bool:
+    return can_text.errno_of(error) == errno.ENOBUFS or str(error) == "Transmit buffer full"

@@ -1,0 +1,114 @@
+"""All nodes together stay below 30 % of the bus, and none of them starves."""
+
+from collections import Counter
+from heapq import heappop, heappush
+
+import pytest
+
+from orchestrator.devices.battery import BatteryNode
+from orchestrator.devices.bus_budget import BURST, EXCHANGE_BITS, BusBudget
+from tests.devices.bmu_bench import WORDS, config
+
+
+def reserve(budget: BusBudget, seconds: float) -> int:
+    """As many exchanges as can begin in this time."""
+    count = 0
+    while budget.reserve(0.0) < seconds:
+        count += 1
+    return count
+
+
+def test_an_exchange_is_counted_with_its_worst_stuffing() -> None:
+    assert EXCHANGE_BITS == 270
+
+
+@pytest.mark.parametrize("bitrate", [50_000, 125_000, 250_000, 1_000_000])
+def test_never_more_than_the_share_and_a_burst(bitrate: int) -> None:
+    count = reserve(BusBudget(bitrate), 10.0)
+    assert (count - BURST) * EXCHANGE_BITS <= 0.30 * bitrate * 10.0
+    assert count * EXCHANGE_BITS > 0.29 * bitrate * 10.0
+
+
+def test_an_idle_bus_saves_up_no_more_than_a_burst() -> None:
+    budget = BusBudget(250_000)
+    begins = [budget.reserve(100.0) for _ in range(BURST + 1)]
+    assert begins[:BURST] == pytest.approx([100.0] * BURST)
+    assert begins[BURST] > 100.003
+
+
+def test_one_node_is_not_stretched_many_are_all_alike() -> None:
+    budget = BusBudget(250_000)
+    budget.join(3, 2, 0.05)
+    assert (budget.fast_s(0.05), budget.slow_s) == (0.05, 1.0)
+    for _ in range(15):
+        budget.join(3, 2, 0.05)
+    assert budget.fast_s(0.05) == pytest.approx(16 * 60 * 0.05 / (0.9 * 75_000 / 270 - 16 * 2))
+    assert budget.fast_s(0.1) == pytest.approx(2 * budget.fast_s(0.05))
+    assert budget.slow_s == 1.0
+
+
+def test_where_even_one_a_second_is_too_much_all_objects_share_alike() -> None:
+    budget = BusBudget(250_000)
+    for _ in range(128):
+        budget.join(3, 2, 0.05)
+    assert budget.fast_s(0.05) == budget.slow_s == pytest.approx(128 * 5 / (0.9 * 75_000 / 270))
+
+
+class Station:
+    """Nodes on one bus that answer after `latency_s`, in simulated time."""
+
+    def __init__(self, nodes: int, bitrate: int) -> None:
+        budget = BusBudget(bitrate)
+        self.nodes = [BatteryNode("can0", config(node_id=1 + i), budget, lambda: None) for i in range(nodes)]
+        self.exchanges: Counter[int] = Counter()
+        self.now_s = 0.0
+
+    def run(self, until_s: float, latency_s: float = 0.001) -> None:
+        answers: list[tuple[float, int, bytes]] = []
+
+        def send(cob_id: int, data: bytes) -> None:
+            node = cob_id - 0x600
+            self.exchanges[node] += 1
+            word = WORDS[data[1] | data[2] << 8].to_bytes(4, "little")
+            heappush(answers, (self.now_s + latency_s, node, b"\x43" + data[1:4] + word))
+
+        while self.now_s < until_s:
+            while answers and answers[0][0] <= self.now_s:
+                _, node, data = heappop(answers)
+                self.nodes[node - 1].on_frame(0x580 + node, data, self.now_s)
+            for one in self.nodes:
+                if one.next_due_s <= self.now_s:
+                    one.turn(self.now_s, send)
+            due_s = min(one.next_due_s for one in self.nodes)
+            self.now_s = max(self.now_s + 1e-6, min([due_s, *(answer[0] for answer in answers[:1])]))
+
+
+@pytest.mark.parametrize(("nodes", "bitrate"), [(1, 250_000), (16, 250_000), (64, 250_000), (16, 1_000_000)])
+def test_a_station_stays_below_the_share_and_every_value_young(nodes: int, bitrate: int) -> None:
+    station = Station(nodes, bitrate)
+    station.run(3.0)
+    station.exchanges.clear()
+    station.run(8.0)
+    assert station.exchanges.total() * EXCHANGE_BITS / 5.0 <= 0.30 * bitrate
+    assert max(station.exchanges.values()) <= 1.1 * min(station.exchanges.values()) + 2
+    for node in station.nodes:
+        reading, link = node.view
+        assert link.online
+        assert reading.voltage_v is not None
+        assert reading.soc_pct is not None
+        assert station.now_s - reading.voltage_v.t_s < 1.5
+        assert station.now_s - reading.soc_pct.t_s < 1.5
+
+
+def test_silent_nodes_cost_the_others_next_to_nothing() -> None:
+    station = Station(8, 250_000)
+    station.run(2.0)
+    dead = station.nodes[4:]
+    for node in dead:
+        node.on_frame = lambda *_args: None  # type: ignore[method-assign]  # it hears nothing any more
+    station.run(6.0)
+    station.exchanges.clear()
+    station.run(10.0)
+    assert all(not node.view[1].online for node in dead)
+    assert all(station.exchanges[5 + i] <= 9 for i in range(4))
+    assert all(station.exchanges[1 + i] >= 100 for i in range(4))

@@ -1,0 +1,424 @@
+"""The dialogue with one BMU, frame by frame, time jumping."""
+
+from itertools import pairwise
+
+import pytest
+
+from orchestrator.model import BatteryReading, Measurement
+from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, REQUEST, RX, TX, WORDS, Bench, Dialogue, config
+
+#: protocol/bmu.md, "Golden exchanges"; a whole first round with the sample of §4.1 in it.
+FIRST_ROUND: Dialogue = [
+    (TX, REQUEST, "40 00 60 00 00 00 00 00"),
+    (RX, REPLY, "43 00 60 00 F8 FF 40 09"),
+    (TX, REQUEST, "40 01 60 00 00 00 00 00"),
+    (RX, REPLY, "43 01 60 00 FF FF 05 00"),
+    (TX, REQUEST, "40 02 60 00 00 00 00 00"),
+    (RX, REPLY, "43 02 60 00 64 5A 78 00"),
+    (TX, REQUEST, "40 03 60 00 00 00 00 00"),
+    (RX, REPLY, "43 03 60 00 D0 07 E8 03"),
+    (TX, REQUEST, "40 04 60 00 00 00 00 00"),
+    (RX, REPLY, "43 04 60 00 F6 FF 00 00"),
+]
+HEARTBEAT_WRITE = "2B 17 10 00 F4 01 00 00"  # 500 ms
+
+
+def online(settings: object = None) -> Bench:
+    bench = Bench(config() if settings is None else settings)  # type: ignore[arg-type]  # None or a BatteryConfig
+    bench.play(FIRST_ROUND)
+    return bench
+
+
+def test_the_documents_own_bytes_become_a_reading() -> None:
+    bench = Bench()
+    bench.play(FIRST_ROUND)
+    values = {name: getattr(bench.reading, name) for name in BatteryReading.__slots__}
+    assert {name: m and m.value for name, m in values.items()} == {
+        "voltage_v": 23.68,
+        "current_a": -0.08,
+        "status": 5,
+        "temperature_c": -1.0,
+        "soc_pct": 90,
+        "soh_pct": 100,
+        "time_to_full_min": None,  # FF FF: not available
+        "time_to_empty_min": 120,
+        "remaining_ah": 10.0,
+        "available_wh": 200.0,
+    }
+    assert bench.link.online
+    assert bench.link.problem == ""
+    assert bench.node.words[0x6000, 0] == (0x0940FFF8, 4)
+
+
+def test_a_value_is_as_old_as_its_request() -> None:
+    bench = Bench()
+    bench.play(FIRST_ROUND[:1])  # type: ignore[index]  # it is a list
+    asked_s = bench.now_s
+    bench.now_s += 0.25
+    bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")
+    assert bench.reading.voltage_v == Measurement(23.68, asked_s)
+
+
+def test_every_answer_is_told_once_and_at_once() -> None:
+    bench = Bench()
+    bench.play(FIRST_ROUND)
+    assert bench.changes == 5
+
+
+def test_fast_objects_each_sweep_slow_ones_each_second() -> None:
+    bench = online()
+    begin = len(bench.sent)
+    bench.answer_reads(10.0, WORDS)
+    asked = [data[1] for _, data in bench.sent[begin:]]
+    assert [asked.count(index) for index in range(5)] == [
+        pytest.approx(200, rel=0.05), pytest.approx(200, rel=0.05), 10, 10, pytest.approx(200, rel=0.05)
+    ]  # fmt: skip
+
+
+def test_only_one_request_is_in_flight() -> None:
+    bench = Bench()
+    bench.next_frame()
+    assert bench.run(0.29) == []
+
+
+# --- silence and refusal ---------------------------------------------------------------------------------------------
+
+
+def test_silence_is_noticed_after_the_limit_and_values_keep_their_age() -> None:
+    bench = online()
+    answered_s, before = bench.now_s, bench.reading
+    bench.run(1.49)
+    assert bench.link.online
+    bench.run(0.02)
+    assert not bench.link.online
+    assert "does not answer" in bench.link.problem
+    assert "check its power" in bench.link.problem
+    assert bench.reading == before
+    assert bench.now_s - answered_s < 1.52
+
+
+def test_a_silent_node_is_asked_twice_a_second_and_its_return_is_noticed() -> None:
+    bench = online()
+    bench.run(2.0)
+    asked = bench.run(20.0)
+    assert 20 <= len(asked) <= 41
+    _, request = bench.next_frame()
+    bench.now_s += 0.01
+    bench.hear(REPLY, f"43 {request[1:4].hex()} F8 FF 00 00")
+    assert bench.link.online
+    assert bench.link.problem == ""
+    assert bench.next_frame(within_s=0.001)
+
+
+def test_a_node_that_never_answered_says_so() -> None:
+    bench = Bench()
+    assert "not asked yet" in bench.link.problem
+    bench.run(1.0)
+    assert "does not answer" in bench.link.problem
+    assert not bench.link.online
+
+
+def test_an_abort_is_a_refusal_not_silence() -> None:
+    bench = Bench()
+    for _ in range(40):
+        _, request = bench.next_frame()
+        bench.now_s += 0.1
+        if request[1] == 0x04:
+            bench.hear(REPLY, "80 04 60 00 00 00 02 06")
+        else:
+            word = WORDS[0x6000 | request[1]].to_bytes(4, "little")
+            bench.hear(REPLY, f"43 {request[1:4].hex()} {word.hex()}")
+    assert bench.link.online
+    assert bench.link.abort_code == 0x06020000
+    assert "0x6004" in bench.link.abort
+    assert "does not exist" in bench.link.abort
+    assert bench.reading.temperature_c is None
+    bench.answer_reads(0.2, WORDS)
+    assert (bench.link.abort, bench.link.abort_code) == ("", 0)
+    assert bench.reading.temperature_c is not None
+
+
+def test_only_aborts_are_alive_too() -> None:
+    bench = Bench()
+    for _ in range(30):
+        _, request = bench.next_frame()
+        bench.now_s += 0.1
+        bench.hear(REPLY, f"80 {request[1:4].hex()} 22 00 00 08")
+    assert bench.link.online
+    assert bench.link.abort_code == 0x08000022
+    assert bench.reading == BatteryReading()
+
+
+# --- answers that are none -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("answer", "because"),
+    [
+        ("41 00 60 00 04 00 00 00", "the beginning of a segmented transfer"),
+        ("00 F8 FF 40 09 00 00 00", "a segment"),
+        ("C0 00 60 00 00 00 00 00", "a block transfer"),
+        ("43 00 60 00 F8 FF 40", "seven bytes"),
+        ("", "no bytes"),
+        ("43 00 60 01 F8 FF 40 09", "another sub-index"),
+        ("43 01 60 00 F8 FF 40 09", "another object"),
+        ("80 01 60 00 00 00 02 06", "the abort of another object"),
+        ("60 00 60 00 00 00 00 00", "a write's answer"),
+    ],
+)
+def test_what_is_no_answer_is_dropped_and_counted(answer: str, because: str) -> None:
+    bench = Bench()
+    bench.play([(TX, REQUEST, "40 00 60 00 00 00 00 00"), (RX, REPLY, answer)])
+    assert bench.reading == BatteryReading(), because
+    assert not bench.link.online
+    assert bench.link.bad_frames == 1
+    bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")  # the true answer still counts
+    assert bench.reading.voltage_v is not None
+
+
+def test_an_endless_segmented_answer_is_silence() -> None:
+    bench = online()
+    end_s = bench.now_s + 3.0
+    while bench.now_s < end_s:
+        bench.run(0.001)
+        bench.hear(REPLY, "41 00 60 00 FF FF 00 00")
+    assert not bench.link.online
+    assert "not understood" in bench.link.problem or "frames a second" in bench.link.problem
+
+
+def test_another_size_than_the_maps_is_implausible() -> None:
+    bench = online()
+    before = bench.reading.voltage_v
+    bench.play([(TX, REQUEST, "40 00 60 00 00 00 00 00"), (RX, REPLY, "4B 00 60 00 40 09 00 00")])
+    assert set(bench.link.implausible) == {"voltage_v", "current_a"}
+    assert "declared 2 bytes, the map says 4" in bench.link.implausible["voltage_v"]
+    assert bench.reading.voltage_v == before
+
+
+def test_an_implausible_value_leaves_the_last_one_until_a_plausible_comes() -> None:
+    bench = online()
+    bench.answer_reads(0.2, WORDS)
+    before = bench.reading.temperature_c
+    bench.answer_reads(1.0, WORDS | {0x6004: 0x7FFF})
+    assert list(bench.link.implausible) == ["temperature_c"]
+    assert "3276.7" in bench.link.implausible["temperature_c"]
+    assert before is not None
+    assert bench.reading.temperature_c is not None
+    assert bench.reading.temperature_c.value == 25.0
+    assert bench.now_s - bench.reading.temperature_c.t_s > 0.9
+    bench.answer_reads(0.1, WORDS)
+    assert bench.link.implausible == {}
+
+
+# --- late answers ----------------------------------------------------------------------------------------------------
+
+
+def test_a_late_answer_is_not_taken_for_the_next_read_of_the_object() -> None:
+    bench = Bench()
+    bench.play([(TX, REQUEST, "40 00 60 00 00 00 00 00")])
+    assert [data[1] for _, data in bench.run(0.55)] == [0x01]  # another object: 0x6000 is not asked again
+    bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")
+    assert bench.reading == BatteryReading()
+    assert bench.link.bad_frames == 1
+
+
+def test_a_node_that_always_answers_too_late_is_offline_and_told_why() -> None:
+    bench = Bench()
+    due: list[tuple[float, str]] = []
+    for _ in range(400):
+        for _, data in bench.run(0.01):
+            due.append((bench.now_s + 0.35, f"43 {data[1:4].hex()} 01 00 02 00"))
+        while due and due[0][0] <= bench.now_s:
+            bench.hear(REPLY, due.pop(0)[1])
+    assert bench.reading == BatteryReading()
+    assert "later than 0.3 s" in bench.link.problem
+    assert bench.link.bad_frames > 3
+
+
+def test_when_nothing_is_answered_an_object_is_asked_again_only_after_quiet() -> None:
+    bench = Bench()
+    times: dict[int, list[float]] = {}
+    end_s = bench.now_s + 20.0
+    while bench.now_s < end_s:
+        _, data = bench.next_frame()
+        times.setdefault(data[1], []).append(bench.now_s)
+    assert len(times) == 5
+    assert all(later - earlier >= 1.3 for asked in times.values() for earlier, later in pairwise(asked))
+
+
+def test_a_second_node_on_the_id_is_found_out() -> None:
+    bench = online()
+    for _ in range(10):
+        _, request = bench.next_frame()
+        for word in ("F8 FF 40 09", "00 00 00 00"):
+            bench.now_s += 0.001
+            bench.hear(REPLY, f"43 {request[1:4].hex()} {word}")
+    assert not bench.link.online
+    assert "answered twice" in bench.link.problem
+    bench.answer_reads(1.0, WORDS)  # the second one was taken off
+    assert bench.link.online
+
+
+def test_one_repeated_frame_is_nothing() -> None:
+    bench = online()
+    for _ in range(50):
+        bench.answer_reads(0.1, WORDS)
+        bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")
+    assert bench.link.online
+    assert bench.link.bad_frames == 50
+
+
+def test_a_babbling_node_is_not_believed() -> None:
+    bench = online()
+    for _ in range(1500):
+        bench.now_s += 0.001
+        bench.hear(HEARTBEAT, "05")
+    assert not bench.link.online
+    assert "500 frames a second" in bench.link.problem
+
+
+# --- heartbeat, boot-up, emergency -----------------------------------------------------------------------------------
+
+
+def test_the_heartbeat_is_asked_for_after_the_first_answer() -> None:
+    bench = Bench(config(heartbeat_s=0.5))
+    bench.play(
+        [
+            (TX, REQUEST, "40 00 60 00 00 00 00 00"),
+            (RX, REPLY, "43 00 60 00 F8 FF 40 09"),
+            (TX, REQUEST, HEARTBEAT_WRITE),
+            (RX, REPLY, "60 17 10 00 00 00 00 00"),
+        ]
+    )
+    assert (bench.link.heartbeat_s, bench.link.heartbeat_t_s) == (0.5, bench.now_s)
+    bench.play([(TX, REQUEST, "40 01 60 00 00 00 00 00")])
+    changes = bench.changes
+    bench.now_s += 0.2
+    bench.hear(HEARTBEAT, "05")
+    assert (bench.link.heartbeat_t_s, bench.link.nmt_state) == (bench.now_s, 5)
+    bench.now_s += 0.2
+    bench.hear(HEARTBEAT, "05")
+    assert bench.link.heartbeat_t_s == bench.now_s
+    assert bench.changes == changes + 1  # the state was news, the second heartbeat is none
+
+
+def test_a_refused_heartbeat_is_no_fault_and_not_asked_for_again() -> None:
+    bench = Bench(config(heartbeat_s=0.5))
+    bench.play(
+        [
+            (TX, REQUEST, "40 00 60 00 00 00 00 00"),
+            (RX, REPLY, "43 00 60 00 F8 FF 40 09"),
+            (TX, REQUEST, HEARTBEAT_WRITE),
+            (RX, REPLY, "80 17 10 00 02 00 01 06"),
+        ]
+    )
+    bench.answer_reads(5.0, WORDS)
+    assert (bench.link.heartbeat_s, bench.link.abort, bench.link.online) == (None, "", True)
+    assert sum(data[0] == 0x2B for _, data in bench.sent) == 1
+
+
+def test_an_unanswered_heartbeat_write_is_tried_again() -> None:
+    bench = Bench(config(heartbeat_s=0.5))
+    bench.play(FIRST_ROUND[:2])  # type: ignore[index]  # it is a list
+    bench.play([(TX, REQUEST, HEARTBEAT_WRITE)])
+    bench.run(0.35)
+    bench.play([(RX, REPLY, "43 01 60 00 FF FF 05 00")])
+    for _ in range(60):
+        _, data = bench.next_frame()
+        if data[0] == 0x2B:
+            break
+        bench.now_s += 0.02
+        bench.hear(REPLY, f"43 {data[1:4].hex()} 00 00 00 00")
+    assert data.hex(" ").upper() == HEARTBEAT_WRITE
+
+
+def test_heartbeats_that_stop_stay_lost_though_they_are_asked_for_again() -> None:
+    bench = Bench(config(heartbeat_s=0.5))
+    bench.answer_reads(0.2, WORDS)
+    bench.hear(HEARTBEAT, "7F")
+    heard_s = bench.now_s
+    bench.answer_reads(5.0, WORDS)
+    assert bench.link.heartbeat_t_s == heard_s
+    assert sum(data[0] == 0x2B for _, data in bench.sent) > 2
+    bench.hear(HEARTBEAT, "7F")
+    assert bench.link.heartbeat_t_s == bench.now_s
+
+
+def test_a_boot_up_in_mid_sweep_forgets_everything_and_configures_again() -> None:
+    bench = Bench(config(heartbeat_s=0.5))
+    bench.answer_reads(1.0, WORDS)
+    bench.hear(HEARTBEAT, "05")
+    bench.hear(EMERGENCY, "10 42 08 00 00 00 00 00")
+    _, in_flight = bench.next_frame()
+    bench.now_s += 0.001
+    bench.hear(HEARTBEAT, "00")
+    assert bench.reading == BatteryReading()
+    assert (bench.link.boots, bench.link.boot_t_s) == (1, bench.now_s)
+    assert (bench.link.heartbeat_s, bench.link.heartbeat_t_s, bench.link.emergency) == (None, None, "")
+    bench.hear(REPLY, f"43 {in_flight[1:4].hex()} 01 00 02 00")  # an answer from before the boot
+    assert bench.reading == BatteryReading()
+    bench.play([(TX, REQUEST, HEARTBEAT_WRITE)])
+    bench.hear(REPLY, "60 17 10 00 00 00 00 00")
+    assert bench.link.heartbeat_s == 0.5
+    bench.hear(HEARTBEAT, "00")
+    assert bench.link.boots == 2
+
+
+def test_a_boot_up_of_a_silent_node_brings_it_back_at_once() -> None:
+    bench = Bench()
+    bench.run(10.0)
+    bench.hear(HEARTBEAT, "00")
+    assert bench.next_frame(within_s=0.001) == (REQUEST, bytes.fromhex("40 00 60 00 00 00 00 00"))
+
+
+def test_a_stopped_node_is_told_from_a_dead_one() -> None:
+    bench = online()
+    bench.hear(HEARTBEAT, "04")
+    bench.run(2.0)
+    assert bench.link.nmt_state == 4
+    assert "NMT start wakes it" in bench.link.problem
+
+
+@pytest.mark.parametrize(("cob_id", "data"), [(HEARTBEAT, ""), (HEARTBEAT, "00 00"), (EMERGENCY, "10")])
+def test_frames_of_a_wrong_length_are_dropped_and_counted(cob_id: int, data: str) -> None:
+    bench = online()
+    before = bench.reading
+    bench.hear(cob_id, data)
+    assert bench.link.bad_frames == 1
+    assert (bench.reading, bench.link.boots, bench.link.emergency) == (before, 0, "")
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ("10 42 08 01 02 03 04 05", "EMCY 0x4210: temperature"),
+        ("10 42", "EMCY 0x4210: temperature"),  # canopen would lose a short one
+        ("30 31 04 00 00 00 00 00", "EMCY 0x3130: voltage"),
+        ("01 FF 00 00 00 00 00 00", "device-specific"),
+    ],
+)
+def test_an_emergency_is_shown_in_words_until_it_is_reset(data: str, words: str) -> None:
+    bench = online()
+    bench.hear(EMERGENCY, data)
+    assert words in bench.link.emergency
+    bench.hear(EMERGENCY, "00 00 00 00 00 00 00 00")
+    assert bench.link.emergency == ""
+
+
+def test_the_bus_that_breaks_takes_the_node_offline_with_its_reason() -> None:
+    bench = online()
+    before = bench.reading
+    bench.next_frame()
+    bench.node.fail("CAN bus can0 is down", bench.now_s)
+    assert (bench.link.online, bench.link.problem) == (False, "CAN bus can0 is down")
+    assert bench.reading == before
+    assert bench.run(0.4) == []
+    bench.answer_reads(1.0, WORDS)
+    assert (bench.link.online, bench.link.problem) == (True, "")
+
+
+def test_trouble_on_the_bus_is_the_reason_of_silence() -> None:
+    bench = online()
+    bench.node.trouble = "nobody acknowledges"
+    bench.run(2.0)
+    assert bench.link.problem.endswith("nobody acknowledges")
