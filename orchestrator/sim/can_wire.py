@@ -9,6 +9,8 @@ import can
 
 Handler = Callable[[int, bytes], None]
 
+#: The length of every SDO frame.
+SDO_BYTES = 8
 #: How often the thread of a bus without a file descriptor looks whether it is to end.
 LOOK_S = 0.1
 
@@ -102,6 +104,8 @@ class NodePort:
             if self.faults.mute:
                 return
             if cob_id & 0x780 == 0x600:
+                if len(data) != SDO_BYTES:  # CANopenNode takes no others; durand would answer with an abort
+                    return
                 self.reads += 1
                 if self._refuse(cob_id, data):
                     return

@@ -226,7 +226,7 @@ def test_automatic_wakes_charges_ends_and_begins_again() -> None:
     assert (bay.charger.charge_mode, bay.charger.current_a) == (ChargeMode.FULL, 0)
     bay.charger.rest(1)
     bay.advance(5)
-    assert bay.charger.mode == ChargeMode.CHARGE
+    assert int(bay.charger.mode) == ChargeMode.CHARGE
     bay.connected = False
     bay.advance(1)
     assert int(bay.charger.mode) == ChargeMode.BATTERY_SEARCH

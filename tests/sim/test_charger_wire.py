@@ -63,10 +63,10 @@ def test_the_lossy_line_loses_a_few_exchanges_and_recovers() -> None:
 
 def test_the_garbage_line_only_adds() -> None:
     with charger_on(LINES["garbage"]) as (wire, port, _):
-        for _ in range(20):
+        for _ in range(12):
             port.write(POLL)
-            assert REPLY in port.read(64, within_s=0.1)
-        assert wire.counters.polls == 20
+            assert REPLY in port.read(64, within_s=0.05)
+        assert wire.counters.polls == 12
 
 
 def test_a_request_in_pieces_is_one_request() -> None:
