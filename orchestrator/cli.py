@@ -180,7 +180,7 @@ def _probe(arguments: argparse.Namespace) -> int:
 
 def _demo(arguments: argparse.Namespace) -> int:
     try:
-        from orchestrator.demo import demo
+        from orchestrator.demo.run import demo
     except ImportError as error:
         raise OrchestratorError(
             f"the demo needs the package {error.name}: pip install 'charging-station-orchestrator[demo]'"

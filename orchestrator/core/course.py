@@ -1,7 +1,7 @@
 """Where a bay goes next: one trigger at most, and the reason that people read. The machine's table says where it leads.
 
-Each state has one function here; all of them ask the same questions in the same order: must current stop, can the charger
-be trusted to stand by, does something keep us from charging, does the battery want to be charged.
+Each kind of state has one function here; all of them ask the same questions in the same order: must current stop, can
+the charger be trusted to stand by, does something keep us from charging, does the battery want to be charged.
 """
 
 from orchestrator.core.facts import Facts

@@ -3,7 +3,7 @@
 Faults name effects, not states; the worst effect wins. `clear` says how a fault ends once its condition is gone:
 
 - AUTO: after `clean_s` without it.
-- BACKOFF: after 10 s without it, and 10, 60, 300 s for the first, second, third time within an hour; the fourth latches.
+- BACKOFF: after 10 s without it, and 10, 60, 300 s for the first, second, third time in an hour; the fourth latches.
 - OPERATOR: when an operator starts the bay (or resets it).
 - RESET: when a person resets it; never while the condition is there.
 """

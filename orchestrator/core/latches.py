@@ -1,7 +1,7 @@
 """How faults come and go: debounce, latch, backoff, clear. Mechanism only; what is a fault stands in the table.
 
-Theory of operation. A row's predicate says what is seen now. It becomes a fault after the row's time and number of polls,
-is then followed in every state, and ends as its `Clear` says. A fault whose condition is there is never cleared.
+Theory of operation. A row's predicate says what is seen now. It becomes a fault after the row's time and number of
+polls, is then followed in every state, and ends as its `Clear` says. A fault whose condition is there is never cleared.
 """
 
 from dataclasses import replace

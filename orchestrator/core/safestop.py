@@ -1,10 +1,10 @@
 """The safe stop: when a charger must be told to stop, and what proves that it did.
 
-Theory of operation. The safe state is *verified* standby: a status reply, requested after the whole stop was handed to the
-port, that shows operation 0 and a current of about 0. Until then the standing order is STOP, which the port repeats every
-500 ms. A charger that has not been verified after `OBEY_STOP_S` is uncontrollable: the order stays, the interlock output
-opens, and only a verified standby ends it. In states of rest the standing order is nothing, as long as fresh replies go
-on to show standby; the moment one does not, it is STOP again.
+Theory of operation. The safe state is *verified* standby: a status reply, requested after the whole stop was handed to
+the port, that shows operation 0 and a current of about 0. Until then the standing order is STOP, which the port repeats
+every 500 ms. A charger that has not been verified after `OBEY_STOP_S` is uncontrollable: the order stays, the interlock
+output opens, and only a verified standby ends it. In states of rest the standing order is nothing, as long as fresh
+replies go on to show standby; the moment one does not, it is STOP again.
 """
 
 from orchestrator.core.facts import Facts
@@ -24,7 +24,7 @@ def must_stop(f: Facts, state: State) -> bool:
 
 
 def gives_up(f: Facts) -> bool:
-    """The charger has had its time. At the start, a charger that does not answer at all is not there: that is OFFLINE."""
+    """The charger has had its time. At the start, one that does not answer at all is not there: that is OFFLINE."""
     if f.state_s < OBEY_STOP_S:
         return False
     return f.memory.state is State.STOPPING or (f.memory.state is State.STARTING and f.reading is not None)

@@ -1,9 +1,9 @@
 """How a charger is brought to a setpoint: one order at a time, each seen in a status reply before the next.
 
-Manual mode: resume (rest 1) → limit step → mode → precharge function → run. Automatic mode: resume only. An order stands
-until its read-back ends it, and the port repeats it meanwhile, so a lost frame costs one slot. A resume has no read-back
-of its own: it counts when a reply was asked for after it was sent. If what follows is not obeyed, the resume may have been
-the frame that was lost, so the sequence begins again with it.
+Manual mode: resume (rest 1) → limit step → mode → precharge function → run. Automatic mode: resume only. An order
+stands until its read-back ends it, and the port repeats it meanwhile, so a lost frame costs one slot. A resume has no
+read-back of its own: it counts when a reply was asked for after it was sent. If what follows is not obeyed, the resume
+may have been the frame that was lost, so the sequence begins again with it.
 """
 
 from orchestrator.core.facts import Facts

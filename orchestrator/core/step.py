@@ -1,6 +1,6 @@
 """`step()`: one decision about one bay. The live service, the simulator, the checker and the replay all call this.
 
-facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the standing order.
+facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the order.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What must be followed from step to step: the session's Ah, how long something has lasted, what a battery showed before."""
+"""What must be followed from step to step: the session's Ah, how long something lasts, what was shown before."""
 
 from dataclasses import replace
 

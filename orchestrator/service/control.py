@@ -1,7 +1,7 @@
 """The control socket: who may ask, how, and what is answered. One JSON object a line, in and out.
 
-Only the owner of the service (and root) can open the socket, a request is bounded in size and time, and clients are served
-one after another, so that no number of them can hold the bays up: the control loop never waits for a client.
+Only the owner of the service (and root) can open the socket, a request is bounded in size and time, and clients are
+served one after another, so that no number of them can hold the bays up: the control loop never waits for a client.
 """
 
 import json

@@ -1,7 +1,7 @@
 """The journal: JSON Lines on disk, rotated and bounded. A disk that is full or gone never stops a charge, nor a stop.
 
-Two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and `snapshots`, far more of
-it, for a replay; each has its own share of the space, so that snapshots never push the reasons out.
+Two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and `snapshots`, far more
+of it, for a replay; each has its own share of the space, so that snapshots never push the reasons out.
 """
 
 import json

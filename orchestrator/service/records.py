@@ -79,7 +79,7 @@ def session_fields(session: Session) -> dict[str, object]:
 
 
 class SnapshotRecorder:
-    """Turns the steps of one bay into `snapshot` lines: whole now and then, else only what differs from the line before.
+    """Turns the steps of one bay into `snapshot` lines: whole now and then, else what differs from the line before.
 
     In a quiet state nothing is written until something happens; then a whole line begins anew.
     """

@@ -1,8 +1,8 @@
 """The running service: one thread a serial port, one a CAN bus, and this loop, which wakes on every new reading.
 
-Theory of operation. Devices replace their view and put their bay's number into a queue; the loop takes a step for every bay
-that has news, and for every bay at least each TICK_S, so that what did *not* come is noticed, too. The queue is the only
-thing that the loop waits for. Signals only put into it. At the end every bay is stopped and verified.
+Theory of operation. Devices replace their view and put their bay's number into a queue; the loop takes a step for every
+bay that has news, and for every bay at least each TICK_S, so that what did *not* come is noticed, too. The queue is the
+only thing that the loop waits for. Signals only put into it. At the end every bay is stopped and verified.
 """
 
 import signal

@@ -41,8 +41,8 @@ def mode_taken_over(f: Facts) -> str | None:
     if f.reading is None or f.reading.control_mode in (None, configured):
         return None
     return (
-        f"the charger is in {f.reading.control_mode.name.lower()} mode, the station file says {configured.name.lower()}: "
-        "look at its rotary switch"
+        f"the charger is in {f.reading.control_mode.name.lower()} mode, the station file says "
+        f"{configured.name.lower()}: look at its rotary switch"
     )
 
 

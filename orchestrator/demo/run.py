@@ -1,0 +1,83 @@
+"""Run one demo from beginning to end."""
+
+import shutil
+import sys
+import time
+
+from orchestrator.demo.screen import Lines, Picture, Screen
+from orchestrator.demo.stage import Stage
+from orchestrator.demo.story import Story
+from orchestrator.errors import OrchestratorError
+from orchestrator.sim.faults import FAULTS
+
+#: How often the picture changes.
+LOOK_EVERY_S = 0.1
+#: Not faults that the service is to stop for.
+NO_FAULT = ("heal", "frozen_temperature")
+
+
+def demo(fault: str | None, *, plain: bool) -> int:
+    """Charge an emulated battery, or see it stopped by `fault`; 0 when it ended as it should."""
+    known = [name for name in FAULTS if name not in NO_FAULT]
+    if fault == "list":
+        for name in known:
+            print(f"{name:22} {FAULTS[name].about}")
+        return 0
+    if fault is not None and fault not in known:
+        raise OrchestratorError(f"no fault {fault!r}: {', '.join(known)}")
+    screen = _screen(plain=plain)
+    story = Story(fault)
+    print(
+        "An emulated charger on a pseudo-terminal, an emulated BMU on a CAN bus, and the service between them.",
+        flush=True,
+    )
+    with Stage() as stage:
+        with screen.live():
+            _watch(stage, story, screen)
+        _sum_up(stage, story)
+    if story.well:
+        shutil.rmtree(stage.directory, ignore_errors=True)
+    else:
+        print(f"journal and log: {stage.directory}", file=sys.stderr)
+    return 0 if story.well else 1
+
+
+def _screen(*, plain: bool) -> Screen:
+    if plain or not sys.stdout.isatty():
+        return Lines()
+    try:
+        return Picture()
+    except ImportError:
+        return Lines()
+
+
+def _watch(stage: Stage, story: Story, screen: Screen) -> None:
+    """Look at the bay until the story is over."""
+    began_s = time.monotonic()
+    while not story.over(t_s := time.monotonic() - began_s):
+        bay = stage.bay()
+        if bay is not None:
+            story.look(t_s, bay)
+            if story.inject_now(t_s) and story.fault:
+                stage.plant.inject(story.fault)
+                story.injected(t_s, FAULTS[story.fault].about)
+            screen.show(t_s, bay, story)
+        time.sleep(LOOK_EVERY_S)
+
+
+def _sum_up(stage: Stage, story: Story) -> None:
+    """What happened, and what the emulated charger itself says at the end."""
+    truth = stage.plant.state()
+    for session in story.sessions:
+        print(
+            f"\nCharged {session['charged_ah']:.3f} Ah ({session['charged_wh']:.1f} Wh) "
+            f"in {session['energised_s']:.0f} s, SOC {session['soc_start_pct']} → {session['soc_pct']} %, {session['step_changes']} changes of the step."
+        )
+    if story.stopped_by:
+        print(f"It stopped because: {story.stopped_by}")
+    if story.fault and truth["injected_s"] is not None and truth["first_stop_s"] is not None:
+        latency_ms = (truth["first_stop_s"] - truth["injected_s"]) * 1000
+        print(f"The first stop frame reached the charger {latency_ms:.0f} ms after the fault was injected.")
+    print(f"State {story.state}. The emulated charger: operation {truth['operation']}, {truth['current_a']:.2f} A.")
+    if not story.well:
+        print("This demo did not end as it should.", file=sys.stderr)

@@ -1,0 +1,101 @@
+"""The demo on a terminal: a live picture with rich, or a line at a time where there is no terminal."""
+
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
+from typing import Protocol, cast
+
+from orchestrator.demo.story import Story
+from orchestrator.show import figure
+
+#: The events that the picture has room for.
+ROOM = 12
+#: Without a terminal, a line of figures this often.
+LINE_EVERY_S = 2.0
+
+
+class Screen(Protocol):
+    """Something to show the demo on."""
+
+    def live(self) -> AbstractContextManager[object]:
+        """While it is entered, `show` draws."""
+
+    def show(self, t_s: float, bay: Mapping[str, object], story: Story) -> None:
+        """Draw the present."""
+
+
+def figures(bay: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
+    """What one wants to see of a bay, name by name."""
+    battery = cast("Mapping[str, object]", bay["battery"])
+    charger = cast("Mapping[str, object]", bay["charger"])
+    step = "–" if bay["step"] is None else f"{bay['step']} ({figure(bay['step_current_a'], '{:g} A')})"
+    return (
+        ("state", str(bay["state"])),
+        ("SOC", figure(battery["soc_pct"], "{:.0f} %")),
+        ("pack", figure(battery["voltage_v"], "{:.2f} V")),
+        ("current", figure(charger["current_a"], "{:.2f} A")),
+        ("temperature", figure(battery["temperature_c"], "{:.1f} °C")),
+        ("step", step),
+    )
+
+
+class Lines:
+    """One line an event, and figures in between."""
+
+    def __init__(self) -> None:
+        self._told = 0
+        self._line_s = 0.0
+
+    def live(self) -> AbstractContextManager[object]:
+        """Lines need no preparation."""
+        return nullcontext()
+
+    def show(self, t_s: float, bay: Mapping[str, object], story: Story) -> None:
+        """Print what is new."""
+        for at_s, what, why in story.events[self._told :]:
+            print(f"{at_s:6.1f} s  {what}: {why}", flush=True)
+        self._told = len(story.events)
+        if t_s - self._line_s >= LINE_EVERY_S:
+            self._line_s = t_s
+            print(f"{t_s:6.1f} s  " + "  ".join(f"{name} {value}" for name, value in figures(bay)), flush=True)
+
+
+class Picture:
+    """The whole demo at one glance, redrawn in place."""
+
+    def __init__(self) -> None:
+        from rich.live import Live  # an extra: `Lines` does without
+
+        self._live = Live(auto_refresh=False)
+
+    def live(self) -> AbstractContextManager[object]:
+        """Draw in place from now on."""
+        return self._live
+
+    def show(self, t_s: float, bay: Mapping[str, object], story: Story) -> None:
+        """Redraw."""
+        from rich.console import Group
+        from rich.panel import Panel
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        values = Table.grid(padding=(0, 3))
+        values.add_row(*(Text(name, style="dim") for name, _ in figures(bay)))
+        values.add_row(*(Text(value, style="bold") for _, value in figures(bay)))
+        battery = cast("Mapping[str, object]", bay["battery"])
+        soc = battery["soc_pct"]
+        bar = ProgressBar(total=100, completed=float(soc) if isinstance(soc, int | float) else 0.0, width=60)
+        past = Table.grid(padding=(0, 2))
+        for at_s, what, why in story.events[-ROOM:]:
+            past.add_row(Text(f"{at_s:5.1f} s", style="dim"), Text(what, style=_style(what)), Text(why))
+        why_now = Text(str(bay["reason"]))
+        title = f"charging-station orchestrator: demo, {t_s:.0f} s"
+        self._live.update(Panel(Group(values, bar, Text(), why_now, Text(), past), title=title), refresh=True)
+
+
+def _style(what: str) -> str:
+    if what.startswith("inject"):
+        return "bold magenta"
+    return {"STOPPING": "yellow", "TRIPPED": "bold red", "UNCONTROLLABLE": "bold red", "FULL": "bold green"}.get(
+        what, "cyan"
+    )

@@ -1,0 +1,78 @@
+"""What the demo runs on: a directory, an emulated station in one process and the service in another."""
+
+import random
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Self, cast
+
+from orchestrator.config.shipped import shipped_dir
+from orchestrator.errors import OrchestratorError, ServiceError
+from orchestrator.service.control import ask
+from orchestrator.sim.client import PlantProcess
+
+STATION = """\
+station: demo
+can:
+  can0: {{interface: udp_multicast, channel: 239.74.163.2, port: {port}, hop_limit: 0}}   # nothing leaves this machine
+bays:
+  - name: bay-1
+    charger: {{port: {directory}/bay-1, control: manual, steps_a: [2.0, 5.0, 8.0, 11.0, 14.0]}}
+    battery: {{can: can0, node_id: 0x10, map: tabos}}
+    limits: {{voltage_v: 58.4, current_a: 15.0, temperature_c: [0, 45]}}
+    policy: policy.yaml
+control: {{socket: run/orchestrator.sock}}
+journal: {{directory: run/journal}}
+"""
+#: The service verifies every charger within this when it is told to end.
+END_S = 8.0
+
+
+class Stage:
+    """`with Stage() as stage`: both processes run; afterwards both have ended."""
+
+    def __init__(self) -> None:
+        self.directory = Path(tempfile.mkdtemp(prefix="orchestrator-demo-"))
+        port = random.randint(43200, 60000)  # noqa: S311 - so that two demos do not meet
+        self.station = self.directory / "station.yaml"
+        self.station.write_text(STATION.format(port=port, directory=self.directory), encoding="utf-8")
+        policy = (shipped_dir() / "configs" / "demo" / "policy.yaml").read_text(encoding="utf-8")
+        (self.directory / "policy.yaml").write_text(policy, encoding="utf-8")
+        self.log = self.directory / "service.log"
+        can = f'{{"interface": "udp_multicast", "channel": "239.74.163.2", "port": {port}, "hop_limit": 0}}'
+        self.plant = PlantProcess(self.directory, "--pack", "demo", "--soc", "-100", "--can", can)
+        with self.log.open("wb") as log:
+            self.service = subprocess.Popen(  # noqa: S603 - our own program, by our own interpreter
+                [sys.executable, "-m", "orchestrator", "run", self.station.name], stderr=log, cwd=self.directory
+            )
+
+    def bay(self) -> dict[str, object] | None:
+        """The bay's status; None while the service is not there yet. OrchestratorError when it has ended."""
+        if self.service.poll() is not None:
+            raise OrchestratorError(f"the service ended with status {self.service.returncode}:\n{self.log.read_text()}")
+        try:
+            document = ask(self.directory / "run" / "orchestrator.sock", {"verb": "status"})
+        except ServiceError:
+            return None
+        return cast("list[dict[str, object]]", document["bays"])[0]
+
+    def end(self) -> int:
+        """Let the service end as an operator would; its exit status."""
+        if self.service.poll() is None:
+            self.service.terminate()
+        try:
+            return self.service.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self.service.kill()
+            return self.service.wait()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.end()
+        self.plant.close()
