@@ -170,7 +170,11 @@ def _steps(steps_a: tuple[float, ...]) -> Problems:
         )
     for i, (lower, upper) in enumerate(pairwise(steps_a), start=1):
         if upper <= lower:
-            yield f"charger.steps_a[{i}]", f"{upper:g} A must be above the step before, {lower:g} A"
+            yield (
+                f"charger.steps_a[{i}]",
+                f"{upper:g} A is not above the step before, {lower:g} A: write the lowest first",
+            )
+            return  # steps from the highest down are one mistake
 
 
 def _lowest_step(steps_a: tuple[float, ...], current_a: float) -> Problems:
