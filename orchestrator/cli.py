@@ -83,6 +83,9 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     probe.add_argument("station", help="the station file")
     probe.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
     probe.add_argument("--nmt", choices=NMT, help="first send this NMT command to the bay's BMU")
+    probe.add_argument(
+        "--old-protocol", action="store_true", help="ask for the BMU's older, undocumented pages as well"
+    )
     probe.set_defaults(run=_probe)
     demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
     demo.add_argument("--fault", metavar="NAME", help="inject a fault in mid-charge; 'list' shows the names")
@@ -175,7 +178,8 @@ def _probe(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import load_station
     from orchestrator.service.probe import probe
 
-    return probe(load_station(arguments.station), arguments.bay, arguments.nmt)
+    station = load_station(arguments.station)
+    return probe(station, arguments.bay, arguments.nmt, old_protocol=arguments.old_protocol)
 
 
 def _demo(arguments: argparse.Namespace) -> int:

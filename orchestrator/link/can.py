@@ -42,16 +42,20 @@ class CanBus:
     """One bus of the station file. All but `nmt()` belongs to the thread that called `open()`.
 
     `settings` go to python-can as they are, nothing is taken from the environment or from python-can's own
-    configuration files. `nodes` are the node ids that may be written to at all (`link/can_gate.py`).
+    configuration files. `nodes` are the node ids that may be written to at all (`link/can_gate.py`); `pages`: their
+    older protocol may be asked, too.
     """
 
-    def __init__(self, name: str, settings: Mapping[str, object], nodes: Collection[int]) -> None:
+    def __init__(
+        self, name: str, settings: Mapping[str, object], nodes: Collection[int], *, pages: bool = False
+    ) -> None:
         self.name = name
         self.trouble = ""  #: error-passive, bus-off, nobody acknowledges: in words; "" once a frame comes again
         self.foreign = 0  #: frames that are none of ours
         self.garbage = 0  #: what the driver could not read
         self._settings = {**PROTECTIVE.get(str(settings.get("interface")), {}), **settings}
         self._nodes = frozenset(nodes)
+        self._pages = pages
         self._callbacks: dict[int, FrameCallback] = {}
         self._orders: deque[tuple[int, NmtCommand]] = deque()
         self._garbage_run = 0
@@ -67,7 +71,7 @@ class CanBus:
     @property
     def nodes_seen(self) -> tuple[int, ...]:
         """The node ids of all that was heard since the bus was opened, ours or not."""
-        return tuple(self._network.scanner.nodes) if self._network else ()
+        return () if self._network is None else tuple(self._network.scanner.nodes)
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
         """Call `callback(cob_id, data)` for each data frame with this id; it holds for every later bus, too."""
@@ -133,7 +137,7 @@ class CanBus:
             self._dispatch(message, self._network)
 
     def _check(self, cob_id: int, data: bytes) -> None:
-        if reason := refusal(cob_id, data, self._nodes):
+        if reason := refusal(cob_id, data, self._nodes, pages=self._pages):
             raise RefusedError(f"{can_text.place(self.name, self._settings)}: not sent: {reason}")
 
     def _dispatch(self, message: "can.Message", network: "canopen.Network") -> None:

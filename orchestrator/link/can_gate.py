@@ -2,11 +2,12 @@
 
 Reads of objects, the two kinds of timers that the CANopen manual offers (§2.5, §2.6) and NMT commands (§3.7), each to a
 node that the station file names. The limits are declared here once more, apart from those of the station file: a timer
-of a millisecond would fill the bus.
+of a millisecond would fill the bus. The request of the older protocol (`protocol/pages.py`) only where it is asked for.
 """
 
 from collections.abc import Collection, Mapping
 
+from orchestrator.protocol.pages import pages_request, pages_request_cob_id
 from orchestrator.protocol.sdo import FRAME_BYTES, NMT_COB_ID, NmtCommand
 
 _SDO_BASE = 0x600
@@ -24,10 +25,15 @@ WRITABLE: Mapping[tuple[int, int], tuple[int, int]] = {
 }
 
 
-def refusal(cob_id: int, data: bytes, nodes: Collection[int]) -> str:
-    """Why this frame must not be sent; "" if it may. `nodes` are the node ids that belong to the station."""
+def refusal(cob_id: int, data: bytes, nodes: Collection[int], *, pages: bool = False) -> str:
+    """Why this frame must not be sent; "" if it may.
+
+    `nodes` are the node ids that belong to the station. `pages`: their older protocol may be asked, too.
+    """
     if cob_id == NMT_COB_ID:
         return _nmt_refusal(data, nodes)
+    if pages and any(cob_id == pages_request_cob_id(node) and data == pages_request(node) for node in nodes):
+        return ""
     if cob_id - _SDO_BASE in nodes:
         return _sdo_refusal(data)
     return f"COB-ID 0x{cob_id:X} is not an SDO request to a node of this station, nor NMT"

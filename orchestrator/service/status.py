@@ -55,7 +55,8 @@ def _setpoint(setpoint: Setpoint) -> dict[str, object]:
 
 def _charger(reading: ChargerReading | None) -> dict[str, object]:
     names = (
-        "voltage_v", "current_a", "control_mode", "operation", "current_limit", "charge_mode", "precharge", "connection",
+        "voltage_v", "current_a",
+        "control_mode", "operation", "current_limit", "charge_mode", "precharge", "connection",
     )  # fmt: skip
     return {name: getattr(reading, name) if reading else None for name in names}
 

@@ -125,7 +125,7 @@ class Supervisor:
         self._journal.close()
         return 1 if unverified else 0
 
-    # --- what the control socket asks, in its own thread ----------------------------------------------------------------
+    # --- what the control socket asks, in its own thread ---
 
     def _answer(self, request: Mapping[str, object]) -> dict[str, object]:
         verb = request.get("verb")
