@@ -27,7 +27,9 @@ def choose(f: Facts, worst: Effect | None) -> tuple[Step, float | None]:
 
 def _lowest(f: Facts, worst: Effect | None) -> Bound:
     current = f.rules.policy.current
-    lowest: Bound = (f.rules.top_step, "the station's current limit", "limits.current_a", None)
+    lowest: Bound = (len(f.rules.steps_a) - 1, "the highest step, nothing limits it", "", None)
+    if f.rules.top_step < lowest[0]:
+        lowest = (f.rules.top_step, "the station's current limit", "limits.current_a", None)
     if worst is not None and worst >= Effect.LIMIT:
         lowest = (0, "a fault that limits the current", "", None)
     for name, table, value in (

@@ -71,13 +71,14 @@ def _sum_up(stage: Stage, story: Story) -> None:
     for session in story.sessions:
         print(
             f"\nCharged {session['charged_ah']:.3f} Ah ({session['charged_wh']:.1f} Wh) "
-            f"in {session['energised_s']:.0f} s, SOC {session['soc_start_pct']} → {session['soc_pct']} %, {session['step_changes']} changes of the step."
+            f"in {session['energised_s']:.0f} s, SOC {session['soc_start_pct']} → {session['soc_pct']} %, "
+            f"{session['step_changes']} changes of the step."
         )
     if story.stopped_by:
         print(f"It stopped because: {story.stopped_by}")
     if story.fault and truth["injected_s"] is not None and truth["first_stop_s"] is not None:
-        latency_ms = (truth["first_stop_s"] - truth["injected_s"]) * 1000
-        print(f"The first stop frame reached the charger {latency_ms:.0f} ms after the fault was injected.")
+        after_s = truth["first_stop_s"] - truth["injected_s"]
+        print(f"The first stop frame reached the charger {after_s:.3f} s after the fault began.")
     print(f"State {story.state}. The emulated charger: operation {truth['operation']}, {truth['current_a']:.2f} A.")
     if not story.well:
         print("This demo did not end as it should.", file=sys.stderr)

@@ -4,6 +4,9 @@ from orchestrator.config.station import Station
 from orchestrator.model import BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
 from orchestrator.service.records import command_fields, session_fields
 
+#: What of a charger's reading the status shows.
+SHOWN = tuple(name for name in ChargerReading.__slots__ if name not in ("t_s", "illegal"))
+
 
 def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, wall_s: float) -> dict[str, object]:
     """One bay. Values are None where nothing valid is known; `since` is Unix time."""
@@ -54,11 +57,7 @@ def _setpoint(setpoint: Setpoint) -> dict[str, object]:
 
 
 def _charger(reading: ChargerReading | None) -> dict[str, object]:
-    names = (
-        "voltage_v", "current_a",
-        "control_mode", "operation", "current_limit", "charge_mode", "precharge", "connection",
-    )  # fmt: skip
-    return {name: getattr(reading, name) if reading else None for name in names}
+    return {name: getattr(reading, name) if reading else None for name in SHOWN}
 
 
 def _battery(reading: BatteryReading) -> dict[str, object]:
