@@ -12,7 +12,9 @@ Handler = Callable[[int, bytes], None]
 #: The length of every SDO frame.
 SDO_BYTES = 8
 #: How often the thread of a bus without a file descriptor looks whether it is to end.
-LOOK_S = 0.1
+LOOK_S = 0.02
+#: A bus that cannot be read is left alone for this long.
+DOWN_S = 0.2
 
 
 class CanWire:
@@ -59,12 +61,23 @@ class CanWire:
             return
 
     def _on_readable(self) -> None:
-        while (message := self._bus.recv(0)) is not None:
-            self._deliver(message)
+        try:
+            while (message := self._bus.recv(0)) is not None:
+                self._deliver(message)
+        except can.CanError:  # down, or rubbish in it: look again later, not at once for ever
+            self._loop.remove_reader(self._fd)
+            self._loop.call_later(DOWN_S, self._resume)
+
+    def _resume(self) -> None:
+        if not self._closing:
+            self._loop.add_reader(self._fd, self._on_readable)
 
     def _listen(self) -> None:
         while not self._closing:
-            message = self._bus.recv(LOOK_S)
+            try:
+                message = self._bus.recv(LOOK_S)
+            except can.CanError:
+                message = None
             if message is not None:
                 self._loop.call_soon_threadsafe(self._deliver, message)
 

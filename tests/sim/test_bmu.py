@@ -124,9 +124,9 @@ def test_the_heartbeat_is_off_until_its_period_is_written(scene: Scene) -> None:
     scene.client.ask(0x610, "2B 17 10 00 32 00 00 00")
     assert [scene.client.wait(0x710) for _ in range(3)] == ["7F"] * 3
     scene.client.send(0, "01 10")
-    assert "05" in [scene.client.wait(0x710) for _ in range(2)]
+    assert scene.client.wait_for(0x710, "05")
     scene.client.send(0, "02 00")
-    assert "04" in [scene.client.wait(0x710) for _ in range(2)]
+    assert scene.client.wait_for(0x710, "04")
 
 
 def test_a_stopped_node_answers_no_sdo_and_a_started_one_does(scene: Scene) -> None:
@@ -146,9 +146,7 @@ def test_a_reset_says_boot_up_and_forgets_the_settings(scene: Scene, command: st
     scene.client.ask(0x610, "2B 17 10 00 32 00 00 00")
     scene.client.ask(0x610, "2B 01 18 05 32 00 00 00")
     scene.client.send(0, command)
-    while (beat := scene.client.wait(0x710)) == "7F":
-        continue
-    assert beat == "00"
+    assert scene.client.wait_for(0x710, "00")
     assert scene.client.wait(0x710, within_s=0.15) is None
     assert scene.read(0x1017) == "4B 17 10 00 00 00 00 00"
     assert scene.read(0x1801, 5) == "4B 01 18 05 00 00 00 00"

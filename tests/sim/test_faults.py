@@ -17,6 +17,7 @@ from orchestrator.sim.charger_frames import Kind
 from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.presets import pack_48v
 from orchestrator.sim.rig import Rig, Setup
+from tests.waiting import wait_until
 
 CHANNELS = count()
 
@@ -163,6 +164,27 @@ def test_a_fault_shows_and_can_be_healed(name: str, scene: Scene) -> None:
     assert told.temperature_c == pytest.approx(20, abs=0.5)
     assert not (rig.wire.mute_rx or rig.wire.mute_tx or rig.wire.complains or rig.bmu.port.faults.mute)
     assert rig.wire.is_open
+    assert not charger.deaf_to
+
+
+def test_a_battery_can_live_faster_than_the_clock(tmp_path: Path) -> None:
+    loop = asyncio.new_event_loop()
+    bus = can.Bus(interface="virtual", channel=f"faults-{next(CHANNELS)}")
+    wire = CanWire(loop, bus)
+    charger = Charger(run=True, mode=ChargeMode.CHARGE, current_limit=2)
+    rig = Rig(loop, wire, Bay(charger, pack_48v()), Setup(node_id=0x10, speed=1000.0))
+
+    def soc_pct() -> float:
+        rig.catch_up()
+        return rig.bay.pack.soc * 100
+
+    began_s = loop.time()
+    wait_until(lambda: soc_pct() > 51.0)
+    assert loop.time() - began_s < 5.0, "8 A need 90 s for 1 % of 20 Ah"
+    rig.close()
+    wire.close()
+    bus.shutdown()
+    loop.close()
 
 
 @pytest.mark.parametrize(

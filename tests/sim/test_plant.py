@@ -151,10 +151,19 @@ def test_it_ends_in_order_on_sigterm(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_it_ends_when_nobody_is_left_to_command_it(tmp_path: Path) -> None:
+    process = start(tmp_path, "--can", json.dumps(udp_keys()))
+    process.communicate(timeout=20)  # closes its stdin
+    assert process.returncode == 0
+
+
 def test_bays_are_dealt_to_several_buses(tmp_path: Path) -> None:
-    one, two = json.dumps(udp_keys()), json.dumps(udp_keys())
-    with PlantProcess(tmp_path, "--bays", "3", "--can", one, "--can", two, "--node", "0x7E") as plant:
+    one, two = udp_keys(), udp_keys()
+    buses = ("--can", json.dumps(one), "--can", json.dumps(two))
+    with PlantProcess(tmp_path, "--bays", "3", *buses, "--node", "0x7E") as plant, on_bus(**two) as client:
         assert [(bay["can"], bay["node_id"]) for bay in plant.bays] == [(0, 126), (0, 127), (1, 126)]
+        assert client.ask(0x67E, "40 00 60 00 00 00 00 00") is not None
+        assert client.ask(0x67F, "40 00 60 00 00 00 00 00", within_s=0.1) is None
 
 
 @pytest.mark.parametrize("args", [["--bays", "0"], ["--bays", "113"], ["--node", "0"], ["--soc", "full"]])

@@ -30,6 +30,13 @@ class Port:
             heard += os.read(self.fd, count - len(heard))
         return heard.hex(" ").upper()
 
+    def read_until(self, text: str, within_s: float = DEADLINE_S) -> str:
+        """Until `text` (hex) has come, or all that came within the time."""
+        heard, deadline_s = "", time.monotonic() + within_s
+        while text not in heard and time.monotonic() < deadline_s:
+            heard = f"{heard} {self.read(1, 0.05)}".strip()
+        return heard
+
     def ask(self, text: str, count: int) -> str:
         self.write(text)
         return self.read(count)
@@ -78,6 +85,13 @@ class Client:
             if message is not None and message.arbitration_id == cob_id:
                 return bytes(message.data).hex(" ").upper()
         return None
+
+    def wait_for(self, cob_id: int, text: str) -> bool:
+        """Whether this frame comes, behind others with its COB-ID perhaps."""
+        while (heard := self.wait(cob_id)) is not None:
+            if heard == text:
+                return True
+        return False
 
     def ask(self, cob_id: int, text: str, within_s: float = DEADLINE_S) -> str | None:
         """An SDO request and its answer."""
