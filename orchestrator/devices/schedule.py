@@ -43,7 +43,8 @@ class Schedule:
 
     def __init__(self, control: ControlMode) -> None:
         self._manual = control is ControlMode.MANUAL
-        self.order: Command | None = STOP  #: the standing order
+        self._half_stopped = False  # operation 0 is still to follow
+        self._after_poll = True  # the last slot was a poll
         self._stop_s = -inf  # when the last stop was begun
         self.restart(-inf)
 
@@ -52,10 +53,8 @@ class Schedule:
 
         At most once a slot, so that an error that comes again each time does not flood the line.
         """
-        self.order = STOP
+        self.order: Command | None = STOP  #: the standing order
         self._urgent = True
-        self._half_stopped = False  # operation 0 is still to follow
-        self._after_poll = True  # the last slot was a poll
         self._free_s = self._slot_s = self._stop_s = max(now_s, self._stop_s + SLOT_S)
 
     def give(self, command: Command | None) -> bool:

@@ -109,6 +109,12 @@ def test_nobody_asked(dialogue: Dialogue) -> None:
     assert dialogue.give_up(5.22) is None
 
 
+def test_what_comes_after_time_is_up_answers_nothing_in_whatever_form(dialogue: Dialogue) -> None:
+    dialogue.ask(5.0)
+    assert dialogue.give_up(5.12) is None
+    assert dialogue.hear(REPLY + REPLY_9 + REPLY_10, 5.15) is None
+
+
 def test_half_an_answer_from_before_the_request_answers_nothing(dialogue: Dialogue) -> None:
     dialogue.hear(REPLY[:12], 5.0)
     dialogue.ask(5.1)

@@ -135,6 +135,12 @@ def test_a_stop_that_is_withdrawn_before_its_turn_is_written_all_the_same() -> N
     assert play(schedule, 1.7, 2.4, {}) == [(1.7, REST), (1.9, OPERATION), (2.1, POLL), (2.3, ORDER)]
 
 
+def test_a_new_schedule_begins_with_a_stop_at_once() -> None:
+    assert play(Schedule(ControlMode.MANUAL), 10.0, 10.6, {}) == [
+        (10.0, REST), (10.2, OPERATION), (10.4, POLL), (10.5, REST),
+    ]  # fmt: skip
+
+
 def test_an_opened_port_stops_first_whatever_was_ordered() -> None:
     schedule = polling()
     schedule.give(RUN)

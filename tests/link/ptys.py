@@ -1,9 +1,10 @@
 """A serial port made of a pty, under a stable name, that can be unplugged, plugged in again and stalled."""
 
 import os
+import select
 import tty
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -34,12 +35,23 @@ class Pty:
         """Write towards the device, which does not read, until nothing more goes in."""
         assert self._ours is not None
         os.set_blocking(self._ours, False)
+        writable = select.poll()
+        writable.register(self._ours, select.POLLOUT)
         filled = 0
-        try:
-            while True:
+        while writable.poll(100):  # the kernel hands on what was written a little later, and so makes room again
+            with suppress(BlockingIOError):
                 filled += os.write(self._ours, bytes(4096))
-        except BlockingIOError:
-            return filled
+        return filled
+
+    def drain(self) -> bytes:
+        """Everything that has reached the device's end and was not read there."""
+        everything = b""
+        os.set_blocking(self.master, False)
+        with suppress(BlockingIOError):
+            while data := os.read(self.master, 65536):
+                everything += data
+        os.set_blocking(self.master, True)
+        return everything
 
 
 @contextmanager
