@@ -1,8 +1,23 @@
-"""`python -m orchestrator` is `orchestrator`."""
+"""`orchestrator`, and `python -m orchestrator`: two verbs that must not wait for anybody's imports, then the rest."""
 
 import sys
 
-from orchestrator.cli import main
+
+def main() -> int:
+    """Run the verb of the command line and return the exit status."""
+    arguments = sys.argv[1:]
+    if arguments[:1] == ["estop"]:
+        from orchestrator.service.estop import main as estop
+
+        return estop(arguments[1:])
+    if arguments[:1] == ["run"] and not any(word.startswith("-") for word in arguments) and len(arguments) <= 2:
+        from orchestrator.service.guardian import guard
+
+        return guard(arguments[1:] or ["station.yaml"])
+    from orchestrator.cli import main as command_line
+
+    return command_line(arguments)
+
 
 if __name__ == "__main__":
     sys.exit(main())

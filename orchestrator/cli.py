@@ -49,6 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"orchestrator {__version__}")
     verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
     _add_service_verbs(verbs)
+    _add_estop(verbs)
     _add_tool_verbs(verbs)
     return parser
 
@@ -69,6 +70,11 @@ def _add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParse
         request.add_argument("--all", action="store_true", help="every bay of the station")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
+
+
+def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """For the list of verbs only: `__main__` runs it before any of this is imported."""
+    verbs.add_parser("estop", help="stop every charger now; needs no running service", add_help=False)
 
 
 def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -108,10 +114,9 @@ def _socket(arguments: argparse.Namespace) -> Path:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from orchestrator.config.load import load_station
-    from orchestrator.service.supervisor import serve
+    from orchestrator.service.guardian import guard
 
-    return serve(load_station(arguments.station))
+    return guard([arguments.station])
 
 
 def _status(arguments: argparse.Namespace) -> int:

@@ -23,6 +23,8 @@ from orchestrator.protocol.charger import OPERATION_STOP_FRAME, STOP_FRAME, enco
 #: The wire takes 20 ms, an FTDI adapter holds the last bytes back for 16 ms; the rest is the charger's.
 REPLY_DEADLINE_S = 0.12
 MISSES_UNTIL_SILENT = 3
+#: Without a turn for so long the loop hangs: a write may take 0.2 s, a poll 0.12 s.
+STALL_S = 0.5
 REOPEN_S = 1.0
 #: Longer than a whole stop takes: operation 0 follows one slot behind rest 0.
 CLOSE_S = 1.0
@@ -67,6 +69,7 @@ class ChargerPort:
         self._line: Line | None = None
         self._dialogue = Dialogue()
         self._open_at_s = 0.0
+        self._turn_s = 0.0
         self._view: tuple[ChargerReading | None, ChargerLink] = (
             None,
             ChargerLink(problem=f"{config.port}: not opened yet"),
@@ -98,6 +101,12 @@ class ChargerPort:
         if new_stop:
             self._wake.set()
 
+    def stalled(self, now_s: float) -> bool:
+        """True when the loop hangs with an open port, or has ended without being told to."""
+        if self._close_by_s is not None:
+            return False
+        return not self._thread.is_alive() or (self._line is not None and now_s - self._turn_s > STALL_S)
+
     def close(self) -> None:
         """End the thread and give the port back. A stop that is ordered is written whole first."""
         if self._close_by_s is None:
@@ -124,7 +133,7 @@ class ChargerPort:
     def _once(self) -> None:
         """Wait for the next turn, or take it."""
         self._wake.clear()
-        now_s = self._clock()
+        now_s = self._turn_s = self._clock()
         line = self._line
         if line is None:
             if now_s >= self._open_at_s:

@@ -18,6 +18,8 @@ from orchestrator.errors import OrchestratorError, ServiceError
 #: The longest request, and how long a client may take over one.
 MAX_REQUEST = 4096
 CLIENT_S = 1.0
+#: Reading, asking every bay and answering take at most this; longer means that the thread hangs.
+STALL_S = 30.0
 
 Answer = Mapping[str, object]
 Handler = Callable[[Mapping[str, object]], Answer]
@@ -26,14 +28,20 @@ Handler = Callable[[Mapping[str, object]], Answer]
 class ControlSocket:
     """Listens on a Unix socket and answers each request with `handler`; its OrchestratorErrors become answers, too."""
 
-    def __init__(self, path: Path, handler: Handler) -> None:
-        self._path, self._handler = path, handler
+    def __init__(self, path: Path, handler: Handler, clock: Callable[[], float]) -> None:
+        self._path, self._handler, self._clock = path, handler, clock
+        self._client_s: float | None = None  # since when a client is being served
         self._listener = _listen(path)
         self._thread = threading.Thread(target=self._run, name="control", daemon=True)
 
     def start(self) -> None:
         """Begin to answer."""
         self._thread.start()
+
+    def stalled(self, now_s: float) -> bool:
+        """True when nobody answers any more, or one client has been served for far too long."""
+        began_s = self._client_s
+        return not self._thread.is_alive() or (began_s is not None and now_s - began_s > STALL_S)
 
     def close(self) -> None:
         """Stop listening and take the socket's name away."""
@@ -48,9 +56,11 @@ class ControlSocket:
                 client, _ = self._listener.accept()
             except OSError:
                 return  # closed
+            self._client_s = self._clock()
             with client, suppress(OSError):
                 client.settimeout(CLIENT_S)
                 client.sendall(_line(self._answer(client)))
+            self._client_s = None
 
     def _answer(self, client: socket.socket) -> Answer:
         try:

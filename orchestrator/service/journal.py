@@ -24,6 +24,8 @@ BACKLOG = 20_000
 #: How long lines are gathered before they are written, and how long a refused disk is left alone.
 GATHER_S = 0.5
 RETRY_S = 5.0
+#: A disk may be slow, a loop that has not turned for this long hangs.
+STALL_S = 30.0
 
 T = TypeVar("T")
 Entry = tuple[float, float, str, Line]  #: monotonic s, wall s, bay, line
@@ -71,6 +73,7 @@ class Journal:
         self._said: deque[str] = deque(maxlen=1000)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._turn_s = clock()
         self.problem = ""
         self.lost = 0
 
@@ -88,6 +91,10 @@ class Journal:
         """A line for people, on standard error."""
         self._said.append(text)
 
+    def stalled(self, now_s: float) -> bool:
+        """True when the writer hangs or has ended."""
+        return not self._thread.is_alive() or now_s - self._turn_s > STALL_S
+
     def close(self) -> None:
         """Write what is left and end; gives a stalled disk one second."""
         self._ended.set()
@@ -96,6 +103,7 @@ class Journal:
 
     def _run(self) -> None:
         while not self._ended.wait(RETRY_S if self.problem else GATHER_S):
+            self._turn_s = self._clock()
             self._write()
         self._write()
 

@@ -23,6 +23,7 @@ from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
 from orchestrator.service.bay import Asked, BayRunner
 from orchestrator.service.control import ControlSocket
+from orchestrator.service.guarded import GuardedLine, GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.status import station_status
 
@@ -37,8 +38,10 @@ ANSWER_S = 2.0
 class Supervisor:
     """The service for one station. `run` returns when the service was told to end."""
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: Station, guardian: GuardianLink) -> None:
         self._station = station
+        self._guardian = guardian
+        self._beat_s = 0.0
         self._wake: SimpleQueue[int | None] = SimpleQueue()
         self._ending = ""
         self._journal = Journal(station.journal.directory, station.journal.max_mb, monotonic, time)
@@ -46,7 +49,7 @@ class Supervisor:
         self._buses: list[BatteryBus] = []
         self._bays: list[BayRunner] = []
         self._build()
-        self._control = ControlSocket(station.control.socket, self._answer)
+        self._control = ControlSocket(station.control.socket, self._answer, monotonic)
 
     def _build(self) -> None:
         """Devices for every bay; nothing is opened yet."""
@@ -58,7 +61,7 @@ class Supervisor:
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
         for number, bay in enumerate(self._station.bays):
             poke: Callable[[], None] = partial(self._wake.put, number)
-            port = _charger_port(bay, poke)
+            port = _charger_port(bay, poke, self._guardian)
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             self._ports.append(port)
@@ -97,6 +100,16 @@ class Supervisor:
         for bay in self._bays:
             if now_s - bay.last_s >= TICK_S:
                 bay.run(monotonic())
+        if now_s - self._beat_s >= TICK_S:
+            self._beat(now_s)
+
+    def _beat(self, now_s: float) -> None:
+        """Let the guardian know that every loop turns; without it, end."""
+        workers = (*self._devices, self._journal, self._control)
+        if any(worker.stalled(now_s) for worker in workers):
+            return
+        self._beat_s = now_s
+        self._ending = self._ending or self._guardian.beat(now_s)
 
     def _news(self) -> set[int]:
         numbers: set[int | None] = set()
@@ -117,6 +130,7 @@ class Supervisor:
         while monotonic() < end_s and not all(bay.verified for bay in self._bays):
             self._turn()
         unverified = [bay.name for bay in self._bays if not bay.verified]
+        self._guardian.done()
         self._control.close()
         for worker in self._devices:
             worker.close()
@@ -163,17 +177,12 @@ def _names(value: object) -> list[object]:
     return value
 
 
-def _charger_port(bay: Bay, poke: Callable[[], None]) -> ChargerPort:
-    kernel = bay.charger.rs485 is Rs485.KERNEL
+def _charger_port(bay: Bay, poke: Callable[[], None], guardian: GuardianLink) -> ChargerPort:
+    port, kernel = bay.charger.port, bay.charger.rs485 is Rs485.KERNEL
     return ChargerPort(
         bay.charger,
         bay.limits,
-        open_line=partial(SerialLine.open, bay.charger.port, kernel_rs485=kernel),
+        open_line=partial(GuardedLine, port, partial(SerialLine.open, port, kernel_rs485=kernel), guardian),
         clock=monotonic,
         on_change=poke,
     )
-
-
-def serve(station: Station) -> int:
-    """Run the service for `station` until it is told to end; the exit status."""
-    return Supervisor(station).run()

@@ -1,0 +1,80 @@
+"""The controller's side of the guardian: heartbeats, the serial ports handed over, and what to do when it is gone."""
+
+import array
+import contextlib
+import socket
+import threading
+from collections.abc import Callable
+
+from orchestrator.link.serial import SerialLine
+from orchestrator.service.guardian import ALIVE, BEAT, DONE, DROP, PORT
+
+#: A guardian that has not answered a heartbeat for this long is gone, or hangs.
+SILENCE_S = 2.0
+
+
+class GuardianLink:
+    """Talks to the guardian over an inherited socket. `beat` belongs to the control loop, the rest to any thread."""
+
+    def __init__(self, fd: int) -> None:
+        self._socket = socket.socket(fileno=fd)
+        self._socket.settimeout(0)
+        self._lock = threading.Lock()
+        self._heard_s: float | None = None
+        self._gone = ""
+
+    def beat(self, now_s: float) -> str:
+        """Say that every loop has turned; returns why the guardian cannot be relied on any more, "" while it can."""
+        self._heard_s = now_s if self._heard_s is None or self._answered() else self._heard_s
+        self._send(BEAT)
+        if not self._gone and now_s - self._heard_s > SILENCE_S:
+            self._gone = f"the guardian has not answered for {SILENCE_S:g} s"
+        return self._gone
+
+    def hold(self, port: str, fd: int) -> None:
+        """Give the guardian its own descriptor of an open port."""
+        self._send(PORT + port.encode(errors="surrogateescape"), fd)
+
+    def drop(self, port: str) -> None:
+        """Let the guardian close its descriptor, so that the port's name becomes free."""
+        self._send(DROP + port.encode(errors="surrogateescape"))
+
+    def done(self) -> None:
+        """Every charger is verified: the end of this process needs no stop."""
+        self._send(DONE)
+
+    def _answered(self) -> bool:
+        heard = False
+        while True:
+            try:
+                data = self._socket.recv(16)
+            except BlockingIOError:
+                return heard
+            except OSError as error:
+                self._gone = f"the guardian is gone: {error.strerror}"
+                return heard
+            if not data:
+                self._gone = "the guardian has died"
+                return heard
+            heard = heard or data == ALIVE
+
+    def _send(self, message: bytes, fd: int | None = None) -> None:
+        """Send without waiting: a guardian that takes nothing shows itself by not answering."""
+        ancillary = [] if fd is None else [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [fd]))]
+        with self._lock, contextlib.suppress(OSError):
+            self._socket.sendmsg([message], ancillary)
+
+
+class GuardedLine:
+    """A serial line of which the guardian has a duplicate for as long as it is open."""
+
+    def __init__(self, port: str, open_line: Callable[[], SerialLine], guardian: GuardianLink) -> None:
+        self._port, self._guardian = port, guardian
+        self._line = open_line()
+        guardian.hold(port, self._line.fileno())
+        self.write, self.read = self._line.write, self._line.read
+
+    def close(self) -> None:
+        """Give the port back; the guardian does, too."""
+        self._guardian.drop(self._port)
+        self._line.close()
