@@ -15,6 +15,7 @@ from durand.node import NodeCapabilities  # type: ignore[import-untyped]  # as a
 from durand.services.nmt import StateEnum  # type: ignore[import-untyped]  # as above
 
 from orchestrator.sim.can_wire import CanWire, NodePort
+from orchestrator.sim.old_pages import REPLY_COB_ID, REQUEST_COB_ID, minutes, pages
 from orchestrator.sim.pack import Readout
 
 HEARTBEAT, TPDO_PARAMETERS, TPDO_COB_ID = 0x1017, 0x1800, 0x180
@@ -22,9 +23,6 @@ EVENT_TIMER = 5  #: sub-index of a TPDO's period in ms
 
 #: The objects that each TPDO carries, whole and in order.
 TPDOS = ((0x6000, 0x6001), (0x6002, 0x6003), (0x6004,))
-
-#: "Not available" in TTF and TTE, as gas gauges have it.
-NO_MINUTES = 0xFFFF
 
 
 class Layout(Enum):
@@ -37,17 +35,14 @@ class Layout(Enum):
 def words(readout: Readout, layout: Layout) -> dict[int, int]:
     """The five objects as 32-bit words. Values that do not fit are cut to the field's width, as firmware would."""
     volts, amps = round(readout.voltage_v * 100), round(readout.current_a * 100)
-    minutes = [
-        NO_MINUTES if value is None else min(round(value), NO_MINUTES - 1)
-        for value in (readout.time_to_full_min, readout.time_to_empty_min)
-    ]
+    to_full, to_empty = minutes(readout.time_to_full_min), minutes(readout.time_to_empty_min)
     soc, soh = round(readout.soc_pct), round(readout.soh_pct)
     hundredths_ah, tenths_wh = round(readout.remaining_ah * 100), round(readout.available_wh * 10)
     high = layout is Layout.FIRST_HIGH
     return {
         0x6000: _word([(volts, 16), (amps, 16)], first_high=True),  # the sample fixes this one
-        0x6001: _word([(readout.status, 16), (minutes[0], 16)], first_high=high),
-        0x6002: _word([(minutes[1], 16), (soc, 8), (soh, 8)], first_high=high),
+        0x6001: _word([(readout.status, 16), (to_full, 16)], first_high=high),
+        0x6002: _word([(to_empty, 16), (soc, 8), (soh, 8)], first_high=high),
         0x6003: _word([(hundredths_ah, 16), (tenths_wh, 16)], first_high=high),
         0x6004: round(readout.temperature_c * 10) & 0xFFFF,
     }
@@ -85,6 +80,7 @@ class Bmu:
         for number in range(len(TPDOS)):
             self._add_tpdo(number)
         self._node.nmt.state_callbacks.add(self._on_state)
+        self.port.add_subscription(REQUEST_COB_ID + node_id, self._on_old_request)
 
     @property
     def node_id(self) -> int:
@@ -103,6 +99,10 @@ class Bmu:
         """Fall silent for ever."""
         self._forget()
         self.port.faults.mute = True
+
+    def _on_old_request(self, _: int, request: bytes) -> None:
+        for page in pages(self.node_id, request, self._readout()):
+            self.port.send(REPLY_COB_ID + self.node_id, page)
 
     # --- objects ---
 

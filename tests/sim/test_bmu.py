@@ -177,6 +177,17 @@ def test_foreign_and_broken_frames_do_not_disturb_it(scene: Scene) -> None:
     assert scene.read(0x6004) == "43 04 60 00 E7 FF 00 00"
 
 
+def test_the_older_protocol_carries_the_same_values(scene: Scene) -> None:
+    scene.client.send(0x470, "71")
+    assert scene.client.wait(0x4F0, within_s=0.1) is None, "that was no request for this node"
+    scene.client.send(0x470, "70")
+    assert [scene.client.wait(0x4F0) for _ in range(3)] == [
+        "70 01 40 09 F8 FF 41 00",
+        "70 02 FF FF 02 01 37 62",
+        "70 03 54 04 D1 14 E7 FF",
+    ]
+
+
 def test_faults_of_a_node(scene: Scene) -> None:
     faults = scene.bmu.port.faults
     faults.aborts[0x6004] = 0x0800_0020
