@@ -4,7 +4,7 @@ Fast objects are read every sweep, slow ones once a second; one request in fligh
 out), the next as soon as the answer is there and the bus's budget allows. A silent node is asked twice a second.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from math import inf
 
@@ -16,7 +16,7 @@ from orchestrator.devices.emergency import emergency_cob_id, emergency_text
 from orchestrator.devices.node_health import NodeHealth
 from orchestrator.devices.polled import Polled
 from orchestrator.devices.read_plan import ReadPlan
-from orchestrator.devices.sdo_client import Key, SdoClient, Verdict
+from orchestrator.devices.sdo_client import SdoClient, Verdict
 from orchestrator.model import BatteryLink, BatteryReading
 from orchestrator.protocol.objects import TpdoEntry
 from orchestrator.protocol.sdo import (
@@ -85,11 +85,6 @@ class BatteryNode:
     def view(self) -> tuple[BatteryReading, BatteryLink]:
         """What is known now. From any thread."""
         return self._view.current
-
-    @property
-    def words(self) -> Mapping[Key, tuple[int, int] | None]:
-        """The newest raw word of each object and the size that its answer declared; None where none came."""
-        return {polled.key: polled.word for polled in self._plan.objects}
 
     # --- what the bus calls -------------------------------------------------------------------------------------------
 

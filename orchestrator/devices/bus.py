@@ -12,6 +12,7 @@ from orchestrator.protocol.sdo import NmtCommand
 
 REOPEN_S = 1.0  #: pause before a bus that failed is opened again
 TICK_S = 0.1  #: longest wait for a frame: so soon an NMT command goes out and `close()` is noticed
+CLOSE_S = 3.0  #: slcan sleeps 2 s when it opens
 STALL_S = 0.5  #: without a turn for so long the loop hangs; five ticks
 
 
@@ -61,9 +62,12 @@ class BatteryBus:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread and close the bus. An NMT command that was just given may be lost."""
+        """End the thread and close the bus. An NMT command that was just given may be lost.
+
+        A driver that hangs (slcan opens a stalled adapter for ever) is left behind after CLOSE_S.
+        """
         self._closing.set()
-        self._thread.join()
+        self._thread.join(CLOSE_S)
 
     def nmt(self, node_id: int, command: NmtCommand) -> None:
         """Ask a node to start, stop or reset; RefusedError for a node that is not of this station. From any thread."""

@@ -20,7 +20,7 @@ CONFLICTS = 2
 class Polled:
     """An object's schedule and its newest word."""
 
-    __slots__ = ("_differed", "_tpdo_fields", "abort", "conflict", "due_s", "entry", "key", "tpdo_t_s", "word")
+    __slots__ = ("_differed", "_tpdo_fields", "abort", "conflict", "due_s", "entry", "key", "tpdo_t_s")
 
     def __init__(self, entry: ObjectEntry) -> None:
         self.entry = entry
@@ -30,7 +30,6 @@ class Polled:
     def forget(self, due_s: float) -> None:
         """The node booted: what it said before counts no more."""
         self.due_s = due_s  #: when it is to be read next
-        self.word: tuple[int, int] | None = None  #: newest raw word of an SDO answer, and the size that it declared
         self.abort: SdoAbort | None = None  #: set while the node refuses to have it read
         self.tpdo_t_s = -inf  #: when a TPDO brought it last
         self.conflict: dict[str, Decoded] = {}  #: fields of which SDO and TPDO tell different stories
@@ -45,7 +44,7 @@ class Polled:
 
     def from_sdo(self, word: int, size: int, asked_s: float) -> Fields:
         """The fields, from an SDO answer to the request of `asked_s`. Where TPDOs bring them, too, both must agree."""
-        self.abort, self.word = None, (word, size)
+        self.abort = None
         fields = decode_word(self.entry, word, size, asked_s)
         if self._tpdo_fields:
             different = self._different(fields)

@@ -18,10 +18,17 @@ _ADVICE: Mapping[int, str] = {
     errno.EIO: "the adapter is gone: plug it in again",
     errno.EACCES: "not allowed: the service's user needs access to this device (for a serial adapter, group dialout)",
     errno.EPERM: "not allowed: the service's user needs access to this device",
+    errno.ENOTTY: "this is no serial port: check the channel in the station file",
     errno.EBUSY: "another program holds it: end that program",
     errno.EAFNOSUPPORT: "this kernel has no CAN: modprobe can_raw, or use another interface",
     errno.EPROTONOSUPPORT: "this kernel has no raw CAN: modprobe can_raw, or use another interface",
     errno.ENOBUFS: "the transmit queue is full, nobody acknowledges: check cable, terminators, bit rate, BMU's power",
+}
+
+#: What to do where there is no errno, by a part of what the libraries say.
+_HINTS: Mapping[str, str] = {
+    "msgpack": "udp_multicast needs it: pip install msgpack",
+    "Write timeout": "the adapter takes nothing any more: unplug it and plug it in again",
 }
 
 #: Error frames of SocketCAN (linux/can/error.h): the bits of the id.
@@ -57,7 +64,7 @@ def errno_of(error: BaseException) -> int | None:
     """The operating system's number of what went wrong, wherever in the chain it is; None if there is none."""
     for link in chain(error):
         number = _number(link)
-        if isinstance(number, int):
+        if isinstance(number, int) and number > 0:  # a name that cannot be resolved has a negative one of its own
             return number
     return None
 
@@ -83,10 +90,11 @@ def failure(name: str, settings: Settings, error: BaseException) -> str:
 
 def _unnumbered(error: BaseException) -> tuple[str, str]:
     text = "; ".join(dict.fromkeys(str(link) for link in chain(error) if str(link)))
-    if "msgpack" in text:
-        return text, "udp_multicast needs it: pip install msgpack"
+    if advice := next((advice for hint, advice in _HINTS.items() if hint in text), None):
+        return text, advice
     kind = type(error).__name__
-    return f"{kind}: {text}" if text else kind, "check the bus's settings in the station file"
+    what = f"{kind}: {text}" if text else kind
+    return what, "check the bus's settings in the station file, and that the interface's driver is installed"
 
 
 def error_frame(can_id: int, data: bytes) -> str | None:

@@ -47,7 +47,6 @@ def test_the_documents_own_bytes_become_a_reading() -> None:
     }
     assert bench.link.online
     assert bench.link.problem == ""
-    assert bench.node.words[0x6000, 0] == (0x0940FFF8, 4)
 
 
 def test_a_value_is_as_old_as_its_request() -> None:

@@ -1,0 +1,412 @@
+"""The bus on real python-can interfaces: virtual, udp_multicast, and slcan on a pty."""
+
+import os
+import random
+import select
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from orchestrator.errors import LinkError, RefusedError
+from orchestrator.link import can_text
+from orchestrator.link.can import DEFAULT_BITRATE, MAX_GARBAGE, CanBus
+from orchestrator.protocol.sdo import NmtCommand
+from tests.link.ptys import Pty
+from tests.waiting import wait_until
+
+READ = bytes.fromhex("40 00 60 00 00 00 00 00")
+ANSWER = bytes.fromhex("43 00 60 00 F8 FF 40 09")
+Frames = list[tuple[int, bytes]]
+
+
+def message(cob_id: int, data: bytes, **kind: bool) -> can.Message:
+    return can.Message(arbitration_id=cob_id, data=data, is_extended_id=kind.pop("extended", False), **kind)
+
+
+def opened(settings: dict[str, object]) -> tuple[CanBus, Frames]:
+    """A bus that hands the answers of node 0x10 to a list."""
+    bus, heard = CanBus("can0", settings, [0x10]), Frames()
+    bus.subscribe(0x590, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.open()
+    return bus, heard
+
+
+def listen(bus: CanBus, condition: Callable[[], object], what: str) -> None:
+    """Receive until it is true."""
+
+    def step() -> object:
+        bus.receive(0.02)
+        return condition()
+
+    wait_until(step, what=what)
+
+
+@pytest.fixture
+def channel() -> str:
+    return f"test-{random.getrandbits(64):x}"
+
+
+@pytest.fixture
+def pair(channel: str) -> Iterator[tuple[CanBus, Frames, can.BusABC]]:
+    """Our bus and the other end of it, on python-can's virtual interface."""
+    bus, heard = opened({"interface": "virtual", "channel": channel})
+    with can.Bus(interface="virtual", channel=channel) as other:
+        yield bus, heard, other
+    bus.close()
+
+
+Pair = tuple[CanBus, Frames, can.BusABC]
+
+
+# --- frames ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_frame_each_way(pair: Pair) -> None:
+    bus, heard, other = pair
+    bus.send(0x610, READ)
+    sent = other.recv(1.0)
+    assert sent is not None
+    assert (sent.arbitration_id, bytes(sent.data), sent.is_extended_id) == (0x610, READ, False)
+    other.send(message(0x590, ANSWER))
+    bus.receive(1.0)
+    assert heard == [(0x590, ANSWER)]
+
+
+def test_foreign_frames_do_not_disturb(pair: Pair) -> None:
+    bus, heard, other = pair
+    other.send(message(0x590, ANSWER, extended=True))
+    other.send(message(0x590, b"", is_remote_frame=True))
+    other.send(message(0x123, b"abc"))
+    other.send(message(0x470, b"\x70"))  # the BMU's older protocol
+    other.send(message(0x7E4, bytes(8)))  # LSS, which canopen would keep for ever
+    for _ in range(5):
+        bus.receive(1.0)
+    assert heard == []
+    assert bus.foreign == 3
+    other.send(message(0x590, ANSWER))
+    bus.receive(1.0)
+    assert heard == [(0x590, ANSWER)]
+
+
+def test_frames_of_any_length_are_handed_on_whole(pair: Pair) -> None:
+    bus, heard, other = pair
+    for length in range(9):
+        other.send(message(0x590, bytes(length)))
+        bus.receive(1.0)
+    assert [len(data) for _, data in heard] == list(range(9))
+
+
+def test_who_is_on_the_bus_is_known(pair: Pair) -> None:
+    bus, _, other = pair
+    other.send(message(0x70A, b"\x05"))
+    other.send(message(0x590, ANSWER))
+    bus.receive(1.0)
+    bus.receive(1.0)
+    assert list(bus.nodes_seen) == [0x0A, 0x10]
+    bus.close()
+    assert list(bus.nodes_seen) == []
+
+
+def test_what_a_callback_raises_is_not_swallowed(pair: Pair) -> None:
+    bus, _, other = pair
+
+    def broken(_cob_id: int, _data: bytes) -> None:
+        raise ZeroDivisionError("a bug")
+
+    bus.subscribe(0x591, broken)
+    bus.close()
+    bus.open()  # what is subscribed holds for the next bus, too
+    other.send(message(0x591, ANSWER))
+    with pytest.raises(ZeroDivisionError, match="a bug"):
+        bus.receive(1.0)
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "data"),
+    [(0x610, bytes.fromhex("23 00 60 00 01 00 00 00")), (0x611, READ), (0x190, ANSWER), (0x000, b"\x81\x00")],
+)
+def test_what_the_gate_refuses_does_not_reach_the_wire(pair: Pair, cob_id: int, data: bytes) -> None:
+    bus, _, other = pair
+    with pytest.raises(RefusedError, match="not sent"):
+        bus.send(cob_id, data)
+    assert other.recv(0) is None
+
+
+def test_what_canopen_sends_by_itself_goes_through_the_gate_too(pair: Pair) -> None:
+    bus, _, other = pair
+    network = bus._network
+    assert network is not None
+    with pytest.raises(RefusedError):
+        network.scanner.search(0x20)
+    with pytest.raises(RefusedError):
+        network.nmt.send_command(0x81)  # to all nodes
+    with pytest.raises(RefusedError):
+        network.send_message(0x610, READ, remote=True)
+    network.send_message(0x610, READ)
+    sent = other.recv(1.0)
+    assert sent is not None
+    assert bytes(sent.data) == READ
+    assert other.recv(0) is None
+
+
+def test_nmt_commands_come_from_any_thread(pair: Pair) -> None:
+    bus, _, other = pair
+    commands = list(NmtCommand)
+    threads = [threading.Thread(target=bus.nmt, args=(0x10, command)) for command in commands]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert other.recv(0) is None  # only the bus's own thread sends
+    bus.receive(0.0)
+    sent = [other.recv(1.0) for _ in commands]
+    assert {bytes(m.data) for m in sent if m and m.arbitration_id == 0} == {bytes((c, 0x10)) for c in commands}
+
+
+def test_nmt_to_a_foreign_node_is_refused_at_once(pair: Pair) -> None:
+    with pytest.raises(RefusedError, match="0x11"):
+        pair[0].nmt(0x11, NmtCommand.STOP)
+
+
+# --- error frames ----------------------------------------------------------------------------------------------------
+
+
+def test_bus_off_breaks_the_bus_and_is_remembered_until_a_frame_comes(pair: Pair) -> None:
+    bus, _, other = pair
+    other.send(message(0x040, bytes(8), is_error_frame=True))
+    with pytest.raises(LinkError, match="bus-off"):
+        bus.receive(1.0)
+    bus.close()
+    bus.open()
+    assert "restart-ms 100" in bus.trouble
+    other.send(message(0x123, b""))
+    bus.receive(1.0)
+    assert bus.trouble == ""
+
+
+def test_an_error_passive_controller_is_noticed(pair: Pair) -> None:
+    bus, heard, other = pair
+    other.send(message(0x004, bytes.fromhex("00 20 00 00 00 00 80 00"), is_error_frame=True))
+    bus.receive(1.0)
+    assert bus.trouble == can_text.PASSIVE
+    other.send(message(0x008, bytes(8), is_error_frame=True))  # passing noise says nothing
+    bus.receive(1.0)
+    assert bus.trouble == can_text.PASSIVE
+    other.send(message(0x004, bytes.fromhex("00 40 00 00 00 00 00 00"), is_error_frame=True))
+    bus.receive(1.0)
+    assert bus.trouble == ""
+    assert heard == []
+
+
+# --- what can break --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"interface": "socketcan", "channel": "can77", "bitrate": 250_000}, "socketcan can77"),
+        ({"interface": "slcan", "channel": "/dev/serial/by-path/none"}, "is the adapter plugged in"),
+        ({"interface": "no-such"}, "no-such"),
+        ({"channel": "can0"}, "interface"),
+        ({"interface": "udp_multicast", "channel": "not an address"}, "udp_multicast not an address"),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_says_why(settings: dict[str, object], words: str) -> None:
+    bus = CanBus("left", settings, [0x10])
+    with pytest.raises(LinkError, match=r"^CAN bus left ") as failure:
+        bus.open()
+    assert words in str(failure.value)
+    bus.close()
+
+
+def test_a_closed_bus_neither_sends_nor_receives(channel: str) -> None:
+    bus = CanBus("can0", {"interface": "virtual", "channel": channel}, [0x10])
+    with pytest.raises(LinkError, match="is not open"):
+        bus.receive(0.0)
+    with pytest.raises(LinkError, match="is not open"):
+        bus.send(0x610, READ)
+
+
+@pytest.mark.parametrize(
+    "full", [can.CanOperationError("Failed to transmit: x", 105), can.CanOperationError("Transmit buffer full")]
+)
+def test_a_full_transmit_queue_is_an_absent_bmu_not_a_broken_bus(
+    pair: Pair, monkeypatch: pytest.MonkeyPatch, full: Exception
+) -> None:
+    bus, _, other = pair
+
+    def send(*_args: object) -> None:
+        raise full
+
+    monkeypatch.setattr(bus._bus, "send", send)  # no bus without a wire can have it for real
+    bus.send(0x610, READ)
+    assert "nobody acknowledges" in bus.trouble
+    other.send(message(0x590, ANSWER))
+    bus.receive(1.0)
+    assert bus.trouble == ""
+
+
+def test_a_send_that_fails_breaks_the_bus(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    bus = pair[0]
+
+    def send(*_args: object) -> None:
+        raise can.CanOperationError("Failed to transmit", 100)
+
+    monkeypatch.setattr(bus._bus, "send", send)
+    with pytest.raises(LinkError, match="Network is down"):
+        bus.send(0x610, READ)
+
+
+def test_nothing_but_the_station_file_says_how_a_bus_is_opened(channel: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": true}')
+    bus, heard = opened({"interface": "virtual", "channel": channel})
+    bus.subscribe(0x610, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.close()
+    bus.open()
+    bus.send(0x610, READ)
+    bus.receive(0.05)
+    assert heard == []
+    bus.close()
+
+
+def test_the_bit_rate_of_a_bus_without_one() -> None:
+    assert CanBus("a", {"interface": "virtual"}, []).bitrate == DEFAULT_BITRATE
+    assert CanBus("a", {"interface": "virtual", "bitrate": 250_000}, []).bitrate == 250_000
+
+
+def test_the_libraries_are_not_imported_before_a_bus_is_opened() -> None:
+    code = (
+        "import sys, orchestrator.link.can, orchestrator.devices.bus; "
+        "sys.exit(bool({'can', 'canopen'} & set(sys.modules)))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+# --- udp_multicast ---------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def udp() -> dict[str, object]:
+    group = f"239.{random.randrange(256)}.{random.randrange(256)}.{random.randrange(1, 255)}"
+    return {"interface": "udp_multicast", "channel": group, "port": random.randrange(20_000, 60_000)}
+
+
+def test_our_own_echo_is_tolerated_and_nothing_leaves_the_host(udp: dict[str, object]) -> None:
+    bus, heard = opened(udp)
+    raw = bus._bus._multicast  # type: ignore[union-attr]  # the driver's own
+    assert raw._socket.getsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL) == 0
+    with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
+        bus.send(0x610, READ)
+        bus.send(0x610, READ)
+        other.send(message(0x590, ANSWER))
+        listen(bus, lambda: heard, "the answer")
+    assert heard == [(0x590, ANSWER)]
+    bus.close()
+
+
+def test_a_datagram_that_is_no_frame_is_noise(udp: dict[str, object]) -> None:
+    bus, heard = opened(udp)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        for garbage in (b"", b"hello", b"\x93\x01\x02\x03", b"\x81\xa3foo\x01", bytes(range(256)) * 4):
+            stranger.sendto(garbage, (str(udp["channel"]), int(str(udp["port"]))))
+        listen(bus, lambda: bus.garbage == 5, "five datagrams")
+    with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
+        other.send(message(0x590, ANSWER))
+        listen(bus, lambda: heard, "the answer")
+    bus.close()
+
+
+def test_a_socket_closed_underneath_breaks_the_bus_and_a_new_one_works(udp: dict[str, object]) -> None:
+    bus, heard = opened(udp)
+    bus._bus._multicast._socket.close()  # type: ignore[union-attr]  # the driver's own
+    with pytest.raises(LinkError, match="udp_multicast"):
+        for _ in range(MAX_GARBAGE):
+            bus.receive(0.0)
+    bus.close()
+    bus.open()
+    with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
+        other.send(message(0x590, ANSWER))
+        listen(bus, lambda: heard, "the answer")
+    bus.close()
+
+
+# --- slcan -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def adapter(tmp_path: Path) -> Iterator[Pty]:
+    pty = Pty(tmp_path / "adapter")
+    yield pty
+    pty.unplug()
+
+
+def slcan(adapter: Pty) -> tuple[CanBus, Frames]:
+    return opened({"interface": "slcan", "channel": adapter.path, "bitrate": 250_000, "sleep_after_open": 0})
+
+
+def read_line(adapter: Pty, wanted: bytes) -> None:
+    """Read what the adapter is told until `wanted` is in it."""
+    seen = b""
+
+    def arrived() -> bool:
+        nonlocal seen
+        if select.select([adapter.master], [], [], 0)[0]:
+            seen += os.read(adapter.master, 4096)
+        return wanted in seen
+
+    wait_until(arrived, what=f"{wanted!r}")
+
+
+def test_slcan_both_ways(adapter: Pty) -> None:
+    bus, heard = slcan(adapter)
+    read_line(adapter, b"S5\r")  # 250 kbit/s
+    bus.send(0x610, READ)
+    read_line(adapter, b"t61084000600000000000\r")
+    os.write(adapter.master, b"t5908430060")
+    bus.receive(0.0)
+    os.write(adapter.master, b"00F8FF4009\r")
+    listen(bus, lambda: heard, "the answer")
+    assert heard == [(0x590, ANSWER)]
+    bus.close()
+
+
+@pytest.mark.parametrize("noise", [b"\xff\xfe\r", b"tzzz8\r", b"t5\r", b"T\r", b"\x00\x80\xff" * 30 + b"\r"])
+def test_noise_on_slcan_costs_one_frame_not_the_bus(adapter: Pty, noise: bytes) -> None:
+    bus, heard = slcan(adapter)
+    os.write(adapter.master, noise)
+    listen(bus, lambda: bus.garbage, "the noise")
+    os.write(adapter.master, b"t59084300600" + b"0F8FF4009\r")
+    listen(bus, lambda: heard, "the answer")
+    assert heard == [(0x590, ANSWER)]
+    bus.close()
+
+
+def test_an_adapter_that_is_unplugged_and_returns(adapter: Pty) -> None:
+    bus, heard = slcan(adapter)
+    adapter.unplug()
+    with pytest.raises(LinkError, match=r"slcan .*plug it in again"):
+        for _ in range(MAX_GARBAGE):
+            bus.receive(0.0)
+    bus.close()
+    with pytest.raises(LinkError, match="is the adapter plugged in"):
+        bus.open()
+    adapter.plug()
+    bus.open()
+    os.write(adapter.master, b"t59084300600" + b"0F8FF4009\r")
+    listen(bus, lambda: heard, "the answer")
+    bus.close()
+
+
+def test_a_stalled_adapter_does_not_stall_the_thread(adapter: Pty) -> None:
+    bus, _ = slcan(adapter)
+    with pytest.raises(LinkError, match="slcan"):
+        for _ in range(2000):  # nobody reads: the pty takes some 4 kB
+            bus.send(0x610, READ)
+    bus.close()
