@@ -109,7 +109,8 @@ class Supervisor:
         if any(worker.stalled(now_s) for worker in workers):
             return
         self._beat_s = now_s
-        self._ending = self._ending or self._guardian.beat(now_s)
+        lost = self._guardian.beat(now_s)
+        self._ending = self._ending or lost
 
     def _news(self) -> set[int]:
         numbers: set[int | None] = set()
