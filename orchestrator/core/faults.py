@@ -82,6 +82,8 @@ FAULTS: tuple[Row, ...] = (
         "cut the charger's mains now; reset after it was repaired"),
     Row("will_not_start", "C7", E.STOP, Clear.BACKOFF, obedience.will_not_start, ENERGISED,
         "check the charger's rotary switch and its mains"),
+    Row("stopped_by_itself", "C4", E.STOP, Clear.OPERATOR, obedience.stopped_by_itself, ENERGISED,
+        "find out who stopped it, then start", polls=2),
     Row("setting_not_obeyed", "C9, C16", E.TRIP, Clear.RESET, obedience.setting_not_obeyed, ENERGISED,
         "check the charger, then reset"),
     Row("over_current", "C11", E.TRIP, Clear.RESET, obedience.over_current, ALWAYS,

@@ -30,6 +30,8 @@ def next_order(f: Facts, setpoint: Setpoint) -> Command | None:
         memory.order, memory.order_s, memory.tries = missing, f.now_s, 0
     if missing is None or _running(reading):
         return missing
+    if memory.ran:
+        return None  # somebody stopped it: the fault table decides
     memory.resumed = memory.resumed or _resume_seen(f, reading)
     tries = int((f.now_s - memory.order_s) / RETRY_S)
     if tries > memory.tries:

@@ -22,9 +22,10 @@ Needs no running service. Exit status 0: every charger was verified to stand by;
 """
 #: How long the proof of standby is waited for.
 VERIFY_S = 3.0
-#: 8N1, no flow control, bytes as they are (§2.2.2): the flags of input, output, control and local modes.
-_LINE = (0, 0, termios.CS8 | termios.CREAD | termios.CLOCAL, 0)
+#: 19200 8N1, no flow control, bytes as they are (§2.2.2).
+_CONTROL = termios.CS8 | termios.CREAD | termios.CLOCAL
 _CHARACTERS: list[bytes | int] = [b"\0"] * 32
+_SETTINGS: list[int | list[bytes | int]] = [0, 0, _CONTROL, 0, termios.B19200, termios.B19200, _CHARACTERS]
 
 
 def main(arguments: list[str]) -> int:
@@ -85,7 +86,7 @@ def _open_and_stop(port: str) -> int:
     """Open a port, whoever else has it, set the line up and say stop."""
     fd = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     with suppress(termios.error):  # not a terminal: a stop is written all the same
-        termios.tcsetattr(fd, termios.TCSANOW, [*_LINE, termios.B19200, termios.B19200, _CHARACTERS])
+        termios.tcsetattr(fd, termios.TCSANOW, _SETTINGS)
     with suppress(BlockingIOError):
         os.write(fd, STOP_FRAME)
     return fd

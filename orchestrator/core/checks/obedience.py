@@ -2,7 +2,7 @@
 
 from orchestrator.core.facts import CHARGER_STALE_S, Facts
 from orchestrator.core.safestop import OBEY_STOP_S
-from orchestrator.model import Action, ChargeMode
+from orchestrator.model import Action, ChargeMode, Operation
 
 #: A setting must be read back within this time (about ten attempts), and a run must be seen (FAULTS C7, C9).
 OBEY_S = 5.0
@@ -60,6 +60,15 @@ def will_not_start(f: Facts) -> str | None:
     if f.memory.order is None or f.memory.order.action not in (Action.RUN, Action.RESUME) or not f.energised:
         return None
     return _unconfirmed(f, "run")
+
+
+def stopped_by_itself(f: Facts) -> str | None:
+    """FAULTS C4: an emergency stop past this service looks like this, too; it is not for us to start again."""
+    if f.reading is None or not f.energised or not f.memory.ran or f.full_mode:
+        return None
+    if f.reading.operation is not Operation.STOPPED:
+        return None
+    return "the charger stopped though it was told to run"
 
 
 def setting_not_obeyed(f: Facts) -> str | None:
