@@ -145,6 +145,11 @@ def test_findings_are_bounded() -> None:
     assert len(findings) == MAX_FINDINGS
 
 
+def test_a_range_has_an_inside() -> None:
+    _, findings, _ = _read("span: [5, 5]\n")
+    assert findings == ["dir/f.yaml:1:7: error: span: [low, high] with low below high, not [5, 5]"]
+
+
 def test_a_path_is_no_longer_than_linux_allows() -> None:
     _, (finding,), _ = _read(f"path: {'x' * 5000}\n")
     assert finding.endswith("a path has at most 4096 characters, this one 5000")

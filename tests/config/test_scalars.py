@@ -40,6 +40,7 @@ def test_a_number_is_a_plain_decimal(text: str, value: float) -> None:
         ("0x0C", "write it in decimal: 12, not 0x0C"),
         ("1e3", "write 1000, not 1e3"),
         ("1.5E-2", "write 0.015, not 1.5E-2"),
+        ("1e300", "'1e300' is not a number in V"),
         ("1e999", "'1e999' is not a number in V"),
         (".nan", ".nan is not a number to charge by"),
         ("-.INF", "-.INF is not a number to charge by"),
@@ -180,6 +181,7 @@ def test_the_nearest_word_is_the_first_of_the_nearest() -> None:
     assert scalars.nearest("SOC-PCT", ["soh_pct", "soc_pct"]) == "soc_pct"
     assert scalars.nearest("zzz", ["can0"]) == ""
     assert scalars.nearest("x", []) == ""
+    assert scalars.nearest("a" * 64, ["a" * 64]) == "a" * 64
     assert scalars.nearest("a" * 65, ["a" * 65]) == "", "no long words are compared: that takes time"
 
 
