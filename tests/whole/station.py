@@ -1,0 +1,195 @@
+"""A whole station for tests: its file, the emulated plant and the service, as processes that never outlive the test."""
+
+import ctypes
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Self, cast
+
+from orchestrator.service.control import ask
+from orchestrator.sim.client import PlantProcess
+from tests.sim.wires import udp_keys
+from tests.waiting import wait_until
+
+Document = dict[str, Any]
+
+POLICY = Path(__file__).with_name("policy.yaml")
+#: Python starts, imports everything and opens the socket within this, also on a machine that does other things.
+START_S = 20.0
+#: The service gives every charger 3 s at its end, then closes its ports.
+END_S = 10.0
+
+
+def die_with_parent() -> None:
+    """In a child, before it becomes another program: let the kernel kill it when the tests end, however they end."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+
+
+def station_document(directory: Path, cans: Sequence[Mapping[str, object]], bays: int) -> Document:
+    """A station of bays `bay-1`, `bay-2`, … on the ports of a plant in `directory`, as its file would have it."""
+    per_bus = -(-bays // len(cans))
+    return {
+        "station": "whole",
+        "can": {f"can{number}": dict(keys) for number, keys in enumerate(cans)},
+        "bays": [
+            {
+                "name": f"bay-{number + 1}",
+                "charger": {
+                    "port": str(directory / f"bay-{number + 1}"),
+                    "control": "manual",
+                    "steps_a": [2.0, 5.0, 8.0, 11.0, 14.0],
+                },
+                "battery": {"can": f"can{number // per_bus}", "node_id": 0x10 + number % per_bus, "map": "tabos"},
+                "limits": {"voltage_v": 58.4, "current_a": 15.0, "temperature_c": [0, 45]},
+                "policy": str(POLICY),
+            }
+            for number in range(bays)
+        ],
+        "control": {"socket": "run/orchestrator.sock"},
+        "journal": {"directory": "run/journal"},
+    }
+
+
+class Service:
+    """`python -m orchestrator run` on a station file; what it says is in `directory`/service.log."""
+
+    def __init__(self, directory: Path, document: Document) -> None:
+        self.directory = directory
+        self.file = directory / "station.yaml"
+        self.file.write_text(json.dumps(document, indent=1), encoding="utf-8")  # JSON is YAML, too
+        self.socket = directory / "run" / "orchestrator.sock"
+        self._log = directory / "service.log"
+        self._process: subprocess.Popen[bytes] | None = None
+
+    # --- the process ---
+
+    def start(self) -> Self:
+        with self._log.open("ab") as log:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "orchestrator", "run", str(self.file)],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                preexec_fn=die_with_parent,
+            )
+        wait_until(self._answers, START_S, "the service's first answer")
+        return self
+
+    def _answers(self) -> bool:
+        assert self._process is not None
+        assert self._process.poll() is None, f"the service ended: {self.log()}"
+        try:
+            return bool(self.status())
+        except Exception:  # noqa: BLE001 - not yet
+            return False
+
+    def signal(self, number: signal.Signals) -> None:
+        assert self._process is not None
+        self._process.send_signal(number)
+
+    def ended(self) -> int:
+        """Wait for its end; the exit status."""
+        assert self._process is not None
+        return self._process.wait(END_S)
+
+    def close(self) -> None:
+        if self._process is not None and self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+
+    # --- asking it ---
+
+    def ask(self, verb: str, *bays: str) -> dict[str, str]:
+        """What each bay answers to a request; "" is yes."""
+        return cast("dict[str, str]", ask(self.socket, {"verb": verb, "bays": list(bays) or None})["results"])
+
+    def status(self) -> dict[str, Document]:
+        """The status of every bay by its name."""
+        bays = cast("list[Document]", ask(self.socket, {"verb": "status"})["bays"])
+        return {bay["name"]: bay for bay in bays}
+
+    def bay(self, name: str = "bay-1") -> Document:
+        return self.status()[name]
+
+    def wait(
+        self, states: str | Collection[str], bays: Collection[str] = ("bay-1",), timeout_s: float = 20.0
+    ) -> dict[str, Document]:
+        """Wait until each of these bays is in one of these states, not necessarily at one moment."""
+        wanted = {states} if isinstance(states, str) else set(states)
+        arrived: dict[str, Document] = {}
+        newest: dict[str, Document] = {}
+
+        def look() -> bool:
+            newest.update(self.status())
+            arrived.update({name: newest[name] for name in bays if newest[name]["state"] in wanted})
+            return len(arrived) == len(set(bays))
+
+        try:
+            wait_until(look, timeout_s)
+        except AssertionError:
+            late = {name: (newest[name]["state"], newest[name]["reason"]) for name in bays if name not in arrived}
+            raise AssertionError(f"not in {sorted(wanted)} within {timeout_s:g} s: {late}") from None
+        return arrived
+
+    def cli(self, *args: str) -> subprocess.CompletedProcess[str]:
+        """One verb on the real command line, with this service's socket in the environment."""
+        return orchestrator(*args, env={"ORCHESTRATOR_SOCKET": str(self.socket)})
+
+    # --- what it wrote ---
+
+    def log(self) -> str:
+        return self._log.read_text(encoding="utf-8")
+
+    def journal(self, bay: str, kind: str) -> list[Document]:
+        """The bay's journal lines of one kind, oldest first."""
+        name = "snapshots" if kind == "snapshot" else "events"
+        path = self.directory / "run" / "journal" / f"{name}.jsonl"
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        records = [cast("Document", json.loads(line)) for line in lines]
+        return [record for record in records if record["bay"] == bay and record["kind"] == kind]
+
+    def path_of(self, bay: str) -> list[str]:
+        """The states that the journal says the bay went through."""
+        return [record["to"] for record in self.journal(bay, "transition")]
+
+
+def orchestrator(*args: str, env: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+    """Run one verb of the command line."""
+    return subprocess.run(
+        [sys.executable, "-m", "orchestrator", *args],
+        env={**os.environ, **(env or {})},
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        preexec_fn=die_with_parent,
+    )
+
+
+@contextmanager
+def whole_station(
+    directory: Path,
+    bays: int = 1,
+    *plant_args: str,
+    change: Callable[[Document], None] = lambda _: None,
+    buses: int = 1,
+) -> Iterator[tuple[PlantProcess, Service]]:
+    """A plant that runs and a service that is not started yet, on buses and ports of their own.
+
+    `change` may alter the station's document before it is written.
+    """
+    cans = [{**udp_keys(), "channel": f"239.74.163.{2 + number}"} for number in range(buses)]
+    document = station_document(directory, cans, bays)
+    change(document)
+    service = Service(directory, document)
+    can_args = [arg for keys in cans for arg in ("--can", json.dumps(keys))]
+    with PlantProcess(directory, "--bays", str(bays), *can_args, *plant_args) as plant:
+        try:
+            yield plant, service
+        finally:
+            service.close()

@@ -1,0 +1,111 @@
+"""How the service begins and ends: signals, a sudden death, chargers found running, files that cannot be used."""
+
+import signal
+from pathlib import Path
+
+import pytest
+
+from orchestrator.sim.client import PlantProcess
+from tests.waiting import wait_until
+from tests.whole.station import Document, Service, orchestrator, station_document, whole_station
+
+
+def charging(plant: PlantProcess, service: Service) -> None:
+    service.wait("CHARGING")
+    wait_until(lambda: plant.state()["current_a"] > 13, 10, "the current")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_stops_the_chargers_and_ends_well(tmp_path: Path, number: signal.Signals) -> None:
+    with whole_station(tmp_path) as (plant, service):
+        charging(plant, service.start())
+        service.signal(number)
+        assert service.ended() == 0
+        truth = plant.state()
+        assert (truth["operation"], truth["current_a"], truth["run"]) == (0, 0, False)
+        assert service.log().splitlines()[-1] == "ended: every charger stands by, verified"
+        assert not service.socket.exists()
+        assert service.path_of("bay-1")[-3:] == ["CHARGING", "STOPPING", "IDLE"]
+        assert service.journal("bay-1", "session")[-1]["event"] == "end"
+
+
+def test_a_charger_that_does_not_stop_makes_the_end_a_bad_one(tmp_path: Path) -> None:
+    with whole_station(tmp_path) as (plant, service):
+        charging(plant, service.start())
+        plant.inject("ignore_stop")
+        service.signal(signal.SIGTERM)
+        assert service.ended() == 1
+        assert service.log().splitlines()[-1] == "ended: NOT verified: bay-1"
+        assert plant.state()["stops"] > 5  # it went on trying, each 500 ms
+
+
+def test_a_charger_found_running_is_stopped_first_and_held(tmp_path: Path) -> None:
+    with whole_station(tmp_path) as (plant, service):
+        charging(plant, service.start())
+        service.signal(signal.SIGKILL)
+        service.ended()
+        assert plant.state()["operation"] == 1  # nobody stopped it: that is what a charger does
+        plant.inject("heal")  # wait anew for the first byte
+        service.start()
+        wait_until(lambda: plant.state()["operation"] == 0, what="the stop")
+        truth = plant.state()
+        assert truth["first_stop_s"] == truth["first_byte_s"]
+        bay = service.wait("IDLE")["bay-1"]
+        assert [fault["id"] for fault in bay["faults"]] == ["found_running"]
+        assert plant.state()["operation"] == 0
+        assert service.ask("start", "bay-1") == {"bay-1": ""}
+        service.wait("CHARGING")
+
+
+def test_a_charger_in_automatic_mode_is_stopped_and_resumed(tmp_path: Path) -> None:
+    def automatic(document: Document) -> None:
+        document["bays"][0]["charger"]["control"] = "automatic"
+
+    with whole_station(tmp_path, 1, "--automatic", change=automatic) as (plant, service):
+        charging(plant, service.start())
+        assert service.bay()["reason"] == "the charger charges by itself (automatic mode)"
+        assert service.cli("pause", "bay-1").returncode == 0
+        service.wait("SUSPENDED")
+        assert plant.state()["operation"] == 0
+        service.ask("start", "bay-1")
+        charging(plant, service)
+        plant.inject("over_temperature")
+        service.wait("SUSPENDED")
+        assert (plant.state()["operation"], plant.state()["orders"]) == (0, 0)
+        service.signal(signal.SIGTERM)
+        assert service.ended() == 0
+        assert plant.state()["operation"] == 0
+
+
+def broken_document(directory: Path) -> Document:
+    document = station_document(directory, [{"interface": "virtual", "channel": "none"}], 1)
+    document["bays"][0]["limits"]["voltage_v"] = 1000
+    document["bays"][0]["battery"]["node_id"] = 0
+    return document
+
+
+def test_a_station_file_with_errors_does_not_run(tmp_path: Path) -> None:
+    service = Service(tmp_path, broken_document(tmp_path))
+    done = orchestrator("run", str(service.file))
+    assert (done.returncode, done.stdout) == (1, "")
+    findings = done.stderr.splitlines()
+    assert len(findings) == 2
+    assert all(finding.startswith(f"{service.file}:") and ": error: bays[0]." in finding for finding in findings)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_policy_with_errors_does_not_run(tmp_path: Path) -> None:
+    policy = tmp_path / "mine.yaml"
+    policy.write_text("policy: mine\npack: {cells_in_series: 13}\n", encoding="utf-8")
+    document = station_document(tmp_path, [{"interface": "virtual", "channel": "none"}], 1)
+    document["bays"][0]["policy"] = "./mine.yaml"
+    done = orchestrator("run", str(Service(tmp_path, document).file))
+    assert done.returncode == 1
+    assert "mine.yaml:" in done.stderr
+    assert "error: " in done.stderr
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    done = orchestrator("run", str(tmp_path / "none.yaml"))
+    assert done.returncode == 1
+    assert "none.yaml" in done.stderr

@@ -1,0 +1,132 @@
+"""Every fault that the emulated station can have, each in a bay of its own, all at once in one running service."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+
+from orchestrator.sim.client import PlantProcess
+from orchestrator.sim.faults import FAULTS
+from tests.waiting import wait_until
+from tests.whole.station import Service, whole_station
+
+#: What must be cut off at once, with a poll, a sweep and a busy machine in between.
+AT_ONCE_S = 2.0
+#: What is noticed by silence (DESIGN §6: 2 s), on a busy machine.
+SILENCE_S = 3.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A fault, where its bay ends, the fault that the journal must name, and how soon the charger must see a stop."""
+
+    name: str
+    state: str
+    fault: str
+    stop_s: float | None = AT_ONCE_S  #: None: no stop can come through, or none is due
+    before: str = "charging"  #: what the bay does when it happens: charging, stopped or precharge
+    instead: str = ""  #: another fault that may be noticed first
+
+
+CASES = (
+    Case("bmu_reboot", "SUSPENDED", "bmu_rebooted"),  # goes on after 20 s, so it is looked at first
+    Case("reverse_polarity", "TRIPPED", "reverse_polarity"),
+    Case("error_stop", "TRIPPED", "error_stop"),
+    Case("system_stop", "IDLE", "system_stop"),
+    Case("charger_silent", "UNCONTROLLABLE", "charger_silent", SILENCE_S),
+    Case("charger_cut_off", "UNCONTROLLABLE", "charger_silent", None),
+    Case("charger_error_frames", "UNCONTROLLABLE", "charger_silent", None),
+    Case("bmu_silent", "OFFLINE", "heartbeat_lost", SILENCE_S),
+    Case("sdo_abort", "TRIPPED", "sdo_refused"),
+    Case("wrong_size", "TRIPPED", "temperature_invalid"),
+    Case("implausible_soc", "IDLE", "implausible"),
+    Case("stale_reading", "OFFLINE", "bmu_silent", SILENCE_S, instead="stale_reading"),
+    Case("temperature_jump", "TRIPPED", "temperature_invalid"),
+    Case("over_temperature", "SUSPENDED", "over_temperature", 10.0),
+    Case("under_temperature", "SUSPENDED", "under_temperature", 10.0),
+    Case("over_voltage", "TRIPPED", "over_voltage"),
+    Case("over_current", "TRIPPED", "over_current"),
+    Case("volts_disagree", "TRIPPED", "volts_disagree", 3 + AT_ONCE_S),
+    Case("amps_disagree", "TRIPPED", "amps_disagree", 5 + AT_ONCE_S),
+    Case("status_bits", "TRIPPED", "status_trip"),
+    Case("emergency", "IDLE", "emergency"),
+    Case("rogue_run", "TRIPPED", "rogue_run", 2 + AT_ONCE_S, before="stopped"),
+    Case("command_ignored", "TRIPPED", "setting_not_obeyed", 5 + AT_ONCE_S),
+    Case("precharge_no_rise", "TRIPPED", "precharge_no_rise", 10.0, before="precharge"),
+    Case("ignore_stop", "UNCONTROLLABLE", "will_not_stop"),
+    Case("illegal_value", "SUSPENDED", "illegal_value"),
+    Case("mode_taken_over", "IDLE", "mode_taken_over"),
+    Case("battery_removed", "IDLE", "heartbeat_lost", SILENCE_S),
+    Case("port_gone", "UNCONTROLLABLE", "charger_silent", None),
+)
+BAYS = {case.name: number for number, case in enumerate(CASES, 1)}
+#: In these the charger goes on, whatever we do: that is what the alarm is for.
+GOES_ON = {"charger_cut_off", "charger_error_frames", "ignore_stop", "port_gone"}
+#: This one shows only when somebody stops the bay.
+STOPPED_BY = "stopped by the operator; start to go on"
+
+
+def steady(plant: PlantProcess) -> bool:
+    bays = plant.ask({"query": "state"})["bays"]
+    return all(bays[BAYS[case.name] - 1]["current_a"] > 13 for case in CASES if case.before != "precharge")
+
+
+def bay_of(case: Case) -> str:
+    return f"bay-{BAYS[case.name]}"
+
+
+@pytest.fixture(name="station", scope="module")
+def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PlantProcess, Service]]:
+    """Every bay in the middle of a charge, one more than there are faults; then everything happens at once."""
+    directory = tmp_path_factory.mktemp("faults")
+    with whole_station(directory, len(CASES) + 1, "--line", "perfect", buses=2) as (plant, service):
+        for case in CASES:
+            if case.before == "precharge":
+                plant.set(BAYS[case.name], soc_pct=-60)
+        service.start()
+        for before, state in (("precharge", "PRECHARGE_PULSE"), ("charging", "CHARGING"), ("stopped", "CHARGING")):
+            service.wait(state, [bay_of(case) for case in CASES if case.before == before], 30)
+        wait_until(lambda: steady(plant), what="a steady charge everywhere")
+        stopped = [bay_of(case) for case in CASES if case.before == "stopped"]
+        service.ask("stop", *stopped)
+        service.wait("IDLE", stopped)
+        for case in CASES:
+            plant.inject(case.name, BAYS[case.name])
+            if case.name == "ignore_stop":
+                service.ask("stop", bay_of(case))
+        yield plant, service
+
+
+def named(service: Service, case: Case) -> bool:
+    """The journal has the fault, and as the reason of the stop."""
+    bay = bay_of(case)
+    texts = {line["text"]: line["id"] for line in service.journal(bay, "fault") if line["event"] == "raised"}
+    stops = [line["reason"] for line in service.journal(bay, "transition") if line["to"] == "STOPPING"]
+    if case.name == "ignore_stop":
+        return case.fault in texts.values() and stops[-1] == STOPPED_BY
+    return bool(stops) and texts.get(stops[-1]) in (case.fault, case.instead)
+
+
+def test_every_fault_is_tried() -> None:
+    # A sensor that goes on saying the temperature of now cannot be told from a pack that keeps it.
+    assert {case.name for case in CASES} == set(FAULTS) - {"heal", "frozen_temperature"}
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_a_fault_ends_where_it_should(station: tuple[PlantProcess, Service], case: Case) -> None:
+    plant, service = station
+    bay = bay_of(case)
+    status = service.wait(case.state, [bay], 30)[bay]
+    truth = plant.state(BAYS[case.name])
+    assert truth["operation"] == (case.name in GOES_ON)
+    assert truth["current_a"] == 0 or case.name in GOES_ON
+    if case.stop_s is not None:
+        assert truth["first_stop_s"] - truth["injected_s"] < case.stop_s
+    assert status["alarm"] == (case.state == "UNCONTROLLABLE")
+    wait_until(lambda: named(service, case), what=f"{case.fault} as the cause, in the journal")
+
+
+def test_the_bay_beside_them_charges_on(station: tuple[PlantProcess, Service]) -> None:
+    plant, service = station
+    assert service.path_of(f"bay-{len(CASES) + 1}")[-1] == "CHARGING"
+    assert plant.state(len(CASES) + 1)["current_a"] > 13

@@ -1,0 +1,210 @@
+"""What an operator does with the real command line, and with the plugs."""
+
+import json
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from orchestrator.sim.client import PlantProcess
+from tests.waiting import wait_until
+from tests.whole.station import Document, Service, orchestrator, whole_station
+
+Station = tuple[PlantProcess, Service]
+
+
+def one_automatic(document: Document) -> None:
+    """The third bay's charger is said to be in automatic mode; the fourth one's port does not exist."""
+    document["bays"][2]["charger"]["control"] = "automatic"
+    document["bays"][3]["charger"]["port"] += "-missing"
+
+
+@pytest.fixture(name="station", scope="module")
+def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    with whole_station(tmp_path_factory.mktemp("operator"), 4, change=one_automatic) as (plant, service):
+        service.start().wait("CHARGING", ["bay-1", "bay-2"])
+        yield plant, service
+
+
+def charging(station: Station, bay: int = 1) -> None:
+    """Bring a bay to where most of these tests begin, and wait until its current is up."""
+    plant, service = station
+    service.ask("start", f"bay-{bay}")
+    service.wait("CHARGING", [f"bay-{bay}"])
+    wait_until(lambda: plant.state(bay)["current_a"] > 13, 10, "the current")
+
+
+def test_two_bays_share_a_bus(station: Station) -> None:
+    charging(station, 1)
+    charging(station, 2)
+
+
+def test_status_shows_every_bay_and_why(station: Station) -> None:
+    charging(station)
+    _, service = station
+    table = service.cli("status")
+    assert table.returncode == 0
+    assert table.stdout.splitlines()[0].split() == ["BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY"]
+    assert "bay-1" in table.stdout
+    assert "4 (14 A)  step 4 (14.0 A): the highest step, nothing limits it" in table.stdout
+    one = service.cli("status", "bay-2", "--json")
+    document = json.loads(one.stdout)
+    assert document["station"] == "whole"
+    assert [bay["name"] for bay in document["bays"]] == ["bay-2"]
+    assert document["bays"][0]["charger"]["online"] is True
+    assert document["journal"] == {"problem": ""}
+
+
+def test_pause_and_start(station: Station) -> None:
+    charging(station)
+    plant, service = station
+    done = service.cli("pause", "bay-1")
+    assert (done.returncode, done.stdout) == (0, "bay-1: pause accepted\n")
+    service.wait("SUSPENDED")
+    assert plant.state()["operation"] == 0
+    assert service.bay("bay-2")["state"] == "CHARGING"
+    assert service.cli("start", "bay-1").returncode == 0
+    service.wait("CHARGING")
+
+
+def test_a_pause_does_not_end_the_session_and_a_stop_does(station: Station) -> None:
+    charging(station)
+    _, service = station
+    before = len(service.journal("bay-1", "session"))
+    service.ask("pause", "bay-1")
+    service.wait("SUSPENDED")
+    charging(station)
+    service.ask("stop", "bay-1")
+    service.wait("IDLE")
+    wait_until(lambda: len(service.journal("bay-1", "session")) > before, what="the journal")
+    (end,) = service.journal("bay-1", "session")[before:]
+    assert (end["event"], end["result"]) == ("end", "stopped by the operator; start to go on")
+
+
+def test_stop_holds_until_start(station: Station) -> None:
+    charging(station)
+    plant, service = station
+    assert service.cli("stop", "--all").returncode == 0
+    service.wait("IDLE", ["bay-1", "bay-2"])
+    assert (plant.state(1)["operation"], plant.state(2)["operation"]) == (0, 0)
+    refused = service.cli("pause", "bay-1", "bay-2")
+    assert refused.returncode == 1
+    assert refused.stderr == "".join(
+        f"bay-{number}: not running: stopped by the operator; start to go on\n" for number in (1, 2)
+    )
+    assert service.bay()["reason"] == "stopped by the operator; start to go on"
+    charging(station)
+
+
+def test_a_trip_is_refused_a_start_and_reset_only_when_its_cause_is_gone(station: Station) -> None:
+    charging(station, 2)
+    plant, service = station
+    plant.inject("status_bits", 2)
+    service.wait("TRIPPED", ["bay-2"])
+    start = service.cli("start", "bay-2")
+    assert start.returncode == 1
+    assert "status_trip is latched and needs a reset: the BMU reports bmu error" in start.stderr
+    reset = service.cli("reset", "bay-2")
+    assert reset.returncode == 1
+    assert "status_trip is still there" in reset.stderr
+    plant.inject("heal", 2)
+    wait_until(lambda: not service.ask("reset", "bay-2")["bay-2"], what="a reset that is accepted")
+    service.wait("IDLE", ["bay-2"])
+    wait_until(lambda: service.bay("bay-2")["reason"] == "reset by the operator; start to go on", what="the hold")
+    assert plant.state(2)["operation"] == 0
+    charging(station, 2)
+
+
+def test_wrong_use_is_told(station: Station) -> None:
+    _, service = station
+    nobody = service.cli("start", "bay-9")
+    assert nobody.returncode == 1
+    assert nobody.stderr == "orchestrator: no bay 'bay-9' here: bay-1, bay-2, bay-3, bay-4\n"
+    assert service.cli("status", "bay-9").returncode == 1
+    assert service.cli("start").returncode == 2
+    assert service.cli("start", "bay-1", "--all").returncode == 2
+    assert service.cli("explode").returncode == 2
+    nowhere = orchestrator("status", "--socket", str(service.directory / "no.sock"))
+    assert nowhere.returncode == 1
+    assert "no service answers on" in nowhere.stderr
+    assert orchestrator("status", env={"ORCHESTRATOR_SOCKET": ""}).returncode == 1
+
+
+def test_a_charger_that_is_not_there_is_offline(station: Station) -> None:
+    _, service = station
+    bay = service.wait("OFFLINE", ["bay-4"])["bay-4"]
+    assert "no such port" in bay["reason"]
+    assert bay["charger"]["online"] is False
+    assert bay["battery"]["online"] is True
+
+
+def test_a_charger_in_another_mode_than_the_file_says_is_not_used(station: Station) -> None:
+    _, service = station
+    bay = service.wait("IDLE", ["bay-3"])["bay-3"]
+    assert [fault["id"] for fault in bay["faults"]] == ["mode_taken_over"]
+
+
+def test_a_second_service_is_refused(station: Station) -> None:
+    _, service = station
+    second = orchestrator("run", str(service.file))
+    assert second.returncode == 1
+    assert second.stderr.startswith(f"orchestrator: another service answers on {service.socket}")
+    assert service.bay("bay-2")["charger"]["online"] is True
+
+
+def test_a_second_service_cannot_take_the_ports(station: Station, tmp_path: Path) -> None:
+    charging(station)
+    plant, service = station
+    thief = Service(tmp_path, json.loads(service.file.read_text()))
+    try:
+        bay = thief.start().wait("OFFLINE")["bay-1"]
+        assert "in use: another program holds it" in bay["reason"]
+        assert plant.state()["operation"] == 1
+    finally:
+        thief.close()
+
+
+def test_probe_is_refused_while_the_service_runs(station: Station) -> None:
+    _, service = station
+    refused = orchestrator("probe", str(service.file))
+    assert refused.returncode == 1
+    assert refused.stderr.startswith("orchestrator: a service is running this station")
+
+
+def test_an_adapter_that_is_unplugged_and_plugged_in_again(station: Station) -> None:
+    charging(station)
+    plant, service = station
+    plant.inject("port_gone")
+    bay = service.wait("UNCONTROLLABLE")["bay-1"]
+    assert bay["alarm"] is True
+    assert "no such port" in bay["reason"]
+    plant.inject("heal")
+    service.wait("SUSPENDED")
+    truth = plant.state()
+    assert (truth["operation"], truth["resting"]) == (0, True)
+    assert truth["first_stop_s"] == truth["first_byte_s"]  # the first that came over the new line was a stop
+    service.wait("CHARGING", timeout_s=40)  # by itself, after the backoff
+
+
+def test_a_battery_that_leaves_and_another_that_comes(station: Station) -> None:
+    charging(station)
+    plant, service = station
+    plant.inject("battery_removed")
+    assert service.wait("IDLE")["bay-1"]["reason"] == "no battery"
+    plant.set(soc_pct=99)
+    plant.inject("heal")
+    wait_until(lambda: "SOC 99 % is not below 98 %" in service.bay()["reason"], 10, "the fuller battery is left alone")
+    plant.set(soc_pct=40)
+    service.wait("CHARGING")
+
+
+def test_the_end_names_the_charger_that_nobody_could_verify(station: Station) -> None:
+    """The last one here."""
+    plant, service = station
+    service.signal(signal.SIGTERM)
+    assert service.ended() == 1
+    log = service.log().splitlines()
+    assert log[-1] == "ended: NOT verified: bay-4"
+    assert [plant.state(bay)["operation"] for bay in (1, 2, 3)] == [0, 0, 0]
+    assert all(line.startswith(("bay-", "whole: ", "SIGTERM: ", "ended: ")) for line in log)  # no traceback
