@@ -88,6 +88,12 @@ class Facts:
         return self.pack_v is None and self.temperature_c is None and self.status is None
 
     @property
+    def just_booted(self) -> bool:
+        """What the BMU said before counts no more, and it had no time to say anything new: that is no silence."""
+        boot_s = self.battery.boot_t_s
+        return boot_s is not None and self.now_s - boot_s < FAST_STALE_S
+
+    @property
     def departed(self) -> bool:
         """The battery has left, as batteries do: its BMU is silent and the charger sees no voltage."""
         return self.silent and not self.battery.online and self.volts is not None and self.volts < TERMINAL_V

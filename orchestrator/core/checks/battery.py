@@ -24,7 +24,7 @@ STATUS_LIMITS = (BatteryStatus.LOW_TEMPERATURE, BatteryStatus.DISCHARGE_OVER_CUR
 
 def bmu_silent(f: Facts) -> str | None:
     """FAULTS B1."""
-    if not f.silent:
+    if not f.silent or f.just_booted:
         return None
     return f.battery.problem or f"the BMU (node {f.rules.bay.battery.node_id}) has stopped answering"
 
