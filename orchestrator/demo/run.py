@@ -6,7 +6,7 @@ import time
 
 from orchestrator.demo.screen import Lines, Picture, Screen
 from orchestrator.demo.stage import Stage
-from orchestrator.demo.story import Story
+from orchestrator.demo.story import SHOWN_BY_A_STOP, Story
 from orchestrator.errors import OrchestratorError
 from orchestrator.sim.faults import FAULTS
 
@@ -61,6 +61,8 @@ def _watch(stage: Stage, story: Story, screen: Screen) -> None:
             if story.inject_now(t_s) and story.fault:
                 stage.plant.inject(story.fault)
                 story.injected(t_s, FAULTS[story.fault].about)
+                if story.fault in SHOWN_BY_A_STOP:
+                    stage.stop()
             screen.show(t_s, bay, story)
         time.sleep(LOOK_EVERY_S)
 

@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
-from typing import Protocol, cast
+from typing import TYPE_CHECKING, Protocol, cast
 
 from orchestrator.demo.story import Story
 from orchestrator.show import figure
+
+if TYPE_CHECKING:
+    from rich.panel import Panel
 
 #: The events that the picture has room for.
 ROOM = 12
@@ -73,24 +76,28 @@ class Picture:
 
     def show(self, t_s: float, bay: Mapping[str, object], story: Story) -> None:
         """Redraw."""
-        from rich.console import Group
-        from rich.panel import Panel
-        from rich.progress_bar import ProgressBar
-        from rich.table import Table
-        from rich.text import Text
+        self._live.update(picture(t_s, bay, story), refresh=True)
 
-        values = Table.grid(padding=(0, 3))
-        values.add_row(*(Text(name, style="dim") for name, _ in figures(bay)))
-        values.add_row(*(Text(value, style="bold") for _, value in figures(bay)))
-        battery = cast("Mapping[str, object]", bay["battery"])
-        soc = battery["soc_pct"]
-        bar = ProgressBar(total=100, completed=float(soc) if isinstance(soc, int | float) else 0.0, width=60)
-        past = Table.grid(padding=(0, 2))
-        for at_s, what, why in story.events[-ROOM:]:
-            past.add_row(Text(f"{at_s:5.1f} s", style="dim"), Text(what, style=_style(what)), Text(why))
-        why_now = Text(str(bay["reason"]))
-        title = f"charging-station orchestrator: demo, {t_s:.0f} s"
-        self._live.update(Panel(Group(values, bar, Text(), why_now, Text(), past), title=title), refresh=True)
+
+def picture(t_s: float, bay: Mapping[str, object], story: Story) -> "Panel":
+    """One moment of the demo: the figures, how full, why, and what has happened so far."""
+    from rich.console import Group
+    from rich.panel import Panel
+    from rich.progress_bar import ProgressBar
+    from rich.table import Table
+    from rich.text import Text
+
+    values = Table.grid(padding=(0, 3))
+    values.add_row(*(Text(name, style="dim") for name, _ in figures(bay)))
+    values.add_row(*(Text(value, style="bold") for _, value in figures(bay)))
+    battery = cast("Mapping[str, object]", bay["battery"])
+    soc = battery["soc_pct"]
+    bar = ProgressBar(total=100, completed=float(soc) if isinstance(soc, int | float) else 0.0, width=60)
+    past = Table.grid(padding=(0, 2))
+    for at_s, what, why in story.events[-ROOM:]:
+        past.add_row(Text(f"{at_s:5.1f} s", style="dim"), Text(what, style=_style(what)), Text(why))
+    title = f"charging-station orchestrator: demo, {t_s:.0f} s"
+    return Panel(Group(values, bar, Text(), Text(str(bay["reason"])), Text(), past), title=title)
 
 
 def _style(what: str) -> str:

@@ -58,6 +58,10 @@ class Stage:
             return None
         return cast("list[dict[str, object]]", document["bays"])[0]
 
+    def stop(self) -> None:
+        """What an operator's `orchestrator stop --all` does."""
+        ask(self.directory / "run" / "orchestrator.sock", {"verb": "stop", "bays": None})
+
     def end(self) -> int:
         """Let the service end as an operator would; its exit status."""
         if self.service.poll() is None:

@@ -6,6 +6,8 @@ from typing import cast
 
 #: Where a fault is injected and what is needed for it; the others in mid-charge.
 STAGES: Mapping[str, str] = {"precharge_no_rise": "PRECHARGE_PULSE", "rogue_run": "FULL"}
+#: Faults that show only when somebody stops the bay.
+SHOWN_BY_A_STOP = frozenset({"ignore_stop"})
 #: How long the stage has lasted when the fault comes.
 INJECT_AFTER_S = 4.0
 #: What the bay does after a fault is looked at for this long.
