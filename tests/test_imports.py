@@ -36,7 +36,7 @@ EDGES: dict[str, tuple[str, ...]] = {
         "config", "core", "demo", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service",
         "show", "sim",
     ),
-    "__main__": ("cli",),
+    "__main__": ("cli", "service.estop", "service.guardian"),
 }  # fmt: skip
 
 #: Third-party library → its owners; nobody else imports it, and nothing else is imported at all.
