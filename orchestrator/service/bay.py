@@ -1,6 +1,7 @@
 """One bay in the running service: its devices' newest views in, one decision out, carried out and written down."""
 
 import traceback
+from dataclasses import replace
 from threading import Event
 from time import time
 from typing import Protocol
@@ -23,6 +24,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.service.journal import Journal
+from orchestrator.service.kept import Kept
 from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.status import bay_status
 
@@ -61,12 +63,14 @@ class Asked:
 class BayRunner:
     """Runs `step()` for one bay. Used by the control loop's thread only, but for `ask` and `status`."""
 
-    def __init__(self, bay: Bay, charger: Charger, battery: Battery, journal: Journal) -> None:
+    def __init__(self, bay: Bay, charger: Charger, battery: Battery, journal: Journal, memory: Memory) -> None:
         self.name = bay.name
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
         self._rules = Rules.of(bay)
-        self._memory = Memory()
+        self._memory = memory
+        self._kept: Kept | None = None
+        self._ending = False
         self._charger, self._battery, self._journal = charger, battery, journal
         self._snapshot = Snapshot()
         self._recorder = SnapshotRecorder()
@@ -78,6 +82,11 @@ class BayRunner:
         """The charger stands by, by its own word, and nothing is ordered."""
         decision = self.decision
         return decision is not None and decision.state in VERIFIED and decision.command is None
+
+    def end(self) -> None:
+        """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it."""
+        self._ending = True
+        self.ask(Asked(Request.STOP))
 
     def ask(self, asked: Asked) -> None:
         """Hand in an operator's request; it is answered by the next step."""
@@ -112,6 +121,15 @@ class BayRunner:
         line = self._recorder.line(snapshot, memory, before, decision)
         if line is not None:
             self._journal.put(self.name, line)
+        self._keep()
+
+    def _keep(self) -> None:
+        kept = Kept.of(self._memory)
+        if self._ending and self._kept is not None:
+            kept = replace(kept, hold=self._kept.hold)
+        if kept != self._kept:
+            self._kept = kept
+            self._journal.keep(self.name, kept)
 
     def _write_down(self, before: Decision | None, decision: Decision) -> None:
         for line in decision_lines(before, decision):

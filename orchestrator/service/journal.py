@@ -1,7 +1,8 @@
 """The journal: JSON Lines on disk, rotated and bounded. A disk that is full or gone never stops a charge, nor a stop.
 
 Two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and `snapshots`, far more
-of it, for a replay; each has its own share of the space, so that snapshots never push the reasons out.
+of it, for a replay; each has its own share of the space, so that snapshots never push the reasons out. Beside them lies
+what the next run must know (`kept.py`).
 """
 
 import json
@@ -14,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
+from orchestrator.service.kept import Kept, write_kept
 from orchestrator.service.records import Line
 
 #: Of the allowed space, what the events may take, and into how many files each stream is divided.
@@ -64,6 +66,9 @@ class Journal:
 
     def __init__(self, directory: Path, max_mb: float, clock: Callable[[], float], wall: Callable[[], float]) -> None:
         self._clock, self._wall = clock, wall
+        self._directory = directory
+        self._kept: dict[str, Kept] = {}
+        self._kept_changed = False
         total = int(max_mb * 1_000_000)
         self._files = {
             False: RotatingFile(directory, "events", int(total * EVENTS_SHARE)),
@@ -86,6 +91,11 @@ class Journal:
         if len(self._waiting) == BACKLOG:
             self.lost += 1
         self._waiting.append((self._clock(), self._wall(), bay, line))
+
+    def keep(self, bay: str, kept: Kept) -> None:
+        """What the next run must know of a bay, from now on."""
+        self._kept = {**self._kept, bay: kept}
+        self._kept_changed = True
 
     def say(self, text: str) -> None:
         """A line for people, on standard error."""
@@ -112,6 +122,7 @@ class Journal:
             print(text, file=sys.stderr, flush=True)  # noqa: T201 - what people read
         entries = list(_drained(self._waiting))
         try:
+            self._write_kept()
             for is_snapshot, file in self._files.items():
                 lines = [_text(entry) for entry in entries if (entry[3][0] == "snapshot") is is_snapshot]
                 if lines:
@@ -120,6 +131,15 @@ class Journal:
         except OSError as error:
             self.lost += len(entries)
             self._settle(f"the journal cannot be written: {error.strerror}: {error.filename}")
+
+    def _write_kept(self) -> None:
+        if self._kept_changed:
+            self._kept_changed = False  # before it is read: a change from now on is written the next time
+            try:
+                write_kept(self._directory, self._kept)
+            except OSError:
+                self._kept_changed = True
+                raise
 
     def _settle(self, problem: str) -> None:
         if problem != self.problem:

@@ -25,6 +25,7 @@ from orchestrator.service.bay import Asked, BayRunner
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardedLine, GuardianLink
 from orchestrator.service.journal import Journal
+from orchestrator.service.kept import read_kept
 from orchestrator.service.status import station_status
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
@@ -59,13 +60,14 @@ class Supervisor:
             for name, settings in self._station.can.items()
         }
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
+        kept = read_kept(self._station.journal.directory, [bay.name for bay in self._station.bays])
         for number, bay in enumerate(self._station.bays):
             poke: Callable[[], None] = partial(self._wake.put, number)
             port = _charger_port(bay, poke, self._guardian)
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             self._ports.append(port)
-            self._bays.append(BayRunner(bay, port, node, self._journal))
+            self._bays.append(BayRunner(bay, port, node, self._journal, kept[bay.name].memory(monotonic())))
         self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
 
     @property
@@ -124,7 +126,7 @@ class Supervisor:
     def _end(self) -> int:
         """Stop every bay, wait until each charger is verified, close everything."""
         for bay in self._bays:
-            bay.ask(Asked(Request.STOP))
+            bay.end()
         end_s = monotonic() + STOP_S
         for bay in self._bays:
             bay.run(monotonic())

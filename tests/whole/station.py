@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self, cast
 
@@ -75,6 +75,7 @@ class Service:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
+                start_new_session=True,
                 preexec_fn=die_with_parent,
             )
         wait_until(self._answers, START_S, "the service's first answer")
@@ -89,8 +90,21 @@ class Service:
             return False
 
     def signal(self, number: signal.Signals) -> None:
+        """To the process that was started: the guardian."""
         assert self._process is not None
         self._process.send_signal(number)
+
+    def kill_controller(self) -> None:
+        assert self._process is not None
+        children = Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split()
+        os.kill(int(children[0]), signal.SIGKILL)
+
+    def kill_all(self) -> None:
+        """Guardian and controller at one moment, as a power failure does."""
+        assert self._process is not None
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
 
     def ended(self) -> int:
         """Wait for its end; the exit status."""
@@ -98,9 +112,8 @@ class Service:
         return self._process.wait(END_S)
 
     def close(self) -> None:
-        if self._process is not None and self._process.poll() is None:
-            self._process.kill()
-            self._process.wait()
+        if self._process is not None:
+            self.kill_all()
 
     # --- asking it ---
 

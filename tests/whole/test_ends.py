@@ -1,5 +1,6 @@
 """How the service begins and ends: signals, a sudden death, chargers found running, files that cannot be used."""
 
+import json
 import signal
 from pathlib import Path
 
@@ -39,22 +40,67 @@ def test_a_charger_that_does_not_stop_makes_the_end_a_bad_one(tmp_path: Path) ->
         assert plant.state()["stops"] > 5  # it went on trying, each 500 ms
 
 
-def test_a_charger_found_running_is_stopped_first_and_held(tmp_path: Path) -> None:
+def test_a_charger_that_was_left_running_is_stopped_first_and_held(tmp_path: Path) -> None:
     with whole_station(tmp_path) as (plant, service):
         charging(plant, service.start())
-        service.signal(signal.SIGKILL)
-        service.ended()
+        wait_until(lambda: kept(service)["running"], what="what is kept")
+        service.kill_all()
         assert plant.state()["operation"] == 1  # nobody stopped it: that is what a charger does
         plant.inject("heal")  # wait anew for the first byte
         service.start()
         wait_until(lambda: plant.state()["operation"] == 0, what="the stop")
         truth = plant.state()
         assert truth["first_stop_s"] == truth["first_byte_s"]
-        bay = service.wait("IDLE")["bay-1"]
-        assert [fault["id"] for fault in bay["faults"]] == ["found_running"]
-        assert plant.state()["operation"] == 0
+        held(plant, service)
         assert service.ask("start", "bay-1") == {"bay-1": ""}
-        service.wait("CHARGING")
+        charging(plant, service)
+
+
+def test_a_controller_that_died_is_not_started_into_a_charge(tmp_path: Path) -> None:
+    with whole_station(tmp_path) as (plant, service):
+        charging(plant, service.start())
+        wait_until(lambda: kept(service)["running"], what="what is kept")
+        service.kill_controller()
+        assert service.ended() != 0
+        assert plant.state()["operation"] == 0
+        service.start()
+        held(plant, service)
+
+
+def held(plant: PlantProcess, service: Service) -> None:
+    bay = service.wait("IDLE")["bay-1"]
+    assert [fault["id"] for fault in bay["faults"]] == ["found_running"]
+    assert "the last run of this service ended in mid-charge" in bay["reason"]
+    assert plant.state()["operation"] == 0
+
+
+def kept(service: Service) -> Document:
+    path = service.directory / "run" / "journal" / "kept.json"
+    document: Document = (
+        json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"bay-1": {"running": False}}
+    )
+    record: Document = document["bay-1"]
+    return record
+
+
+def test_a_restart_is_neither_a_reset_nor_a_start(tmp_path: Path) -> None:
+    with whole_station(tmp_path, 3) as (plant, service):
+        service.start().wait("CHARGING", ["bay-1", "bay-2", "bay-3"])
+        plant.inject("status_bits", 1)
+        service.ask("stop", "bay-2")
+        service.wait("TRIPPED", ["bay-1"])
+        service.wait("IDLE", ["bay-2"])
+        plant.inject("heal", 1)
+        service.signal(signal.SIGTERM)
+        assert service.ended() == 0
+        service.start().wait("TRIPPED", ["bay-1"])
+        bay = service.bay("bay-1")
+        assert "the BMU reports bmu error" in bay["reason"]
+        assert service.wait("IDLE", ["bay-2"])["bay-2"]["reason"] == "stopped by the operator; start to go on"
+        service.wait("CHARGING", ["bay-3"])  # its stop was the service's own
+        wait_until(lambda: not service.ask("reset", "bay-1")["bay-1"], what="a reset that is accepted")
+        service.ask("start", "bay-1", "bay-2")
+        service.wait("CHARGING", ["bay-1", "bay-2"])
 
 
 def test_a_charger_in_automatic_mode_is_stopped_and_resumed(tmp_path: Path) -> None:
