@@ -5,6 +5,9 @@ from orchestrator.model import ChargeMode, Connection, ErrorBit
 
 #: An error frame is news for this long.
 ERROR_FRAME_S = 5.0
+#: It does not know what we say, or it did not hear it well. (Here, since joining flags takes long.)
+NOT_KNOWN = ErrorBit.COMMAND | ErrorBit.ORDER
+NOT_HEARD = ErrorBit.LENGTH | ErrorBit.CHECKSUM
 
 
 def reverse_polarity(f: Facts) -> str | None:
@@ -48,12 +51,12 @@ def mode_taken_over(f: Facts) -> str | None:
 
 def rejected_frame(f: Facts) -> str | None:
     """FAULTS C22."""
-    return _error_frame(f, ErrorBit.COMMAND | ErrorBit.ORDER)
+    return _error_frame(f, NOT_KNOWN)
 
 
 def noisy_line(f: Facts) -> str | None:
     """FAULTS C21."""
-    return _error_frame(f, ErrorBit.LENGTH | ErrorBit.CHECKSUM)
+    return _error_frame(f, NOT_HEARD)
 
 
 def _error_frame(f: Facts, bits: ErrorBit) -> str | None:
