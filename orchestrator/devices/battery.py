@@ -109,7 +109,6 @@ class BatteryNode:
         """The bus, or our own code, failed: what was asked is lost, and the reason is shown until an answer comes."""
         self._client.drop()
         self._slot_s = None
-        self._answer_s = -inf
         self._not_before_s = self.next_due_s = now_s + SILENT_S
         self._view.set(online=False, problem=problem)
         self._publish()
@@ -181,8 +180,7 @@ class BatteryNode:
     def _accept(self, reply: SdoValue | SdoWritten | SdoAbort, now_s: float) -> None:
         self._answer_s = now_s
         self._not_before_s = -inf
-        if not self._health.problem:
-            self._view.set(online=True, problem="")
+        self._view.set(online=True, problem="")
         if self._client.writing:
             self._configured(now_s, written=isinstance(reply, SdoWritten))
             return

@@ -9,6 +9,9 @@ import errno
 import logging
 from collections import deque
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
+from io import IOBase
+from socket import socket
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import LinkError, RefusedError
@@ -93,10 +96,9 @@ class CanBus:
         """Shut the bus down. Never raises: a bus that broke cannot be closed in any better way."""
         bus, self._bus, self._network = self._bus, None, None
         if bus is not None:
-            try:
+            with suppress(Exception):
                 bus.shutdown()
-            except Exception as error:  # noqa: BLE001 - see above
-                logging.getLogger(__name__).debug("closing %s: %s", self.name, error)
+            _close_files(bus)
 
     def nmt(self, node_id: int, command: NmtCommand) -> None:
         """Ask a node to start, stop or reset. From any thread; it is sent in the bus thread's next turn.
@@ -220,6 +222,14 @@ def _send_nmt(network: "canopen.Network", node_id: int, command: NmtCommand) -> 
 def _without_time(callback: FrameCallback) -> Callable[[int, bytearray, float], None]:
     """The frame's own time stamp is the wall clock's; ours is monotonic and taken by who reads the frame."""
     return lambda cob_id, data, _timestamp: callback(cob_id, bytes(data))
+
+
+def _close_files(bus: "can.BusABC") -> None:
+    """What a driver left open because its own shutdown failed: an adapter's name is not free again before."""
+    for part in vars(bus).values():
+        if isinstance(part, IOBase | socket):
+            with suppress(OSError):
+                part.close()
 
 
 def _is_queue_full(error: Exception) -> bool:

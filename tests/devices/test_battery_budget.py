@@ -61,6 +61,7 @@ class Station:
         budget = BusBudget(bitrate)
         self.nodes = [BatteryNode("can0", config(node_id=1 + i), budget, lambda: None) for i in range(nodes)]
         self.exchanges: Counter[int] = Counter()
+        self.sent_s: list[float] = []
         self.now_s = 0.0
 
     def run(self, until_s: float, latency_s: float = 0.001) -> None:
@@ -69,6 +70,7 @@ class Station:
         def send(cob_id: int, data: bytes) -> None:
             node = cob_id - 0x600
             self.exchanges[node] += 1
+            self.sent_s.append(self.now_s)
             word = WORDS[data[1] | data[2] << 8].to_bytes(4, "little")
             heappush(answers, (self.now_s + latency_s, node, b"\x43" + data[1:4] + word))
 
@@ -98,6 +100,13 @@ def test_a_station_stays_below_the_share_and_every_value_young(nodes: int, bitra
         assert reading.soc_pct is not None
         assert station.now_s - reading.voltage_v.t_s < 1.5
         assert station.now_s - reading.soc_pct.t_s < 1.5
+
+
+def test_all_at_once_at_the_start_are_spaced() -> None:
+    station = Station(64, 250_000)
+    station.run(1.0)
+    assert len(station.sent_s) > 200
+    assert all(sent_s >= (i - BURST) * 270 / 75_000 for i, sent_s in enumerate(station.sent_s))
 
 
 def test_silent_nodes_cost_the_others_next_to_nothing() -> None:

@@ -1,11 +1,13 @@
 """The dialogue with one BMU, frame by frame, time jumping."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
 from orchestrator.model import BatteryReading, Measurement
-from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, REQUEST, RX, TX, WORDS, Bench, Dialogue, config
+from orchestrator.protocol.objects import ObjectMap
+from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, REQUEST, RX, TABOS, TX, WORDS, Bench, Dialogue, config
 
 #: protocol/bmu.md, "Golden exchanges"; a whole first round with the sample of §4.1 in it.
 FIRST_ROUND: Dialogue = [
@@ -234,6 +236,30 @@ def test_a_node_that_always_answers_too_late_is_offline_and_told_why() -> None:
     assert bench.link.bad_frames > 3
 
 
+def two_objects() -> ObjectMap:
+    """Only volts and amps, fast, and the percentages, slow."""
+    return replace(TABOS, objects=(TABOS.objects[0], TABOS.objects[2]), tpdos=())
+
+
+def test_when_all_two_objects_are_unanswered_there_is_a_pause() -> None:
+    bench = Bench(config(object_map=two_objects()))
+    times = [0.0] * 10
+    for i in range(10):
+        bench.next_frame()
+        times[i] = bench.now_s
+    gaps = [later - earlier for earlier, later in pairwise(times)]
+    assert gaps[0::2] == pytest.approx([0.5] * 5)
+    assert gaps[1::2] == pytest.approx([1.3] * 4)  # the time-out and a second of quiet
+
+
+def test_a_single_fast_object_is_read_each_sweep_with_another_one_in_between() -> None:
+    bench = Bench(config(object_map=two_objects()))
+    bench.answer_reads(5.0, WORDS)
+    asked = [data[1] for _, data in bench.sent]
+    assert asked.count(0) > 80
+    assert not any(earlier == later for earlier, later in pairwise(asked))
+
+
 def test_when_nothing_is_answered_an_object_is_asked_again_only_after_quiet() -> None:
     bench = Bench()
     times: dict[int, list[float]] = {}
@@ -319,16 +345,17 @@ def test_a_refused_heartbeat_is_no_fault_and_not_asked_for_again() -> None:
 def test_an_unanswered_heartbeat_write_is_tried_again() -> None:
     bench = Bench(config(heartbeat_s=0.5))
     bench.play(FIRST_ROUND[:2])  # type: ignore[index]  # it is a list
-    bench.play([(TX, REQUEST, HEARTBEAT_WRITE)])
-    bench.run(0.35)
-    bench.play([(RX, REPLY, "43 01 60 00 FF FF 05 00")])
-    for _ in range(60):
+    writes: list[float] = []
+    while len(writes) < 3:
         _, data = bench.next_frame()
         if data[0] == 0x2B:
-            break
-        bench.now_s += 0.02
-        bench.hear(REPLY, f"43 {data[1:4].hex()} 00 00 00 00")
-    assert data.hex(" ").upper() == HEARTBEAT_WRITE
+            assert data.hex(" ").upper() == HEARTBEAT_WRITE
+            writes.append(bench.now_s)
+        else:
+            bench.now_s += 0.001
+            bench.hear(REPLY, f"43 {data[1:4].hex()} 00 00 00 00")
+    assert all(1.0 <= later - earlier < 1.4 for earlier, later in pairwise(writes))
+    assert bench.link.heartbeat_s is None
 
 
 def test_heartbeats_that_stop_stay_lost_though_they_are_asked_for_again() -> None:
@@ -414,6 +441,15 @@ def test_the_bus_that_breaks_takes_the_node_offline_with_its_reason() -> None:
     assert bench.run(0.4) == []
     bench.answer_reads(1.0, WORDS)
     assert (bench.link.online, bench.link.problem) == (True, "")
+
+
+def test_an_answer_to_what_was_asked_before_a_failure_is_late() -> None:
+    bench = Bench()
+    bench.next_frame()
+    bench.node.fail("a bug", bench.now_s)
+    bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")
+    assert bench.reading == BatteryReading()
+    assert bench.link.problem == "a bug"
 
 
 def test_trouble_on_the_bus_is_the_reason_of_silence() -> None:

@@ -89,6 +89,8 @@ def test_foreign_frames_do_not_disturb(pair: Pair) -> None:
         bus.receive(1.0)
     assert heard == []
     assert bus.foreign == 3
+    assert bus._network is not None
+    assert bus._network.lss.responses.empty()
     other.send(message(0x590, ANSWER))
     bus.receive(1.0)
     assert heard == [(0x590, ANSWER)]
@@ -402,6 +404,17 @@ def test_an_adapter_that_is_unplugged_and_returns(adapter: Pty) -> None:
     os.write(adapter.master, b"t59084300600" + b"0F8FF4009\r")
     listen(bus, lambda: heard, "the answer")
     bus.close()
+
+
+def test_an_unplugged_adapter_leaves_no_file_open(adapter: Pty) -> None:
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    bus, _ = slcan(adapter)
+    adapter.unplug()
+    with pytest.raises(LinkError):
+        for _ in range(MAX_GARBAGE):
+            bus.receive(0.0)
+    bus.close()  # while an old file is open, the kernel gives the adapter another name when it returns
+    assert len(list(Path("/proc/self/fd").iterdir())) == before - 2  # the pty's own two
 
 
 def test_a_stalled_adapter_does_not_stall_the_thread(adapter: Pty) -> None:
