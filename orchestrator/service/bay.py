@@ -99,14 +99,20 @@ class BayRunner:
             self._step(now_s, asked.request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
             self._charger.order(STOP)
-            where = traceback.extract_tb(error.__traceback__)[-1]
-            self._internal = f"{error!r} in {where.name}, line {where.lineno}"
-            self._journal.say(f"{self.name}: internal error, stopping: {self._internal}")
+            self._failed(error, now_s)
             if asked:
                 asked.answer = f"internal error: {self._internal}"
         if asked:
             asked.answer = asked.answer or (self.decision.answer if self.decision else "")
             asked.done.set()
+
+    def _failed(self, error: Exception, now_s: float) -> None:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        internal = f"{error!r} in {where.name}, line {where.lineno}"
+        if internal != self._internal:
+            self._journal.say(f"{self.name}: internal error, stopping: {internal}")
+        self._internal, self.last_s = internal, now_s
+        self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
 
     def _step(self, now_s: float, request: Request | None) -> None:
         reading, charger_link = self._charger.view

@@ -15,9 +15,11 @@ from pathlib import Path
 
 from orchestrator.errors import OrchestratorError, ServiceError
 
-#: The longest request, and how long a client may take over one.
+#: The longest request, and how long a client may take to send one, and then to take its answer.
 MAX_REQUEST = 4096
 CLIENT_S = 1.0
+#: So many clients may wait for their turn; one more is turned away by the kernel.
+WAITING = 128
 #: Reading, asking every bay and answering take at most this; longer means that the thread hangs.
 STALL_S = 30.0
 
@@ -58,14 +60,16 @@ class ControlSocket:
                 return  # closed
             self._client_s = self._clock()
             with client, suppress(OSError):
+                answer = _line(self._answer(client))
                 client.settimeout(CLIENT_S)
-                client.sendall(_line(self._answer(client)))
+                client.sendall(answer)
             self._client_s = None
 
     def _answer(self, client: socket.socket) -> Answer:
         try:
             _check_peer(client)
-            return {"ok": True, **self._handler(parse_request(_read_line(client)))}
+            line = _read_line(client, self._clock)
+            return {"ok": True, **self._handler(parse_request(line))}
         except OrchestratorError as error:
             return {"ok": False, "error": str(error)}
         except Exception as error:  # noqa: BLE001 - a request must never end the thread that answers them
@@ -83,9 +87,11 @@ def parse_request(line: bytes) -> Mapping[str, object]:
     return request
 
 
-def _read_line(client: socket.socket) -> bytes:
-    data = b""
+def _read_line(client: socket.socket, clock: Callable[[], float]) -> bytes:
+    """One line; its time is up for the whole of it, so that nobody holds the others up by sending byte for byte."""
+    data, end_s = b"", clock() + CLIENT_S
     while b"\n" not in data:
+        client.settimeout(max(end_s - clock(), 0.001))
         part = client.recv(MAX_REQUEST)
         data += part
         if len(data) > MAX_REQUEST or not part:
@@ -101,23 +107,30 @@ def _check_peer(client: socket.socket) -> None:
 
 def _listen(path: Path) -> socket.socket:
     """The listening socket, owner-only from the first moment on; a dead one in its place is removed."""
-    path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if path.exists() and not path.is_socket():
+        raise ServiceError(f"{path} is there already and is no socket: give this station another control.socket")
     if is_alive(path):
         raise ServiceError(
             f"another service answers on {path}: stop it first, or give this station another control.socket"
         )
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        _bind(listener, path)
+    except OSError as error:
+        listener.close()
+        raise ServiceError(f"the control socket {path} cannot be opened: {error.strerror or error}") from None
+    listener.listen(WAITING)
+    return listener
+
+
+def _bind(listener: socket.socket, path: Path) -> None:
     mask = os.umask(0o177)
     try:
         path.unlink(missing_ok=True)
         listener.bind(str(path))
-    except OSError as error:
-        listener.close()
-        raise ServiceError(f"the control socket {path} cannot be opened: {error.strerror or error}") from None
     finally:
         os.umask(mask)
-    listener.listen(8)
-    return listener
 
 
 def is_alive(path: Path) -> bool:
@@ -126,6 +139,8 @@ def is_alive(path: Path) -> bool:
         try:
             probe.settimeout(CLIENT_S)
             probe.connect(str(path))
+        except (BlockingIOError, TimeoutError):
+            return True  # there are more clients than it has answered yet
         except OSError:
             return False
     return True

@@ -17,10 +17,10 @@ from typing import TypeVar
 
 from orchestrator.service.kept import Kept, write_kept
 from orchestrator.service.records import Line
+from orchestrator.service.rotating import RotatingFile
 
-#: Of the allowed space, what the events may take, and into how many files each stream is divided.
+#: Of the allowed space, what the events may take.
 EVENTS_SHARE = 0.25
-FILES = 8
 #: Lines that wait for a disk that does not take them; beyond it the oldest are dropped and counted.
 BACKLOG = 20_000
 #: How long lines are gathered before they are written, and how long a refused disk is left alone.
@@ -33,35 +33,10 @@ T = TypeVar("T")
 Entry = tuple[float, float, str, Line]  #: monotonic s, wall s, bay, line
 
 
-class RotatingFile:
-    """`NAME.jsonl` is written; `NAME.1.jsonl` … `NAME.7.jsonl` are older and go when there is no space for them."""
-
-    def __init__(self, directory: Path, name: str, max_bytes: int) -> None:
-        self._directory, self._name = directory, name
-        self._max_bytes = max(max_bytes // FILES, 4096)
-
-    def append(self, text: str) -> None:
-        """Add whole lines; OSError where the disk does not take them."""
-        path = self._path(0)
-        self._directory.mkdir(parents=True, exist_ok=True, mode=0o750)
-        if path.exists() and path.stat().st_size + len(text) > self._max_bytes:
-            self._rotate()
-        with path.open("a", encoding="utf-8") as file:
-            file.write(text)
-
-    def _path(self, age: int) -> Path:
-        return self._directory / (f"{self._name}.{age}.jsonl" if age else f"{self._name}.jsonl")
-
-    def _rotate(self) -> None:
-        for age in range(FILES - 1, 0, -1):
-            if self._path(age - 1).exists():
-                self._path(age - 1).replace(self._path(age))
-
-
 class Journal:
     """Takes lines from any thread without ever waiting; one thread of its own writes them, and what people read.
 
-    `problem` says why the disk does not take them, "" while it does; `lost` counts the lines that had to be dropped.
+    Lines that the disk does not take wait for it; `lost` counts those that were dropped because there were too many.
     """
 
     def __init__(self, directory: Path, max_mb: float, clock: Callable[[], float], wall: Callable[[], float]) -> None:
@@ -70,16 +45,16 @@ class Journal:
         self._kept: dict[str, Kept] = {}
         self._kept_changed = False
         total = int(max_mb * 1_000_000)
-        self._files = {
-            False: RotatingFile(directory, "events", int(total * EVENTS_SHARE)),
-            True: RotatingFile(directory, "snapshots", int(total * (1 - EVENTS_SHARE))),
+        self._streams: dict[bool, tuple[RotatingFile, deque[bytes]]] = {
+            False: (RotatingFile(directory, "events", int(total * EVENTS_SHARE)), deque()),
+            True: (RotatingFile(directory, "snapshots", int(total * (1 - EVENTS_SHARE))), deque()),
         }
         self._waiting: deque[Entry] = deque(maxlen=BACKLOG)
         self._said: deque[str] = deque(maxlen=1000)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._turn_s = clock()
-        self.problem = ""
+        self._problem = ""
         self.lost = 0
 
     def start(self) -> None:
@@ -101,9 +76,15 @@ class Journal:
         """A line for people, on standard error."""
         self._said.append(text)
 
-    def stalled(self, now_s: float) -> bool:
-        """True when the writer hangs or has ended."""
-        return not self._thread.is_alive() or now_s - self._turn_s > STALL_S
+    def problem(self, now_s: float) -> str:
+        """Why nothing is being written, for a person; "" while all is well."""
+        if not self._thread.is_alive():
+            return "the journal is not being written"
+        if now_s - self._turn_s > STALL_S:
+            return (
+                f"the journal has not been written for {now_s - self._turn_s:.0f} s: the disk, or standard error, hangs"
+            )
+        return self._problem
 
     def close(self) -> None:
         """Write what is left and end; gives a stalled disk one second."""
@@ -112,25 +93,27 @@ class Journal:
             self._thread.join(1.0)
 
     def _run(self) -> None:
-        while not self._ended.wait(RETRY_S if self.problem else GATHER_S):
+        while not self._ended.wait(RETRY_S if self._problem else GATHER_S):
             self._turn_s = self._clock()
             self._write()
         self._write()
 
     def _write(self) -> None:
         for text in _drained(self._said):
-            print(text, file=sys.stderr, flush=True)  # noqa: T201 - what people read
-        entries = list(_drained(self._waiting))
+            _tell(text)
+        for entry in _drained(self._waiting):
+            lines = self._streams[entry[3][0] == "snapshot"][1]
+            lines.append(_line(entry))
+            if len(lines) > BACKLOG:
+                lines.popleft()
+                self.lost += 1
         try:
             self._write_kept()
-            for is_snapshot, file in self._files.items():
-                lines = [_text(entry) for entry in entries if (entry[3][0] == "snapshot") is is_snapshot]
-                if lines:
-                    file.append("".join(lines))
+            for file, lines in self._streams.values():
+                file.take(lines)
             self._settle("")
         except OSError as error:
-            self.lost += len(entries)
-            self._settle(f"the journal cannot be written: {error.strerror}: {error.filename}")
+            self._settle(f"the journal cannot be written: {error.strerror}: {error.filename or self._directory}")
 
     def _write_kept(self) -> None:
         if self._kept_changed:
@@ -142,9 +125,15 @@ class Journal:
                 raise
 
     def _settle(self, problem: str) -> None:
-        if problem != self.problem:
-            self.problem = problem
-            print(problem or "the journal is being written again", file=sys.stderr, flush=True)  # noqa: T201
+        if problem != self._problem:
+            self._problem = problem
+            _tell(problem or "the journal is being written again")
+
+
+def _tell(text: str) -> None:
+    """To whom it may concern; nobody has to listen."""
+    with suppress(OSError):
+        print(text, file=sys.stderr, flush=True)  # noqa: T201 - what people read
 
 
 def _drained(waiting: "deque[T]") -> Iterator[T]:
@@ -154,10 +143,11 @@ def _drained(waiting: "deque[T]") -> Iterator[T]:
             yield waiting.popleft()
 
 
-def _text(entry: Entry) -> str:
+def _line(entry: Entry) -> bytes:
     t_s, wall_s, bay, (kind, fields) = entry
     head = {"t": t_s, "wall": rfc3339(wall_s), "bay": bay, "kind": kind}
-    return json.dumps({**head, **fields}, ensure_ascii=False, separators=(",", ":")) + "\n"
+    text = json.dumps({**head, **fields}, ensure_ascii=False, separators=(",", ":")) + "\n"
+    return text.encode(errors="backslashreplace")  # of file names that are no text; still JSON
 
 
 def rfc3339(wall_s: float) -> str:

@@ -106,8 +106,8 @@ class Supervisor:
             self._beat(now_s)
 
     def _beat(self, now_s: float) -> None:
-        """Let the guardian know that every loop turns; without it, end."""
-        workers = (*self._devices, self._journal, self._control)
+        """Let the guardian know that every loop turns (but the journal's: no disk stops a charge); without it, end."""
+        workers = (*self._devices, self._control)
         if any(worker.stalled(now_s) for worker in workers):
             return
         self._beat_s = now_s
@@ -148,11 +148,11 @@ class Supervisor:
         verb = request.get("verb")
         if verb == "status":
             bays = [bay.status() for bay in self._named(request.get("bay"))]
-            return station_status(self._station, bays, self._journal.problem)
-        if verb in set(Request):
+            return station_status(self._station, bays, self._journal.problem(monotonic()))
+        if isinstance(verb, str) and verb in set(Request):
             bays_named = request.get("bays")
             chosen = self._bays if bays_named is None else [b for name in _names(bays_named) for b in self._named(name)]
-            return {"results": self._ask(chosen, Request(str(verb)))}
+            return {"results": self._ask(chosen, Request(verb))}
         raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
 
     def _named(self, name: object) -> list[BayRunner]:
