@@ -13,7 +13,12 @@ from pathlib import Path
 from typing import cast
 
 from orchestrator import __version__
-from orchestrator.errors import ConfigError, OrchestratorError
+from orchestrator.errors import ConfigError, HexError, OrchestratorError
+
+
+class UsageError(OrchestratorError):
+    """The command line cannot be understood; the text says what is missing."""
+
 
 REQUESTS = {
     "start": "let a bay charge (again): after a stop, a pause or a reset",
@@ -33,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except OrchestratorError as error:
         print(f"orchestrator: {error}", file=sys.stderr)
-        return 1
+        return 2 if isinstance(error, UsageError | HexError) else 1
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
@@ -83,6 +88,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     check.set_defaults(run=_check)
     decode = verbs.add_parser("decode", help="explain frames of the charger's protocol")
     decode.add_argument("hex", nargs="+", help="bytes in hexadecimal, e.g. AF FA 90 04 10 90 00 34 AF A0")
+    decode.add_argument("--kinds", type=_kinds, metavar="K1,K2", help="which values a reply holds, e.g. 03,04")
     decode.add_argument("--json", action="store_true", help="for programs")
     decode.set_defaults(run=_decode)
     probe = verbs.add_parser("probe", help="ask the devices of a station once and show everything they say")
@@ -106,10 +112,16 @@ def _add_socket(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--socket", help="the service's control socket (default: $ORCHESTRATOR_SOCKET)")
 
 
+def _kinds(text: str) -> tuple[int, int]:
+    """Two masks in hexadecimal, as a status request has them; argparse makes a message of a ValueError."""
+    first, second = bytes.fromhex(text.replace("0x", "").replace(",", " "))
+    return first, second
+
+
 def _socket(arguments: argparse.Namespace) -> Path:
     name = arguments.socket or os.environ.get("ORCHESTRATOR_SOCKET")
     if not name:
-        raise OrchestratorError("name the service's control socket with --socket PATH or $ORCHESTRATOR_SOCKET")
+        raise UsageError("name the service's control socket with --socket PATH or $ORCHESTRATOR_SOCKET")
     return Path(name)
 
 
@@ -149,8 +161,7 @@ def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.service.control import ask
 
     if bool(arguments.bay) == arguments.all:
-        print(f"orchestrator {arguments.verb}: name bays, or --all", file=sys.stderr)
-        return 2
+        raise UsageError(f"{arguments.verb}: name bays, or --all")
     bays = None if arguments.all else arguments.bay
     answer = ask(_socket(arguments), {"verb": arguments.verb, "bays": bays})
     results = cast("dict[str, str]", answer["results"])
@@ -171,7 +182,7 @@ def _check(arguments: argparse.Namespace) -> int:
 def _decode(arguments: argparse.Namespace) -> int:
     from orchestrator.protocol.explain import explain
 
-    explained = explain(" ".join(arguments.hex))
+    explained = explain(" ".join(arguments.hex), arguments.kinds)
     if arguments.json:
         print(json.dumps([item.facts for item in explained], ensure_ascii=False))
     else:
