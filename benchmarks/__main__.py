@@ -1,0 +1,48 @@
+"""`python -m benchmarks`: the service beside floors and a naive controller, as medians and p99 over many runs."""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from benchmarks import decoding, footprint, latency, reaction, startup, stepping
+from benchmarks.effort import Effort
+from benchmarks.report import Result, machine, table, write_json
+
+PARTS: Mapping[str, Callable[[Effort], Iterator[Result]]] = {
+    "reaction": reaction.measure,
+    "latency": latency.measure,
+    "start": startup.measure,
+    "footprint": footprint.measure,
+    "step": stepping.measure,
+    "decoder": decoding.measure,
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure what is asked for and print the table. The exit status tells only whether it could be measured."""
+    arguments = _arguments(argv)
+    facts = ", ".join(f"{name} {value}" for name, value in machine().items())
+    print(facts, flush=True)
+    results: list[Result] = []
+    for name in arguments.only or PARTS:
+        begin_s = time.monotonic()
+        results += PARTS[name](Effort(quick=arguments.quick))
+        print(f"{name}: {time.monotonic() - begin_s:.0f} s", file=sys.stderr, flush=True)
+    print(table(results))
+    if arguments.json:
+        write_json(arguments.json, results)
+    return 0
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer runs: about a minute")
+    parser.add_argument("--only", action="append", choices=PARTS, help="only this part; may be repeated")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
+    return parser.parse_args(argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

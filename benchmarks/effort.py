@@ -1,0 +1,14 @@
+"""How much is measured."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """All of it, or what takes a minute."""
+
+    quick: bool = False
+
+    def choose(self, full: int, quick: int) -> int:
+        """The number of runs."""
+        return quick if self.quick else full

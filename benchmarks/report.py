@@ -1,0 +1,153 @@
+"""What a measurement says, and the table that people read."""
+
+import json
+import os
+import platform
+import statistics
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+
+COLUMNS = ("what", "goal", "median", "p99", "n", "beside it", "median", "p99", "n", "met")
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Many runs of one measurement. `missing` runs gave nothing at all in the time they had."""
+
+    label: str
+    samples: Sequence[float]
+    missing: int = 0
+    more_is_better: bool = False  #: then p99 is the value that at most one run in a hundred falls below
+
+    @property
+    def median(self) -> float | None:
+        """None where most runs gave nothing."""
+        return None if self.missing >= max(len(self.samples), 1) else statistics.median(self.samples)
+
+    @property
+    def p99(self) -> float | None:
+        """The value that at most one run in a hundred exceeds; None where more than that gave nothing."""
+        n = len(self.samples) + self.missing
+        rank = ceil(0.99 * n)
+        worst_last = sorted(self.samples, reverse=self.more_is_better)
+        return worst_last[rank - 1] if n and rank <= len(self.samples) else None
+
+    @property
+    def n(self) -> int:
+        """All runs."""
+        return len(self.samples) + self.missing
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """At most so much: absolute in the result's unit, or as a share of what is beside it."""
+
+    median: float | None = None
+    p99: float | None = None
+    share: float | None = None
+
+    def met(self, ours: Series, other: Series | None) -> bool:
+        """Whether every part of it holds."""
+        pairs = [(ours.median, self.median), (ours.p99, self.p99)]
+        if self.share is not None and other is not None:
+            pairs += [(ours.median, _times(other.median, self.share)), (ours.p99, _times(other.p99, self.share))]
+        return all(limit is None or (value is not None and value <= limit) for value, limit in pairs)
+
+    def text(self, unit: str) -> str:
+        """For the table."""
+        parts = []
+        if self.median is not None:
+            parts.append(f"≤ {_figure(self.median)} {unit}")
+        if self.p99 is not None:
+            parts.append(f"p99 ≤ {_figure(self.p99)} {unit}")
+        if self.share is not None:
+            parts.append(f"≤ 1/{1 / self.share:.0f} of it")
+        return ", ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One row of the table: ours, what it is measured beside, and what it should be."""
+
+    what: str
+    unit: str
+    ours: Series
+    other: Series | None = None
+    goal: Goal | None = None
+
+    @property
+    def met(self) -> bool | None:
+        """None where there is no goal."""
+        return self.goal.met(self.ours, self.other) if self.goal else None
+
+    def cells(self) -> tuple[str, ...]:
+        """Its row of the table."""
+        verdict = {None: "", True: "yes", False: "NO"}[self.met]
+        goal = self.goal.text(self.unit) if self.goal else ""
+        other = (self.other.label, *_figures(self.other, self.unit)) if self.other else ("", "", "", "")
+        return (self.what, goal, *_figures(self.ours, self.unit), *other, verdict)
+
+    def facts(self) -> dict[str, object]:
+        """For programs."""
+        sides = {"ours": self.ours, "beside": self.other}
+        return {
+            "what": self.what,
+            "unit": self.unit,
+            "goal": self.goal.text(self.unit) if self.goal else None,
+            "met": self.met,
+            **{
+                side: {"label": one.label, "median": one.median, "p99": one.p99, "n": one.n, "missing": one.missing}
+                for side, one in sides.items()
+                if one is not None
+            },
+        }
+
+
+def _times(value: float | None, share: float) -> float | None:
+    return None if value is None else value * share
+
+
+def _figure(value: float) -> str:
+    digits = 0 if value >= 100 else 1 if value >= 10 else 2 if value >= 0.1 else 3
+    return f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
+
+
+def _figures(series: Series, unit: str) -> tuple[str, str, str]:
+    said = ["never" if value is None else f"{_figure(value)} {unit}" for value in (series.median, series.p99)]
+    return said[0], said[1], str(series.n)
+
+
+def table(results: Iterable[Result]) -> str:
+    """Aligned columns."""
+    rows = [COLUMNS, *(result.cells() for result in results)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    )
+
+
+def machine() -> dict[str, object]:
+    """Where this was measured."""
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)),
+        "python": platform.python_version(),
+        "kernel": platform.release(),
+        "load": round(os.getloadavg()[0], 2),
+    }
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.machine()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def write_json(path: Path, results: Sequence[Result]) -> None:
+    """Everything, for a program that compares two runs."""
+    document = {"machine": machine(), "results": [result.facts() for result in results]}
+    path.write_text(json.dumps(document, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
