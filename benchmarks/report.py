@@ -6,7 +6,7 @@ import platform
 import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf, isfinite
 from pathlib import Path
 
 COLUMNS = ("what", "goal", "median", "p99", "n", "beside it", "median", "p99", "n", "met")
@@ -23,16 +23,17 @@ class Series:
 
     @property
     def median(self) -> float | None:
-        """None where most runs gave nothing."""
-        return None if self.missing >= max(len(self.samples), 1) else statistics.median(self.samples)
+        """None where half of the runs gave nothing."""
+        return _known(statistics.median(self._worst_last)) if self.n else None
 
     @property
     def p99(self) -> float | None:
         """The value that at most one run in a hundred exceeds; None where more than that gave nothing."""
-        n = len(self.samples) + self.missing
-        rank = ceil(0.99 * n)
-        worst_last = sorted(self.samples, reverse=self.more_is_better)
-        return worst_last[rank - 1] if n and rank <= len(self.samples) else None
+        return _known(self._worst_last[ceil(0.99 * self.n) - 1]) if self.n else None
+
+    @property
+    def _worst_last(self) -> list[float]:
+        return [*sorted(self.samples, reverse=self.more_is_better), *[inf] * self.missing]
 
     @property
     def n(self) -> int:
@@ -103,6 +104,10 @@ class Result:
                 if one is not None
             },
         }
+
+
+def _known(value: float) -> float | None:
+    return value if isfinite(value) else None
 
 
 def _times(value: float | None, share: float) -> float | None:
