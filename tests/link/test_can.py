@@ -265,6 +265,21 @@ def test_a_send_that_fails_breaks_the_bus(pair: Pair, monkeypatch: pytest.Monkey
         bus.send(0x610, READ)
 
 
+def test_a_driver_that_cannot_even_forget_its_noise_breaks_the_bus(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    bus = pair[0]
+
+    def recv(*_args: object) -> None:
+        raise ValueError("cannot decode")
+
+    def flush() -> None:
+        raise can.CanOperationError("Could not flush", 5)
+
+    monkeypatch.setattr(bus._bus, "recv", recv)
+    monkeypatch.setattr(bus._bus, "flush", flush, raising=False)  # an adapter that is pulled out just then
+    with pytest.raises(LinkError, match="Input/output error"):
+        bus.receive(0.0)
+
+
 def test_nothing_but_the_station_file_says_how_a_bus_is_opened(channel: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CAN_CONFIG", '{"receive_own_messages": true}')
     bus, heard = opened({"interface": "virtual", "channel": channel})
