@@ -1,0 +1,204 @@
+"""What the journal says of a bay: readable for people, complete for a replay."""
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, replace
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator.core.memory import Memory
+from orchestrator.model import (
+    STOP,
+    Action,
+    ActiveFault,
+    BatteryLink,
+    BatteryReading,
+    ChargeMode,
+    ChargerLink,
+    ChargerReading,
+    Command,
+    Connection,
+    ControlMode,
+    Decision,
+    Effect,
+    Measurement,
+    Operation,
+    Precharge,
+    Request,
+    Session,
+    Snapshot,
+    State,
+    Step,
+)
+from orchestrator.service.records import QUIET, WHOLE_EVERY, SnapshotRecorder, decision_lines
+from tests.core.world import World
+
+IDLE = Decision(State.IDLE, "no battery")
+HOT = ActiveFault("hot_trip", Effect.TRIP, "the pack has 56.0 °C", 3.0)
+
+
+def kinds(before: Decision | None, now: Decision) -> dict[str, Any]:
+    return dict(decision_lines(before, now))
+
+
+def test_the_first_decision_says_where_the_bay_begins() -> None:
+    assert kinds(None, IDLE) == {
+        "transition": {"from": None, "to": "IDLE", "reason": "no battery"},
+        "command": {"action": None},
+        "decision": {"state": "IDLE", "reason": "no battery", "step": None},
+    }
+
+
+def test_nothing_new_says_nothing() -> None:
+    charging = Decision(State.CHARGING, "step 4", step=Step(4, 14.0, "rule"), session=Session(1.0))
+    longer = replace(charging, reason="step 4, a second later", session=Session(1.0, elapsed_s=1.0))
+    assert kinds(charging, longer) == {}
+
+
+def test_a_change_of_state_of_order_and_of_step() -> None:
+    stopping = Decision(State.STOPPING, "hot", STOP)
+    assert kinds(IDLE, stopping) == {
+        "transition": {"from": "IDLE", "to": "STOPPING", "reason": "hot"},
+        "command": {"action": "stop", "value": 0},
+        "decision": {"state": "STOPPING", "reason": "hot", "step": None},
+    }
+    four = Decision(State.CHARGING, "a", Command(Action.SET_LIMIT, 4), step=Step(4, 14.0, "rule of four"))
+    three = replace(four, command=Command(Action.SET_LIMIT, 3), step=Step(3, 11.0, "rule of three"))
+    assert kinds(four, three) == {
+        "command": {"action": "set_limit", "value": 3},
+        "decision": {
+            "state": "CHARGING",
+            "reason": "a",
+            "step": {"index": 3, "current_a": 11.0, "rule": "rule of three"},
+        },
+    }
+
+
+def test_a_fault_comes_gets_worse_and_goes() -> None:
+    warm = replace(HOT, effect=Effect.PAUSE, text="the pack has 46 °C")
+    hotter = replace(warm, text="the pack has 47 °C")
+    fields = {"id": "hot_trip", "event": "raised", "effect": "PAUSE", "text": "the pack has 46 °C"}
+    assert kinds(IDLE, replace(IDLE, faults=(warm,))) == {"fault": fields}
+    assert kinds(replace(IDLE, faults=(warm,)), replace(IDLE, faults=(hotter,))) == {}
+    assert kinds(replace(IDLE, faults=(warm,)), replace(IDLE, faults=(HOT,)))["fault"]["effect"] == "TRIP"
+    assert kinds(replace(IDLE, faults=(HOT,)), IDLE)["fault"]["event"] == "cleared"
+
+
+def test_a_session_begins_and_ends_once() -> None:
+    begun = replace(IDLE, session=Session(1.0, soc_start_pct=50.0))
+    assert kinds(IDLE, begun)["session"]["event"] == "begin"
+    going = replace(IDLE, session=Session(1.0, elapsed_s=9.0))
+    assert kinds(begun, going) == {}
+    ended = replace(IDLE, session=Session(1.0, elapsed_s=9.06, charged_ah=1.23456789, result="full"))
+    assert kinds(going, ended)["session"] == {
+        "event": "end",
+        "elapsed_s": 9.1,
+        "energised_s": 0.0,
+        "charged_ah": 1.2346,
+        "charged_wh": 0.0,
+        "soc_start_pct": None,
+        "soc_pct": None,
+        "step_changes": 0,
+        "result": "full",
+    }
+    assert kinds(ended, IDLE) == {}
+    assert kinds(ended, begun)["session"]["event"] == "begin"
+
+
+# --- snapshots -------------------------------------------------------------------------------------------------------
+
+
+def plain(snapshot: Snapshot) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(json.dumps(asdict(snapshot)))
+    return document
+
+
+def rebuilt(lines: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The snapshots that a reader makes of the lines, which it only knows as JSON."""
+    snapshots: list[dict[str, Any]] = []
+    for line in lines:
+        fields = json.loads(json.dumps(line))
+        if fields.pop("whole", False):
+            fields.pop("memory")
+            snapshots.append(fields)
+        else:
+            battery = {**snapshots[-1]["battery"], **fields.pop("battery", {})}
+            snapshots.append({**snapshots[-1], **fields, "battery": battery})
+    return snapshots
+
+
+READING = ChargerReading(
+    1.0, 48.0, 0.0, ControlMode.MANUAL, Operation.STOPPED, 0, ChargeMode.FULL, Precharge.OFF, Connection.NORMAL
+)
+measurements = st.none() | st.builds(Measurement, st.sampled_from([20.0, 21.0]), st.sampled_from([1.0, 2.0]))
+snapshots = st.builds(
+    Snapshot,
+    st.sampled_from(
+        [None, READING, replace(READING, t_s=2.0), replace(READING, charge_mode=None, illegal=("mode 9",))]
+    ),
+    st.sampled_from([ChargerLink(), ChargerLink(online=True), ChargerLink(problem="gone"), ChargerLink(online=True)]),
+    st.builds(BatteryReading, soc_pct=measurements, temperature_c=measurements, voltage_v=measurements),
+    st.sampled_from([BatteryLink(), BatteryLink(online=True, implausible={"soc_pct": "140"})]),
+    st.sampled_from([None, *Request]),
+    st.sampled_from(["", "broken"]),
+)
+
+
+@given(st.lists(snapshots, max_size=12))
+def test_the_lines_are_enough_to_rebuild_every_snapshot(steps: list[Snapshot]) -> None:
+    recorder, lines = SnapshotRecorder(), []
+    charging = Decision(State.CHARGING, "")
+    for snapshot in steps:
+        line = recorder.line(snapshot, Memory(), charging, charging)
+        assert line is not None
+        lines.append(line[1])
+    assert rebuilt(lines) == [plain(snapshot) for snapshot in steps]
+
+
+def test_a_whole_line_with_the_memory_comes_now_and_then() -> None:
+    recorder = SnapshotRecorder()
+    charging = Decision(State.CHARGING, "")
+    lines = [recorder.line(Snapshot(), Memory(), charging, charging) for _ in range(2 * WHOLE_EVERY + 4)]
+    whole = [number for number, line in enumerate(lines) if line is not None and line[1].get("whole")]
+    assert whole == [0, WHOLE_EVERY + 1, 2 * (WHOLE_EVERY + 1)]
+    assert lines[0] is not None
+    assert "state" in json.loads(json.dumps(lines[0][1]))["memory"]
+
+
+def test_a_quiet_bay_says_nothing_until_something_happens() -> None:
+    recorder = SnapshotRecorder()
+    for state in QUIET:
+        quiet = Decision(state, "quiet")
+        assert recorder.line(Snapshot(), Memory(), quiet, quiet) is None
+    assert recorder.line(Snapshot(request=Request.START), Memory(), IDLE, IDLE) is not None
+    assert recorder.line(Snapshot(), Memory(), IDLE, IDLE) is None
+    line = recorder.line(Snapshot(), Memory(), IDLE, replace(IDLE, faults=(HOT,)))
+    assert line is not None
+    assert line[1]["whole"]
+
+
+def test_a_whole_charge_can_be_read_back() -> None:
+    """From the first step to the end of a charge: each line is JSON, and no snapshot of a change is missing."""
+    world, recorder = World(soc_pct=98.4), SnapshotRecorder()
+    world.values["soc_pct"] = 97.0
+    before: Decision | None = None
+    written: list[dict[str, Any]] = []
+    given_: list[dict[str, Any]] = []
+    for number in range(150):
+        memory = world.memory
+        if number == 100:
+            world.values["soc_pct"] = 100.0
+        world.now_s += 0.2
+        world._obey()
+        snapshot = world.snapshot(None, "")
+        decision = world.tick(0.0)
+        line = recorder.line(snapshot, memory, before, decision)
+        if line is not None:
+            written.append(line[1])
+            given_.append(plain(snapshot))
+        json.dumps(list(decision_lines(before, decision)))
+        before = decision
+    assert {State.CHARGING, State.FULL} <= {decision.state for decision in world.decisions}
+    assert rebuilt(written) == given_

@@ -1,0 +1,119 @@
+"""The status document: its names are fixed, its values are JSON, unknown is null."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from orchestrator.config.load import load_station
+from orchestrator.config.shipped import shipped_dir
+from orchestrator.model import (
+    ActiveFault,
+    BatteryLink,
+    BatteryReading,
+    ChargeMode,
+    ChargerLink,
+    ChargerReading,
+    Connection,
+    ControlMode,
+    Decision,
+    Effect,
+    Measurement,
+    Operation,
+    Precharge,
+    Session,
+    Setpoint,
+    Snapshot,
+    State,
+    Step,
+)
+from orchestrator.service.status import bay_status, station_status
+
+READING = ChargerReading(
+    1.0, 50.11, 13.9, ControlMode.MANUAL, Operation.RUNNING, 4, ChargeMode.CHARGE, Precharge.OFF, Connection.NORMAL
+)
+CHARGING = Decision(
+    State.CHARGING,
+    "step 4",
+    setpoint=Setpoint(True, 4, ChargeMode.CHARGE, Precharge.OFF),
+    step=Step(4, 14.0, "limits.current_a"),
+    faults=(ActiveFault("noisy_line", Effect.WARN, "an error frame", since_s=90.0),),
+    session=Session(10.0, elapsed_s=90.0, charged_ah=0.5),
+)
+KNOWN = Snapshot(
+    READING,
+    ChargerLink(online=True),
+    BatteryReading(soc_pct=Measurement(51.0, 1.0), temperature_c=Measurement(20.5, 1.0)),
+    BatteryLink(online=True),
+)
+
+
+def document(snapshot: Snapshot, decision: Decision) -> dict[str, Any]:
+    """As a program on the other side of the socket gets it."""
+    status: dict[str, Any] = json.loads(json.dumps(bay_status("bay-1", snapshot, decision, 100.0, 1000.0)))
+    return status
+
+
+def test_the_fixed_names_are_there_whatever_is_known() -> None:
+    for status in (document(Snapshot(), Decision(State.STARTING, "")), document(KNOWN, CHARGING)):
+        assert {"name", "state", "reason", "step", "command", "charger", "battery", "faults", "session"} <= set(status)
+        assert set(status["charger"]) >= {
+            "online",
+            "voltage_v",
+            "current_a",
+            "control_mode",
+            "operation",
+            "current_limit",
+            "charge_mode",
+            "precharge",
+            "connection",
+        }
+        assert set(status["battery"]) >= {
+            "online",
+            "soc_pct",
+            "soh_pct",
+            "temperature_c",
+            "voltage_v",
+            "current_a",
+            "status",
+        }
+
+
+def test_nothing_known_is_null() -> None:
+    status = document(Snapshot(), Decision(State.STARTING, "the service has just started"))
+    assert {value for key, value in status["charger"].items() if key not in ("online", "problem")} == {None}
+    assert {value for key, value in status["battery"].items() if key not in ("online", "problem")} == {None}
+    assert (status["step"], status["session"], status["faults"], status["alarm"]) == (None, None, [], False)
+
+
+def test_what_is_known_is_in_the_devices_own_values() -> None:
+    status = document(KNOWN, CHARGING)
+    assert status["state"] == "CHARGING"
+    assert (status["step"], status["step_current_a"], status["step_rule"]) == (4, 14.0, "limits.current_a")
+    assert status["command"] == {
+        "operation": 1,
+        "current_limit": 4,
+        "charge_mode": 4,
+        "precharge": 0,
+        "order": {"action": None},
+    }
+    assert (status["charger"]["voltage_v"], status["charger"]["operation"], status["charger"]["charge_mode"]) == (
+        50.11,
+        1,
+        4,
+    )
+    assert (status["battery"]["soc_pct"], status["battery"]["soh_pct"]) == (51.0, None)
+    assert status["session"]["charged_ah"] == 0.5
+
+
+def test_since_is_the_wall_clock() -> None:
+    (fault,) = document(KNOWN, CHARGING)["faults"]
+    assert fault == {"id": "noisy_line", "effect": "WARN", "text": "an error frame", "since": 990.0}
+
+
+def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
+    station = load_station(shipped_dir() / Path("configs/stations/one-bay.yaml"))
+    assert station_status(station, [], "disk full") == {
+        "station": "depot-1",
+        "bays": [],
+        "journal": {"problem": "disk full"},
+    }
