@@ -230,7 +230,6 @@ class ChargerPort:
     def _restart(self) -> None:
         with self._lock:
             self._schedule.restart(self._clock())
-            self._grant = None
 
     def _broken(self, error: Exception) -> None:
         """A port that failed is closed and opened again. After anything else the charger is stopped and polled on."""

@@ -97,6 +97,22 @@ class FakeCharger:
         """Send something that nobody asked for."""
         os.write(self.pty.master, data)
 
+    @contextmanager
+    def babbling(self) -> Iterator[None]:
+        """Send noise without a pause, as fast as it is taken."""
+        over = Event()
+        noise = self._dice.randbytes(4096)
+
+        def babble() -> None:
+            while not over.is_set():
+                self.say(noise)
+
+        thread = Thread(target=babble, daemon=True)
+        thread.start()
+        yield
+        over.set()
+        thread.join()
+
     def stop_reading(self) -> None:
         """Take nothing off the line any more."""
         self._reading.clear()
