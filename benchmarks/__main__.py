@@ -26,11 +26,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     facts = ", ".join(f"{name} {value}" for name, value in machine().items())
     print(facts, flush=True)
     results: list[Result] = []
-    for name in arguments.only or PARTS:
-        begin_s = time.monotonic()
-        results += PARTS[name](Effort(quick=arguments.quick))
-        print(f"{name}: {time.monotonic() - begin_s:.0f} s", file=sys.stderr, flush=True)
-    print(table(results))
+    try:
+        for name in arguments.only or PARTS:
+            begin_s = time.monotonic()
+            results += PARTS[name](Effort(quick=arguments.quick))
+            print(f"{name}: {time.monotonic() - begin_s:.0f} s", file=sys.stderr, flush=True)
+    finally:
+        print(table(results))
     if arguments.json:
         write_json(arguments.json, results)
     return 0

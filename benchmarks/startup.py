@@ -5,6 +5,7 @@ The floor is a bare Python that opens the same port with pyserial and writes the
 
 import os
 import select
+import signal
 import subprocess
 import sys
 import time
@@ -52,17 +53,30 @@ def _port() -> Iterator[tuple[int, dict[str, str | int]]]:
 
 def _first(argv: Sequence[str], master: int) -> dict[bytes, float]:
     """When each of the two frames came first, in s from the start of the program."""
+    while _comes(master, 0.0):
+        os.read(master, 4096)  # of the program before
     begin_s = time.monotonic()
-    with subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        heard, came = b"", {}
-        while POLL not in came:
-            if not select.select([master], [], [], BROKEN_S)[0]:
-                process.kill()
-                raise RuntimeError(f"no poll within {BROKEN_S:g} s: {argv}")
-            heard += os.read(master, 4096)
-            now_s = time.monotonic()
-            for frame in (POLL, STOP):
-                if frame in heard and frame not in came:
-                    came[frame] = now_s - begin_s
-        process.kill()
+    with subprocess.Popen(
+        argv, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    ) as process:
+        try:
+            return _listen(master, begin_s)
+        finally:
+            os.killpg(process.pid, signal.SIGKILL)  # guardian and controller at once: neither shall stop anything
+
+
+def _listen(master: int, begin_s: float) -> dict[bytes, float]:
+    heard, came = b"", dict[bytes, float]()
+    while POLL not in came:
+        if not _comes(master, BROKEN_S):
+            raise RuntimeError(f"no poll within {BROKEN_S:g} s, but {heard.hex(' ')}")
+        heard += os.read(master, 4096)
+        now_s = time.monotonic()
+        for frame in (POLL, STOP):
+            if frame in heard and frame not in came:
+                came[frame] = now_s - begin_s
     return came
+
+
+def _comes(master: int, within_s: float) -> bool:
+    return bool(select.select([master], [], [], within_s)[0])

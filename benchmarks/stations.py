@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -42,8 +43,8 @@ class Station:
     bitrate: int | None = None
 
     def station_file(self) -> Path:
-        """Written for our service."""
-        self.directory.mkdir(parents=True, exist_ok=True)
+        """Written for our service, which finds nothing of an earlier run: it would go on holding latched faults."""
+        shutil.rmtree(self.directory / "run", ignore_errors=True)
         used = sorted({bay["can"] for bay in self.bays})
         rate = {} if self.bitrate is None else {"bitrate": self.bitrate}
         lines = ["station: bench", "can:"]
