@@ -1,31 +1,58 @@
-"""The serial ports of a station, even of one whose file has mistakes: what an emergency stop needs, and no more."""
+"""Serial ports and control socket of a station, even of one whose file has mistakes: what an emergency stop needs."""
 
 import re
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.config.yamltree import MAX_BYTES, Entries, Items, Node, Scalar, parse
 
+_COMMENT = re.compile(rb"(?:^|(?<=\s))#.*", re.MULTILINE)
 _PORT = re.compile(rb"""(?:^|[\s{,])port:\s+["']?(/[^\s"',}#]+)""", re.MULTILINE)
+_SOCKET = re.compile(rb"""(?:^|[\s{,])socket:\s+["']?([^\s"',}#]+)""", re.MULTILINE)
 
 
-def charger_ports(path: Path) -> tuple[str, ...]:
-    """Every charger's port, in the file's order. A mistake elsewhere must not keep a stop from being sent.
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """Every charger's port, in the file's order, with its bay's name; and the socket. "" is what cannot be told."""
 
-    A file that is not even YAML is searched for what looks like `port: /dev/…`. Raises `OSError` if it cannot be read.
+    ports: Mapping[str, str]
+    socket: str
+
+
+def wiring(path: Path) -> Wiring:
+    """What a station file says about them. A mistake elsewhere must not keep a stop from being sent.
+
+    What looks like `port: /dev/…` counts wherever it stands, in a file that is not even YAML, too. Raises `OSError` if
+    the file cannot be read.
     """
     with path.open("rb") as stream:
         data = stream.read(MAX_BYTES)
     node, _ = parse(str(path), data)
-    if node is not None and (ports := _ports(node)):
-        return tuple(str(path.parent / port) for port in dict.fromkeys(ports))
-    return tuple(dict.fromkeys(match.decode(errors="surrogateescape") for match in _PORT.findall(data)))
+    ports = {} if node is None else _ports(node)
+    bare = _COMMENT.sub(b"", data)
+    for match in _PORT.findall(bare):
+        ports.setdefault(match.decode(errors="surrogateescape"), "")
+    socket = _text(_get(_get(node, "control"), "socket"))
+    if not socket and (found := _SOCKET.search(bare)):
+        socket = found[1].decode(errors="surrogateescape")
+    return Wiring(
+        {str(path.parent / port): name for port, name in ports.items()}, str(path.parent / socket) if socket else ""
+    )
 
 
-def _ports(node: Node) -> list[str]:
+def _ports(node: Node) -> dict[str, str]:
     bays = _get(node, "bays")
-    chargers = [_get(bay, "charger") for bay in bays.items] if isinstance(bays, Items) else []
-    ports = [_get(charger, "port") for charger in chargers]
-    return [port.text for port in ports if isinstance(port, Scalar) and "/" in port.text]
+    ports: dict[str, str] = {}
+    for bay in bays.items if isinstance(bays, Items) else ():
+        port = _text(_get(_get(bay, "charger"), "port"))
+        if "/" in port:
+            ports.setdefault(port, _text(_get(bay, "name")))
+    return ports
+
+
+def _text(node: Node | None) -> str:
+    return node.text if isinstance(node, Scalar) else ""
 
 
 def _get(node: Node | None, key: str) -> Node | None:

@@ -4,30 +4,33 @@
 STOP_FRAME = bytes.fromhex("AF FA 90 04 10 90 00 34 AF A0")
 #: 0x02 push 0x01 value 0: so that a later resume does not run on; acted on in manual mode only (§3.3.2).
 OPERATION_STOP_FRAME = bytes.fromhex("AF FA 90 05 02 90 01 00 28 AF A0")
-#: Kinds 0x13 and 0x1F: volts, amps, control mode, operation, limit, mode, precharge, connection (§3.3.1).
-STATUS_REQUEST = bytes.fromhex("AF FA 90 05 01 90 13 1F 58 AF A0")
+#: Kinds 0x12 and 0x01: amps, control mode, operation (§3.3.1). The service asks for eight values or more, so that no
+#: answer to a question of its own, from before the stop perhaps, can be taken for an answer to this one.
+QUESTION = bytes.fromhex("AF FA 90 05 01 90 12 01 39 AF A0")
 
-#: How its answer begins: address, length (16 bytes of data + 3), command 0x03, order (§3.3.3).
-_REPLY_HEAD = bytes.fromhex("AF FA 90 13 03 90")
-_REPLY_END = bytes.fromhex("AF A0")
-_DATA_BYTES = 16
-_CURRENT, _OPERATION = slice(2, 4), slice(6, 8)
+#: How its answer begins: address, length (6 bytes of data + 3), command 0x03, order (§3.3.3).
+_ANSWER_HEAD = bytes.fromhex("AF FA 90 09 03 90")
+_ANSWER_END = bytes.fromhex("AF A0")
+_DATA_BYTES = 6
+ANSWER_BYTES = len(_ANSWER_HEAD) + _DATA_BYTES + 1 + len(_ANSWER_END)
+_CURRENT, _OPERATION = slice(0, 2), slice(4, 6)
 #: In 0.01 A: standby may show so much, as everywhere else.
 _STANDBY_CENTIAMPS = 50
 
 
 def stands_by(data: bytes) -> bool | None:
-    """What the newest good status reply in `data` says: True for standby, False for running, None where there is none.
+    """What the newest good answer to QUESTION in `data` says: True for standby, False for running, None without one.
 
     Standby is operation 0 and at most 0.5 A.
     """
     said = None
-    at = data.find(_REPLY_HEAD)
+    at = data.find(_ANSWER_HEAD)
     while at >= 0:
-        values = data[at + len(_REPLY_HEAD) : at + len(_REPLY_HEAD) + _DATA_BYTES]
-        tail = data[at + len(_REPLY_HEAD) + _DATA_BYTES :]
-        if len(tail) >= 3 and tail[0] == sum(data[at + 2 : at + 6] + values) & 0xFF and tail[1:3] == _REPLY_END:
+        answer = data[at : at + ANSWER_BYTES]
+        values = answer[len(_ANSWER_HEAD) : len(_ANSWER_HEAD) + _DATA_BYTES]
+        checksum, end = answer[-3:-2], answer[-2:]
+        if len(answer) == ANSWER_BYTES and end == _ANSWER_END and checksum[0] == sum(answer[2:-3]) & 0xFF:
             amps = int.from_bytes(values[_CURRENT], "big")
             said = int.from_bytes(values[_OPERATION], "big") == 0 and amps <= _STANDBY_CENTIAMPS
-        at = data.find(_REPLY_HEAD, at + 1)
+        at = data.find(_ANSWER_HEAD, at + 1)
     return said

@@ -2,6 +2,7 @@
 
 import traceback
 from dataclasses import replace
+from pathlib import Path
 from threading import Event
 from time import time
 from typing import Protocol
@@ -149,4 +150,5 @@ class BayRunner:
         decision = self.decision
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
-        return bay_status(self.name, self._snapshot, decision, self.last_s, time())
+        status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
+        return {**status, "port": str(Path(self._rules.bay.charger.port).absolute())}

@@ -10,8 +10,9 @@ from orchestrator.service.supervisor import Supervisor
 
 def main(fd: int, station: str) -> int:
     """Run the service for a station file; 0 if every charger was verified at the end."""
+    guardian = GuardianLink(fd)  # stays open to the last word: its end is the sign that this process has ended
     try:
-        return Supervisor(load_station(station), GuardianLink(fd)).run()
+        return Supervisor(load_station(station), guardian).run()
     except ConfigError as error:
         print(error, file=sys.stderr)  # noqa: T201 - what people read
     except OrchestratorError as error:

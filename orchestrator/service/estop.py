@@ -6,102 +6,100 @@ looked at. Standard library only, and PyYAML where a station file has to be read
 
 import os
 import sys
-import termios
-import time
-from contextlib import suppress
-from pathlib import Path
+from collections.abc import Mapping
 
-from orchestrator.protocol.standby import STOP_FRAME
-from orchestrator.service.laststop import stop_all
+from orchestrator.service.laststop import first_stop, stop_all
 
 USAGE = """\
-usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH]
+usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held]
 
 Stop the charger on every port of the station file (default: station.yaml), or on the given ports, and verify it.
-Needs no running service. Exit status 0: every charger was verified to stand by; 1: not every one.
+Needs no running service. One that runs is told to hold these bays until an operator starts them.
+
+  --port PATH ...  these ports, without a station file
+  --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or what the station file says)
+  --leave-held     leave ports alone that a running service holds, and tell it nothing
+
+Exit status 0: every charger was verified to stand by; 1: not every one; 2: used wrongly.
 """
+DEFAULT_STATION = "station.yaml"
 #: How long the proof of standby is waited for.
 VERIFY_S = 3.0
-#: 19200 8N1, no flow control, bytes as they are (§2.2.2).
-_CONTROL = termios.CS8 | termios.CREAD | termios.CLOCAL
-_CHARACTERS: list[bytes | int] = [b"\0"] * 32
-_SETTINGS: list[int | list[bytes | int]] = [0, 0, _CONTROL, 0, termios.B19200, termios.B19200, _CHARACTERS]
 
 
-def main(arguments: list[str]) -> int:
-    """Parse the command line by hand (the quickest way), stop, verify, tell."""
-    ports, words, control = _parse(arguments)
-    if ports is None:
+class Options:
+    """The command line, taken apart by hand: argparse alone would cost half of the time there is."""
+
+    def __init__(self, words: list[str]) -> None:
+        self.ports: list[str] = []
+        self.stations: list[str] = []
+        self.socket = os.environ.get("ORCHESTRATOR_SOCKET", "")
+        self.leave_held = False
+        self.wrong = ""
+        taking = ""
+        for word in words:
+            if word == "--leave-held":
+                self.leave_held, taking = True, ""
+            elif word in ("--port", "--socket"):
+                taking = word
+            elif word.startswith("-"):
+                self.wrong = f"unknown option {word}"
+            elif taking == "--port":
+                self.ports.append(word)
+            elif taking == "--socket":
+                self.socket, taking = word, ""
+            else:
+                self.stations.append(word)
+        if len(self.stations) + bool(self.ports) > 1:
+            self.wrong = "name one station file, or ports"
+        elif taking == "--socket" or (taking == "--port" and not self.ports):
+            self.wrong = f"{taking} needs a path"
+
+
+def main(words: list[str]) -> int:
+    """Stop, verify, tell; the exit status."""
+    if "-h" in words or "--help" in words:
         print(USAGE, end="")  # noqa: T201 - what people read
-        return 2 if "-h" not in arguments and "--help" not in arguments else 0
-    opened, told = {}, {}
-    for port in ports or _station_ports(words[0] if words else "station.yaml"):
-        try:
-            opened[port] = _open_and_stop(port)
-        except OSError as error:
-            told[port] = f"{port}: {error.strerror}"
-    service = _tell_service(control)
-    told |= stop_all(opened, VERIFY_S)
-    for port, why in told.items():
-        print(why or f"{port}: standby verified")  # noqa: T201
-    if service:
-        print(service)  # noqa: T201
-    if not told:
+        return 0
+    options = Options(words)
+    if options.wrong:
+        print(f"orchestrator estop: {options.wrong}\n{USAGE}", end="", file=sys.stderr)  # noqa: T201
+        return 2
+    bays: Mapping[str, str] = dict.fromkeys(options.ports, "")
+    socket = options.socket
+    if not bays:
+        bays, written = _wiring((options.stations or [DEFAULT_STATION])[0])
+        socket = socket or written
+    if not bays:
         print("no port to stop: name a station file or --port PATH", file=sys.stderr)  # noqa: T201
-    return 1 if not told or any(told.values()) else 0
+        return 1
+    return _stop(bays, "" if options.leave_held else socket, options)
 
 
-def _parse(arguments: list[str]) -> tuple[list[str] | None, list[str], str]:
-    """(ports, other words, control socket); ports is None where the line is not understood, or help is asked for."""
-    ports: list[str] = []
-    words: list[str] = []
-    control = os.environ.get("ORCHESTRATOR_SOCKET", "")
-    taking = ""
-    for word in arguments:
-        if taking == "--port" and not word.startswith("-"):
-            ports.append(word)
-        elif taking == "--socket":
-            control, taking = word, ""
-        elif word in ("--port", "--socket"):
-            taking = word
-        elif word.startswith("-") or words:
-            return None, [], ""
-        else:
-            words.append(word)
-    return (None if ports and words else ports), words, control
+def _stop(bays: Mapping[str, str], socket: str, options: Options) -> int:
+    """Stop all of them, with whatever help there is, and tell what became of each."""
+    opened = {port: first_stop(port, leave_held=options.leave_held) for port in bays}
+    from orchestrator.service.witness import Service  # noqa: PLC0415 - the first stops are out now
+
+    service = Service(bays, socket, every_bay=not options.ports)
+    whys = stop_all(opened, VERIFY_S, leave_held=options.leave_held, on_stop=service.hold, witness=service.sees)
+    for port, why in whys.items():
+        name = f"{bays[port]} ({port})" if bays[port] else port
+        print(f"{name}: {why or 'standby verified'}")  # noqa: T201
+    if not options.leave_held:
+        print(service.said, file=sys.stderr)  # noqa: T201
+    return 1 if any(whys.values()) else 0
 
 
-def _station_ports(station: str) -> tuple[str, ...]:
-    """The chargers' ports in a station file, even in one with mistakes."""
-    from orchestrator.config.ports import charger_ports  # noqa: PLC0415 - PyYAML, only where it is needed
+def _wiring(station: str) -> tuple[Mapping[str, str], str]:
+    """Ports with their bays' names, and the socket, of a station file, even of one with mistakes."""
+    from pathlib import Path  # noqa: PLC0415 - only where it is needed
+
+    from orchestrator.config.ports import wiring  # noqa: PLC0415 - PyYAML
 
     try:
-        return charger_ports(Path(station))
+        found = wiring(Path(station))
     except OSError as error:
         print(f"{station}: {error.strerror}", file=sys.stderr)  # noqa: T201
-        return ()
-
-
-def _open_and_stop(port: str) -> int:
-    """Open a port, whoever else has it, set the line up and say stop."""
-    fd = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    with suppress(termios.error):  # not a terminal: a stop is written all the same
-        termios.tcsetattr(fd, termios.TCSANOW, _SETTINGS)
-    with suppress(BlockingIOError):
-        os.write(fd, STOP_FRAME)
-    return fd
-
-
-def _tell_service(control: str) -> str:
-    """A service that runs must not start again what was stopped here: tell it, and say what it answered."""
-    if not control:
-        return ""
-    from orchestrator.errors import ServiceError  # noqa: PLC0415 - after the first stop
-    from orchestrator.service.control import ask  # noqa: PLC0415
-
-    began_s = time.monotonic()
-    try:
-        ask(Path(control), {"verb": "stop", "bays": None}, timeout_s=1.0)
-    except ServiceError as error:
-        return f"the service was not told: {error}"
-    return f"the service holds every bay stopped ({time.monotonic() - began_s:.2f} s)"
+        return {}, ""
+    return found.ports, found.socket

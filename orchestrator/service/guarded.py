@@ -1,7 +1,6 @@
 """The controller's side of the guardian: heartbeats, the serial ports handed over, and what to do when it is gone."""
 
 import array
-import contextlib
 import socket
 import threading
 from collections.abc import Callable
@@ -18,15 +17,17 @@ class GuardianLink:
 
     def __init__(self, fd: int) -> None:
         self._socket = socket.socket(fileno=fd)
+        self._socket.set_inheritable(False)  # our end must close when we die
         self._socket.settimeout(0)
         self._lock = threading.Lock()
         self._heard_s: float | None = None
         self._gone = ""
 
-    def beat(self, now_s: float) -> str:
-        """Say that every loop has turned; returns why the guardian cannot be relied on any more, "" while it can."""
+    def beat(self, now_s: float, *, well: bool) -> str:
+        """Say that every loop has turned, if that is so. Why the guardian can no more be relied on, "" while it can."""
         self._heard_s = now_s if self._heard_s is None or self._answered() else self._heard_s
-        self._send(BEAT)
+        if well:
+            self._send(BEAT)
         if not self._gone and now_s - self._heard_s > SILENCE_S:
             self._gone = f"the guardian has not answered for {SILENCE_S:g} s"
         return self._gone
@@ -40,7 +41,7 @@ class GuardianLink:
         self._send(DROP + port.encode(errors="surrogateescape"))
 
     def done(self) -> None:
-        """Every charger is verified: the end of this process needs no stop."""
+        """Every charger was stopped, and verified where it can be; the end of this process needs no other stop."""
         self._send(DONE)
 
     def _answered(self) -> bool:
@@ -59,10 +60,13 @@ class GuardianLink:
             heard = heard or data == ALIVE
 
     def _send(self, message: bytes, fd: int | None = None) -> None:
-        """Send without waiting: a guardian that takes nothing shows itself by not answering."""
+        """Send without waiting. A guardian that takes no message cannot be relied on: no port may be lost to it."""
         ancillary = [] if fd is None else [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [fd]))]
-        with self._lock, contextlib.suppress(OSError):
-            self._socket.sendmsg([message], ancillary)
+        try:
+            with self._lock:
+                self._socket.sendmsg([message], ancillary)
+        except OSError as error:
+            self._gone = self._gone or f"the guardian takes no messages: {error.strerror}"
 
 
 class GuardedLine:

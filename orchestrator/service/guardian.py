@@ -1,12 +1,13 @@
 """The guardian: parent of the controller, and the one who stops the chargers when the controller cannot.
 
 Theory of operation. `orchestrator run` is this process; it starts the controller and then only waits. The controller
-hands it a duplicate of every serial port it opens (SCM_RIGHTS) and sends a heartbeat when *all* of its loops have turned.
+hands it a duplicate of every serial port it opens (SCM_RIGHTS) and sends a heartbeat when *all* its loops have turned.
 No heartbeat for SILENCE_S, or the end of the connection, means that nobody is at the wheel: the guardian kills what is
-left, stops the charger on every port that it holds, verifies it, and ends with an error, so that systemd starts anew.
-It answers each heartbeat; a controller that gets no answer knows that its guardian is gone, stops, and ends.
+left, stops the charger on every port that it was ever told of, verifies it, and ends with an error, so that systemd
+starts anew. It answers each heartbeat; a controller without answers knows that its guardian is gone, stops, and ends.
 
-Standard library and `protocol/standby.py` only: what is not imported cannot fail.
+Standard library and `protocol/standby.py` only: what is not imported cannot fail. Nothing here ever waits for anybody
+but the controller: not for systemd, not for who reads the log, not for a line that takes nothing.
 """
 
 import array
@@ -17,9 +18,11 @@ import signal
 import socket
 import sys
 import time
+from collections.abc import Sequence
 from types import FrameType
 
-from orchestrator.service.laststop import stop_all
+from orchestrator.service.laststop import drop_port, stop_all
+from orchestrator.service.say import Systemd, say
 
 #: Messages from the controller: one letter, then a port's name; PORT carries the descriptor.
 BEAT, PORT, DROP, DONE = b"B", b"P", b"D", b"E"
@@ -35,71 +38,85 @@ END_S = 10.0
 FRAME_GAP_S = 0.006
 #: How long the chargers' standby is waited for. Whoever starts the service anew goes on with it.
 VERIFY_S = 5.0
+#: A process that was killed is gone within this, if anything can make it go.
+KILLED_S = 1.0
+#: systemd is told that we live this often; the unit allows a multiple of it.
+WATCHDOG_S = 0.5
 #: Exit status when the guardian had to act.
 ACTED = 70
 MESSAGE = 4096
+CONTROLLER = ("-m", "orchestrator.service.controller")
+
+#: Whoever wants us to end: systemd or `kill`, Ctrl-C, the terminal that is closed, Ctrl-\.
+ENDS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
+#: Ctrl-Z and its like would freeze guardian and controller together, with the chargers running.
+FREEZES = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 
 
 class Guardian:
     """Watches one controller, already started, over `link` (SOCK_SEQPACKET)."""
 
     def __init__(self, child: int, link: socket.socket) -> None:
-        self._child, self._link = child, link
-        self._ports: dict[str, int] = {}
-        self._held = False  # a port has been handed over: there is something to stop
-        self._done = False
-        self._ending = False
+        self._child, self._link = os.pidfd_open(child), link
+        self._ports: dict[str, int | None] = {}  # None: the controller has closed it, for now
+        self._done = self._ending = self._ready = False
         self._deadline_s = time.monotonic() + STARTUP_S
+        self._systemd = Systemd()
+        self._watchdog_s = 0.0  # when systemd was last told that we live
+        self._reason = ""
+        self._told = False
 
     def run(self) -> int:
         """Wait for the end of the controller; its exit status, or ACTED if the chargers had to be stopped from here."""
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, self._pass_on)
-        reason = self._watch()
-        if self._done or not self._held:
-            return self._status()
-        say(f"guardian: {reason}: stopping {len(self._ports)} chargers")
-        _notify(f"STATUS=the controller is gone ({reason}); stopping the chargers")
+        for number in ENDS:
+            if signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` stays what it is
+                signal.signal(number, self._pass_on)
+        self._reason = self._watch()
+        if self._done or not self._ports:
+            return self._status(END_S)
+        self._signal(signal.SIGKILL)
         time.sleep(FRAME_GAP_S)
-        for name, why in stop_all(self._ports, VERIFY_S).items():
-            say(f"guardian: {why or f'{name}: standby verified'}")
-        return self._status() or ACTED
+        for name, why in stop_all(self._ports, VERIFY_S, on_stop=self._stopping).items():
+            say(f"guardian: {name}: {why or 'standby verified'}")
+        return self._status(KILLED_S) or ACTED
 
-    def _pass_on(self, number: int, _frame: FrameType | None) -> None:
+    def _pass_on(self, _number: int, _frame: FrameType | None) -> None:
         """The controller ends orderly by itself; it gets the time to."""
-        if not self._ending:
-            self._ending = True
-            _notify("STOPPING=1")
+        self._ending = True
+        self._systemd.tell("STOPPING=1")
+        self._signal(signal.SIGTERM)
+
+    def _signal(self, number: signal.Signals) -> None:
         with contextlib.suppress(ProcessLookupError):
-            os.kill(self._child, number)
+            signal.pidfd_send_signal(self._child, number)
 
     def _watch(self) -> str:
         """Read the controller's messages until they end; why they did. A controller that hangs is killed."""
         poll = select.poll()
         poll.register(self._link, select.POLLIN)
         while True:
-            left_s = self._deadline_s - time.monotonic()
-            if left_s <= 0:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(self._child, signal.SIGKILL)
+            left_s = max(0.0, self._deadline_s - time.monotonic())
+            if not poll.poll(left_s * 1000):  # asked even when time is up: it may be us who slept
+                self._signal(signal.SIGKILL)
                 return "the controller hangs"
-            if poll.poll(left_s * 1000) and not self._message():
-                return "the controller has ended"
+            if not self._message():
+                return ""
 
     def _message(self) -> bool:
         """Take one message; False at the end of the connection."""
         try:
             data, descriptors = _receive(self._link)
+        except ConnectionResetError:
+            return True  # said once of a controller that died with our answers unread; its last messages come now
         except OSError:
             return False
-        kind, name = data[:1], data[1:].decode(errors="replace")
+        kind, name = data[:1], data[1:].decode(errors="surrogateescape")
         if kind == BEAT:
             self._beat()
-        elif kind == PORT and descriptors:
-            self._drop(name)
-            self._ports[name], self._held = descriptors.pop(), True
-        elif kind == DROP:
-            self._drop(name)
+        elif kind == PORT:
+            self._hold(name, descriptors.pop() if descriptors else None)
+        elif kind == DROP and not self._done:
+            self._hold(name, None)
         elif kind == DONE:
             self._done, self._deadline_s = True, time.monotonic() + END_S
         for fd in descriptors:
@@ -107,19 +124,51 @@ class Guardian:
         return bool(data)
 
     def _beat(self) -> None:
-        self._deadline_s = time.monotonic() + SILENCE_S
+        now_s = time.monotonic()
+        self._deadline_s = now_s + SILENCE_S
         with contextlib.suppress(OSError):
             self._link.send(ALIVE, socket.MSG_DONTWAIT)
-        _notify("READY=1\nWATCHDOG=1")
+        if not self._ready:
+            self._ready = True
+            self._systemd.tell("READY=1")
+        if now_s - self._watchdog_s >= WATCHDOG_S:
+            self._watchdog_s = now_s
+            self._systemd.tell("WATCHDOG=1")
 
-    def _drop(self, name: str) -> None:
-        if name in self._ports:
-            os.close(self._ports.pop(name))
+    def _hold(self, name: str, fd: int | None) -> None:
+        """Keep this descriptor of the port, or none; its name is remembered for the stop."""
+        old = self._ports.get(name)
+        self._ports[name] = fd
+        if old is not None:
+            drop_port(old)
 
-    def _status(self) -> int:
-        """The controller's exit status; a signal that ended it counts as ACTED."""
-        _, status = os.waitpid(self._child, 0)
-        return os.WEXITSTATUS(status) if os.WIFEXITED(status) else ACTED
+    def _stopping(self) -> None:
+        """The stops of a round are out; after the first one there is time to tell."""
+        self._systemd.tell("WATCHDOG=1")
+        if not self._told:
+            self._told = True
+            reason = self._reason or f"the controller {self._fate()[1]}"
+            say(f"guardian: {reason}: stopping the chargers on {len(self._ports)} ports")
+            self._systemd.tell(f"STATUS={reason}; stopping the chargers")
+
+    def _status(self, within_s: float) -> int:
+        """The controller's exit status, ACTED where it has none; one that does not end is killed."""
+        end = select.poll()
+        end.register(self._child, select.POLLIN)
+        if not end.poll(within_s * 1000):
+            self._signal(signal.SIGKILL)
+            end.poll(KILLED_S * 1000)
+        return self._fate()[0]
+
+    def _fate(self) -> tuple[int, str]:
+        """The controller's exit status, and in words. A driver that hangs may keep it alive: nobody waits for it."""
+        end = os.waitid(os.P_PIDFD, self._child, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+        if end is None:
+            return ACTED, "does not die"
+        if end.si_code == os.CLD_EXITED:
+            return end.si_status, f"has ended with status {end.si_status}"
+        early = self._ending and not self._ports  # before it could take SIGTERM for anything but its end
+        return 0 if early else ACTED, f"was ended by {signal.Signals(end.si_status).name}"
 
 
 def _receive(link: socket.socket) -> tuple[bytes, list[int]]:
@@ -133,25 +182,13 @@ def _receive(link: socket.socket) -> tuple[bytes, list[int]]:
     return data, list(descriptors)
 
 
-def _notify(text: str) -> None:
-    """Tell systemd, if it has asked for it."""
-    path = os.environ.get("NOTIFY_SOCKET")
-    if path:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd, contextlib.suppress(OSError):
-            systemd.sendto(text.encode(), f"\0{path[1:]}" if path.startswith("@") else path)
-
-
-def say(text: str) -> None:
-    """A line for people; a standard error that is gone must not keep a stop from being sent."""
-    with contextlib.suppress(OSError):
-        os.write(sys.stderr.fileno(), f"{text}\n".encode())
-
-
-def guard(arguments: list[str]) -> int:
+def guard(arguments: Sequence[str], controller: Sequence[str] = CONTROLLER) -> int:
     """Start the controller (`arguments` go to its command line) and watch over it; the exit status."""
+    for number in FREEZES:
+        signal.signal(number, signal.SIG_IGN)  # the controller inherits that
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     theirs.set_inheritable(True)
-    command = [sys.executable, "-m", "orchestrator.service.controller", str(theirs.fileno()), *arguments]
+    command = [sys.executable, *controller, str(theirs.fileno()), *arguments]
     child = os.posix_spawn(sys.executable, command, os.environ)
     theirs.close()
     return Guardian(child, ours).run()

@@ -4,8 +4,8 @@ from orchestrator.config.station import Station
 from orchestrator.model import BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
 from orchestrator.service.records import command_fields, session_fields
 
-#: What of a charger's reading the status shows.
-SHOWN = tuple(name for name in ChargerReading.__slots__ if name not in ("t_s", "illegal"))
+#: What of a charger's reading the status shows; `t_s` is when it was asked for, in monotonic seconds of this machine.
+SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
 
 
 def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, wall_s: float) -> dict[str, object]:

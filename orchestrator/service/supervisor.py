@@ -43,6 +43,7 @@ class Supervisor:
         self._station = station
         self._guardian = guardian
         self._beat_s = 0.0
+        self._lost = ""  # why the guardian cannot be relied on any more
         self._wake: SimpleQueue[int | None] = SimpleQueue()
         self._ending = ""
         self._journal = Journal(station.journal.directory, station.journal.max_mb, monotonic, time)
@@ -75,7 +76,10 @@ class Supervisor:
         return (*self._ports, *self._buses)
 
     def run(self) -> int:
-        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1."""
+        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1.
+
+        Without its guardian it ends, too, and with 1.
+        """
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         self._journal.start()
@@ -108,11 +112,10 @@ class Supervisor:
     def _beat(self, now_s: float) -> None:
         """Let the guardian know that every loop turns (but the journal's: no disk stops a charge); without it, end."""
         workers = (*self._devices, self._control)
-        if any(worker.stalled(now_s) for worker in workers):
-            return
+        well = not any(worker.stalled(now_s) for worker in workers)
         self._beat_s = now_s
-        lost = self._guardian.beat(now_s)
-        self._ending = self._ending or lost
+        self._lost = self._guardian.beat(now_s, well=well)
+        self._ending = self._ending or self._lost
 
     def _news(self) -> set[int]:
         numbers: set[int | None] = set()
@@ -140,7 +143,7 @@ class Supervisor:
         verdict = f"NOT verified: {', '.join(unverified)}" if unverified else "every charger stands by, verified"
         self._journal.say(f"ended: {verdict}")
         self._journal.close()
-        return 1 if unverified else 0
+        return 1 if unverified or self._lost else 0
 
     # --- what the control socket asks, in its own thread ---
 

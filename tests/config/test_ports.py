@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.config.load import check, load_station
-from orchestrator.config.ports import charger_ports
+from orchestrator.config.ports import Wiring, wiring
 
 GOOD = (Path(__file__).parent / "good" / "station.yaml").read_text()
 
@@ -28,21 +28,42 @@ GOOD = (Path(__file__).parent / "good" / "station.yaml").read_text()
 def test_ports_are_found(what: str, text: str, tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text(text)
-    assert charger_ports(file) == ("/dev/ttyS1", "/dev/ttyS2")
+    assert tuple(wiring(file).ports) == ("/dev/ttyS1", "/dev/ttyS2")
+    assert wiring(file).socket == str(tmp_path / "run" / "orchestrator.sock")
     assert (check([file]) == []) == (what == "well")
 
 
 def test_ports_are_those_that_the_service_opens(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text(GOOD.replace("/dev/ttyS1", "./tty"))
-    assert charger_ports(file) == tuple(bay.charger.port for bay in load_station(file).bays)
+    assert tuple(wiring(file).ports) == tuple(bay.charger.port for bay in load_station(file).bays)
+
+
+def test_names_and_socket_are_the_services(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text(GOOD)
+    station = load_station(file)
+    assert dict(wiring(file).ports) == {bay.charger.port: bay.name for bay in station.bays}
+    assert wiring(file).socket == str(station.control.socket)
+
+
+def test_a_port_in_a_comment_is_none(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text(GOOD + "# port: /dev/ttyS8\n#port: /dev/ttyS9\n")
+    assert tuple(wiring(file).ports) == ("/dev/ttyS1", "/dev/ttyS2")
+
+
+def test_a_port_under_a_misspelt_key_is_not_forgotten(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text(GOOD.replace("charger:", "chrager:", 1))
+    assert dict(wiring(file).ports) == {"/dev/ttyS2": "bay-2", "/dev/ttyS1": ""}
 
 
 def test_a_file_without_ports_has_none(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text("bays: 7\n")
-    assert charger_ports(file) == ()
+    assert wiring(file) == Wiring({}, "")
     file.write_text("bays: [7, {charger: 1}, {charger: {port: [1]}}, {charger: {port: tty}}]\n")
-    assert charger_ports(file) == ()
+    assert wiring(file) == Wiring({}, "")
     with pytest.raises(OSError, match="No such file"):
-        charger_ports(tmp_path / "none.yaml")
+        wiring(tmp_path / "none.yaml")

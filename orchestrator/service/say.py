@@ -1,0 +1,35 @@
+"""What a process says to people and to systemd without ever waiting for them. Standard library only."""
+
+import os
+import select
+import socket
+
+
+def say(text: str) -> None:
+    """A line on standard error. One that nobody takes now is lost: it must not keep a stop from being sent."""
+    try:
+        taker = select.poll()
+        taker.register(2, select.POLLOUT)
+        if any(event & select.POLLOUT for _, event in taker.poll(0)):
+            os.write(2, f"{text}\n".encode(errors="backslashreplace"))
+    except OSError:
+        return  # standard error is gone
+
+
+class Systemd:
+    """The service manager, if one has asked to be notified (sd_notify)."""
+
+    def __init__(self) -> None:
+        path = os.environ.get("NOTIFY_SOCKET", "")
+        self._socket: socket.socket | None = None
+        if path:
+            self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self._address = f"\0{path[1:]}" if path.startswith("@") else path
+
+    def tell(self, text: str) -> None:
+        """One notification, as "WATCHDOG=1"; lost when it cannot be taken now."""
+        if self._socket is not None:
+            try:
+                self._socket.sendto(text.encode(), socket.MSG_DONTWAIT, self._address)
+            except OSError:
+                return
