@@ -1,7 +1,9 @@
 """What is true of a bay now: ages, validity and comparisons, worked out once a step for everything that decides.
 
-A value here is fresh and in range, or it is None. Nothing downstream looks at a reading's age again.
+A value here is a number, fresh and in range, or it is None. Nothing downstream looks at a reading's age again.
 """
+
+from math import inf, isfinite
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
@@ -17,20 +19,32 @@ from orchestrator.model import (
     State,
 )
 
-#: A status reply is taken for the charger's present state for this long: five polls.
-CHARGER_STALE_S = 1.0
+#: A status reply is taken for the charger's present state for this long. Three misses are found earlier, also where
+#: orders and polls take turns (0.4 s each); this is for a port that no longer polls at all.
+CHARGER_STALE_S = 1.5
 #: Volts, amps, status and temperature of the pack: three sweeps, at most this.
 FAST_STALE_S = 1.5
 #: The objects that are read once a second: three readings.
 SLOW_STALE_S = 3.0
+#: What a BMU says right after its boot is what its memory held, not what it measured.
+SETTLE_S = 1.0
 #: Standby may show this much: the resolution and offset of a charger's current measurement.
 STANDBY_A = 0.5
 #: Below this the charger sees no battery at its terminals.
 TERMINAL_V = 5.0
 
 
-def _fresh(measurement: Measurement | None, oldest_s: float) -> float | None:
-    return measurement.value if measurement is not None and measurement.t_s >= oldest_s else None
+def _fresh(measurement: Measurement | None, now_s: float, oldest_s: float) -> float | None:
+    """The value, if it may be relied on. A time in the future is as wrong as one too long ago."""
+    if measurement is None or not oldest_s <= measurement.t_s <= now_s + FAST_STALE_S:
+        return None
+    return measurement.value if isfinite(measurement.value) else None
+
+
+def _valid(reading: ChargerReading | None, now_s: float) -> ChargerReading | None:
+    if reading is None or not abs(now_s - reading.t_s) <= CHARGER_STALE_S:
+        return None
+    return reading if isfinite(reading.voltage_v) and isfinite(reading.current_a) else None
 
 
 class Facts:
@@ -62,21 +76,20 @@ class Facts:
         self.snapshot = snapshot
         self.memory = memory
         self.rules = rules
-        reading = snapshot.charger
-        self.reading: ChargerReading | None = (
-            reading if reading is not None and reading.t_s >= now_s - CHARGER_STALE_S else None
-        )
+        self.reading: ChargerReading | None = _valid(snapshot.charger, now_s)
         self.charger: ChargerLink = snapshot.charger_link
         self.battery: BatteryLink = snapshot.battery_link
         self.volts = self.reading.voltage_v if self.reading else None
         self.amps = self.reading.current_a if self.reading else None
-        battery, fast_s, slow_s = snapshot.battery, now_s - FAST_STALE_S, now_s - SLOW_STALE_S
-        self.pack_v = _fresh(battery.voltage_v, fast_s)
-        self.pack_a = _fresh(battery.current_a, fast_s)
-        self.status = _fresh(battery.status, fast_s)
-        self.temperature_c = _fresh(battery.temperature_c, fast_s)
-        self.soc = _fresh(battery.soc_pct, slow_s)
-        self.soh = _fresh(battery.soh_pct, slow_s)
+        battery, boot_s = snapshot.battery, self.battery.boot_t_s
+        settled_s = boot_s + SETTLE_S if boot_s is not None else -inf
+        fast_s, slow_s = max(now_s - FAST_STALE_S, settled_s), max(now_s - SLOW_STALE_S, settled_s)
+        self.pack_v = _fresh(battery.voltage_v, now_s, fast_s)
+        self.pack_a = _fresh(battery.current_a, now_s, fast_s)
+        self.status = _fresh(battery.status, now_s, fast_s)
+        self.temperature_c = _fresh(battery.temperature_c, now_s, fast_s)
+        self.soc = _fresh(battery.soc_pct, now_s, slow_s)
+        self.soh = _fresh(battery.soh_pct, now_s, slow_s)
         self.energised = memory.state in ENERGISED
         self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
         #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
@@ -91,7 +104,7 @@ class Facts:
     def just_booted(self) -> bool:
         """What the BMU said before counts no more, and it had no time to say anything new: that is no silence."""
         boot_s = self.battery.boot_t_s
-        return boot_s is not None and self.now_s - boot_s < FAST_STALE_S
+        return boot_s is not None and self.now_s - boot_s < SETTLE_S + FAST_STALE_S
 
     @property
     def departed(self) -> bool:
@@ -102,6 +115,19 @@ class Facts:
     def present(self) -> bool:
         """A battery is there, with everything fresh that a charge needs."""
         return None not in (self.pack_v, self.pack_a, self.status, self.temperature_c, self.soc, self.soh)
+
+    @property
+    def missing(self) -> str:
+        """What the BMU has not told freshly, of all that a charge needs; for people."""
+        values = {
+            "voltage": self.pack_v,
+            "current": self.pack_a,
+            "status": self.status,
+            "temperature": self.temperature_c,
+            "SOC": self.soc,
+            "SOH": self.soh,
+        }
+        return ", ".join(name for name, value in values.items() if value is None)
 
     @property
     def standby(self) -> bool:

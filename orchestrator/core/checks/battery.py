@@ -23,8 +23,8 @@ STATUS_LIMITS = (BatteryStatus.LOW_TEMPERATURE, BatteryStatus.DISCHARGE_OVER_CUR
 
 
 def bmu_silent(f: Facts) -> str | None:
-    """FAULTS B1."""
-    if not f.silent or f.just_booted:
+    """FAULTS B1, B5, B19, B21: no values, or a line or a node of which the values cannot be trusted."""
+    if (f.battery.online and not f.silent) or f.just_booted:
         return None
     return f.battery.problem or f"the BMU (node {f.rules.bay.battery.node_id}) has stopped answering"
 
@@ -33,15 +33,7 @@ def stale_reading(f: Facts) -> str | None:
     """FAULTS B2: it answers, but not about everything that a charge needs."""
     if f.silent or f.present:
         return None
-    fresh = {
-        "voltage": f.pack_v,
-        "current": f.pack_a,
-        "status": f.status,
-        "temperature": f.temperature_c,
-        "SOC": f.soc,
-        "SOH": f.soh,
-    }
-    return f"no fresh {', '.join(name for name, value in fresh.items() if value is None)} from the BMU"
+    return f"no fresh {f.missing} from the BMU"
 
 
 def sdo_refused(f: Facts) -> str | None:
@@ -93,10 +85,11 @@ def emergency(f: Facts) -> str | None:
 
 def over_temperature(f: Facts) -> str | None:
     """FAULTS B10."""
-    high = f.rules.temperature_c.high - (HEAT_HYSTERESIS_K if "over_temperature" in f.raised else 0.0)
-    if f.temperature_c is None or f.temperature_c < high:
+    high = f.rules.temperature_c.high
+    again = high - HEAT_HYSTERESIS_K
+    if f.temperature_c is None or f.temperature_c < (again if "over_temperature" in f.raised else high):
         return None
-    return f"the pack has {f.temperature_c:.1f} °C; it charges below {high:g} °C"
+    return f"the pack has {f.temperature_c:.1f} °C, the limit is {high:g} °C; it charges again below {again:g} °C"
 
 
 def hot_trip(f: Facts) -> str | None:
@@ -109,10 +102,11 @@ def hot_trip(f: Facts) -> str | None:
 
 def under_temperature(f: Facts) -> str | None:
     """FAULTS B11."""
-    low = f.rules.temperature_c.low + (COLD_HYSTERESIS_K if "under_temperature" in f.raised else 0.0)
-    if f.temperature_c is None or f.temperature_c >= low:
+    low = f.rules.temperature_c.low
+    again = low + COLD_HYSTERESIS_K
+    if f.temperature_c is None or f.temperature_c >= (again if "under_temperature" in f.raised else low):
         return None
-    return f"the pack has {f.temperature_c:.1f} °C; it charges at {low:g} °C or more"
+    return f"the pack has {f.temperature_c:.1f} °C, the limit is {low:g} °C; it charges again at {again:g} °C"
 
 
 def runaway(f: Facts) -> str | None:
@@ -125,11 +119,13 @@ def runaway(f: Facts) -> str | None:
         return None
     rate = (f.temperature_c - then_c) / lasted_s * 60
     limit = f.rules.policy.faults.temperature_rise_k_per_min
-    return f"the pack warms by {rate:.1f} K/min, more than {limit:g} K/min" if rate > limit else None
+    return f"the pack warms by {rate:.2f} K/min, more than {limit:g} K/min" if rate > limit else None
 
 
 def temperature_invalid(f: Facts) -> str | None:
     """FAULTS B13."""
+    if f.just_booted:
+        return None
     wrong = f.battery.implausible.get("temperature_c")
     if wrong:
         return wrong
@@ -144,7 +140,7 @@ def temperature_invalid(f: Facts) -> str | None:
 
 def implausible(f: Facts) -> str | None:
     """FAULTS B14, B17: a value that cannot be."""
-    if not f.battery.implausible:
+    if not f.battery.implausible or f.just_booted:
         return None
     texts = [text for name, text in f.battery.implausible.items() if name != "temperature_c"]
     return "; ".join(texts) or None
