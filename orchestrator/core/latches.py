@@ -1,7 +1,8 @@
 """How faults come and go: debounce, latch, backoff, clear. Mechanism only; what is a fault stands in the table.
 
 Theory of operation. A row's predicate says what is seen now. It becomes a fault after the row's time and number of
-polls, is then followed in every state, and ends as its `Clear` says. A fault whose condition is there is never cleared.
+polls, is then followed in every state, and ends as its `Clear` says. A fault whose condition is there is never cleared,
+and one that has latched only ever by a person.
 """
 
 from dataclasses import replace
@@ -27,9 +28,10 @@ def update(f: Facts) -> dict[str, FaultMemory]:
         fault = before.get(row.id)
         if fault is None and state not in row.where:
             continue
-        if row.departs and departed:
+        left = departed and row.departs
+        if left and not (fault is not None and fault.latched):
             continue
-        looked_for = state in row.where or (fault is not None and fault.raised_s is not None)
+        looked_for = not left and (state in row.where or (fault is not None and fault.raised_s is not None))
         seen = row.check(f) if looked_for else None
         if seen is not None:
             after[row.id] = _present(row, fault or FaultMemory(), seen, f)
@@ -106,7 +108,7 @@ def release(
 ) -> tuple[dict[str, FaultMemory], list[str]]:
     """Clear what a person may clear: by a reset everything, by a start what waits for a start.
 
-    Returns the faults that are left and the reasons why some of them could not be cleared.
+    Returns the faults that are left and the reasons why some of them cannot be cleared; then none is.
     """
     left: dict[str, FaultMemory] = {}
     reasons: list[str] = []
@@ -123,4 +125,4 @@ def release(
         elif now_s - fault.clean_s < row.clean_s:
             left[name] = fault
             reasons.append(f"{name} must be gone for {row.clean_s:g} s first")
-    return left, reasons
+    return (faults if reasons else left), reasons

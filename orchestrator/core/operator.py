@@ -36,9 +36,10 @@ def _start(memory: Memory, now_s: float) -> str:
 
 
 def _reset(memory: Memory, now_s: float) -> str:
-    memory.faults, reasons = latches.release(memory.faults, now_s, by_reset=True)
+    before = memory.faults
+    memory.faults, reasons = latches.release(before, now_s, by_reset=True)
     if reasons:
         return "; ".join(reasons)
-    if memory.state is State.TRIPPED:
+    if len(memory.faults) < len(before):  # in whatever state: the way on is a start, also while the stop is verified
         memory.hold = RESET
     return ""

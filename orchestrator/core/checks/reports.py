@@ -50,8 +50,8 @@ def mode_taken_over(f: Facts) -> str | None:
 
 
 def rejected_frame(f: Facts) -> str | None:
-    """FAULTS C22."""
-    return _error_frame(f, NOT_KNOWN)
+    """FAULTS C22: heard well and not known. Noise can change a command, too, but then the checksum is wrong as well."""
+    return None if f.charger.error_bits & NOT_HEARD else _error_frame(f, NOT_KNOWN)
 
 
 def noisy_line(f: Facts) -> str | None:
