@@ -8,7 +8,7 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import finished
 from orchestrator.core.machine import RESTING, Trigger
-from orchestrator.core.safestop import gives_up
+from orchestrator.core.safestop import LOST_S, gives_up
 from orchestrator.model import ENERGISED, ActiveFault, Effect, State
 
 Course = tuple[Trigger | None, str]
@@ -59,8 +59,12 @@ def _charging_reason(f: Facts, faults: Faults) -> str:
     chosen = f.memory.step
     if chosen is None:
         return "the charger charges by itself (automatic mode)" if not f.rules.manual else f.memory.reason
-    limited = f"; {faults[0].text}" if faults and faults[0].effect is Effect.LIMIT else ""
-    return f"step {chosen.index} ({chosen.current_a:.1f} A): {chosen.rule}{limited}"
+    limited = f"; {faults[0].text}" if faults and faults[0].effect >= Effect.LIMIT else ""
+    rises = ""
+    if f.memory.raise_s is not None:
+        hold_s, at = f.rules.policy.current.raise_after_s, f.rules.policy.source.at("current.raise_after_s")
+        rises = f"; a higher step is allowed, and taken after {hold_s:g} s ({at})"
+    return f"step {chosen.index} ({chosen.current_a:.1f} A): {chosen.rule}{limited}{rises}"
 
 
 def _precharging(f: Facts) -> Course:
@@ -97,10 +101,6 @@ def _stopping(f: Facts, faults: Faults) -> Course:
     return None, f.memory.reason
 
 
-#: A charger that has not answered for this long at the start is not there.
-LOST_S = 3.0
-
-
 def _why(f: Facts) -> str:
     if f.charger.problem:
         return f.charger.problem
@@ -119,8 +119,9 @@ def _resting(f: Facts, faults: Faults) -> Course:
         return Trigger.STOP, fresh.text
     if f.runs:
         return Trigger.STOP, "the charger runs though it was not commanded to"
-    if f.memory.state is State.OFFLINE and f.charger.online and not f.stopped:
-        return None, "the charger answers again; it is being stopped before anything else"
+    if f.memory.state is State.OFFLINE and not f.stopped:
+        answers = f.charger.online and f.reading is not None
+        return None, "the charger is being stopped before anything else" if answers else _offline_reason(f)
     return _rest(f, faults)
 
 
@@ -169,7 +170,8 @@ def _absent(f: Facts) -> tuple[Trigger, str] | None:
     if f.battery.online and not f.silent:
         return None
     if not f.departed:
-        problem = f.battery.problem or f"the BMU (node {f.rules.bay.battery.node_id}) does not answer"
+        does_not = "has just booted" if f.just_booted else "does not answer"
+        problem = f.battery.problem or f"the BMU (node {f.rules.bay.battery.node_id}) {does_not}"
         return Trigger.LOSE, f"{f.volts or 0:.1f} V at the charger, but {problem}"
     return Trigger.REST, "no battery"
 
@@ -179,7 +181,9 @@ def _wanted(f: Facts) -> tuple[bool, str]:
     policy, full_pct = f.rules.policy, f.memory.full_pct
     if f.soc is None:
         return False, "a battery is there; its SOC is not known yet"
-    if full_pct is None:
+    if full_pct is None and f.memory.session is not None:  # what was interrupted is brought to its end
+        key, threshold = "finish.soc_pct", policy.finish.soc_pct
+    elif full_pct is None:
         key, threshold = "start.soc_below_pct", policy.start.soc_below_pct
     else:  # it may have been full by taper at less than the policy's SOC: it must have fallen since
         key, threshold = "recharge.soc_below_pct", min(policy.recharge.soc_below_pct, full_pct - RECHARGE_DROP_PCT)
@@ -192,10 +196,10 @@ def _qualifying(f: Facts) -> Course:
     memory = f.memory
     if not f.present or f.volts is None:
         memory.qualified_s = None
-        return None, "waiting for fresh values of charger and BMU"
+        return None, f"waiting for fresh values: {f.missing or 'the charger’s status'}"
     if memory.qualified_s is None:
         memory.qualified_s = f.now_s
-    if f.now_s - memory.qualified_s < QUALIFY_S or not _seen_twice(f, memory.qualified_s):
+    if f.now_s - memory.qualified_s < QUALIFY_S or not _seen_twice(f, memory.qualified_s) or not f.stopped:
         return None, "checking charger and battery before a charge"
     rule = f.rules.policy.precharge
     if f.rules.manual and rule is not None and f.pack_v is not None and f.pack_v < rule.below_v:

@@ -14,6 +14,7 @@ from enum import Enum, auto
 
 from orchestrator.core.checks import battery, charge, obedience, pair, reports
 from orchestrator.core.facts import Facts
+from orchestrator.core.safestop import OBEY_STOP_S
 from orchestrator.model import ENERGISED, Effect, State
 
 Check = Callable[[Facts], str | None]
@@ -32,9 +33,10 @@ ALWAYS = frozenset(State)
 #: The charger was verified to stand by and was not told to run.
 AT_REST = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
 AT_WORK = ENERGISED | {State.QUALIFYING}
-STARTING = frozenset({State.STARTING})
+#: The charger is heard for the first time, or again.
+UNSEEN = frozenset({State.STARTING, State.OFFLINE})
 QUALIFYING = frozenset({State.QUALIFYING})
-UNSTOPPED = frozenset({State.STOPPING, State.UNCONTROLLABLE})
+UNSTOPPED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,22 +76,22 @@ FAULTS: tuple[Row, ...] = (
     # whether it obeys
     Row("charger_silent", "C23, C25", E.STOP, Clear.BACKOFF, obedience.charger_silent, AT_WORK,
         "check the charger's power and its cable"),
-    Row("found_running", "G10", E.STOP, Clear.OPERATOR, obedience.found_running, STARTING,
+    Row("found_running", "G10", E.STOP, Clear.OPERATOR, obedience.found_running, UNSEEN,
         "it was stopped; find out why it ran, then start"),
     Row("rogue_run", "C5", E.TRIP, Clear.RESET, obedience.rogue_run, AT_REST,
         "somebody else commands this charger, or it is defective: find out, then reset"),
     Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNSTOPPED,
-        "cut the charger's mains now; reset after it was repaired"),
+        "cut the charger's mains now; reset after it was repaired", for_s=OBEY_STOP_S),
     Row("will_not_start", "C7", E.STOP, Clear.BACKOFF, obedience.will_not_start, ENERGISED,
         "check the charger's rotary switch and its mains"),
     Row("stopped_by_itself", "C4", E.STOP, Clear.OPERATOR, obedience.stopped_by_itself, ENERGISED,
-        "find out who stopped it, then start", polls=2),
+        "find out who stopped it, then start", polls=2, departs=True),
     Row("setting_not_obeyed", "C9, C16", E.TRIP, Clear.RESET, obedience.setting_not_obeyed, ENERGISED,
         "check the charger, then reset"),
     Row("over_current", "C11", E.TRIP, Clear.RESET, obedience.over_current, ALWAYS,
         "check the station file's steps_a against the charger, then reset", polls=2),
     Row("early_full", "C18", E.STOP, Clear.OPERATOR, obedience.early_full, ENERGISED,
-        "check the BMU's SOC against the pack's voltage, then start", polls=2),
+        "check the BMU's SOC against the pack's voltage, then start", polls=2, departs=True),
     Row("open_circuit", "C13", E.STOP, Clear.BACKOFF, obedience.open_circuit, ENERGISED,
         "check the contacts between charger and battery", departs=True),
     Row("no_battery", "C14", E.STOP, Clear.BACKOFF, obedience.no_battery, ENERGISED,
@@ -108,7 +110,7 @@ FAULTS: tuple[Row, ...] = (
     Row("back_feed", "C12", E.TRIP, Clear.RESET, pair.back_feed, ENERGISED,
         "check charger and wiring, then reset", for_s=2),
     # the battery
-    Row("bmu_silent", "B1", E.STOP, Clear.BACKOFF, battery.bmu_silent, AT_WORK,
+    Row("bmu_silent", "B1, B5, B19, B21", E.STOP, Clear.BACKOFF, battery.bmu_silent, AT_WORK,
         "check the CAN cable, its termination and the BMU's power", departs=True),
     Row("stale_reading", "B2", E.STOP, Clear.BACKOFF, battery.stale_reading, ENERGISED,
         "check the CAN bus for load and errors", departs=True),
@@ -133,7 +135,7 @@ FAULTS: tuple[Row, ...] = (
     Row("under_temperature", "B11", E.PAUSE, Clear.AUTO, battery.under_temperature, ALWAYS,
         "goes on when it has warmed up", clean_s=10),
     Row("runaway", "B12", E.TRIP, Clear.RESET, battery.runaway, ENERGISED,
-        "keep people away; inspect the pack, then reset"),
+        "keep people away; inspect the pack, then reset", for_s=1),
     Row("temperature_invalid", "B13", E.TRIP, Clear.RESET, battery.temperature_invalid, ALWAYS,
         "no temperature, no charge: check the sensor and the object map, then reset", clean_s=5),
     Row("implausible", "B14, B17", E.STOP, Clear.BACKOFF, battery.implausible, ALWAYS,

@@ -2,16 +2,16 @@
 
 from orchestrator.config.policy import Band, Table
 from orchestrator.core.facts import Facts
-from orchestrator.model import Effect, Step
+from orchestrator.model import ActiveFault, Effect, Step
 
 #: (step, what limits it, for whom: the key in policy or station, the value)
 Bound = tuple[int, str, str, float | None]
 
 
-def choose(f: Facts, worst: Effect | None) -> tuple[Step, float | None]:
+def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
     """The step for now, and since when a higher one has been allowed (None: none is).
 
-    `worst` is the worst effect of the faults in force; LIMIT means the lowest step.
+    `worst` is the worst of the faults in force; LIMIT, and what is worse, means the lowest step.
     """
     bound = _lowest(f, worst)
     before, raise_s = f.memory.step, f.memory.raise_s
@@ -25,13 +25,13 @@ def choose(f: Facts, worst: Effect | None) -> tuple[Step, float | None]:
     return before, raise_s
 
 
-def _lowest(f: Facts, worst: Effect | None) -> Bound:
+def _lowest(f: Facts, worst: ActiveFault | None) -> Bound:
     current = f.rules.policy.current
     lowest: Bound = (len(f.rules.steps_a) - 1, "the highest step, nothing limits it", "", None)
     if f.rules.top_step < lowest[0]:
         lowest = (f.rules.top_step, "the station's current limit", "limits.current_a", None)
-    if worst is not None and worst >= Effect.LIMIT:
-        lowest = (0, "a fault that limits the current", "", None)
+    if worst is not None and worst.effect >= Effect.LIMIT:
+        lowest = (0, f"the fault {worst.id}", "", None)
     for name, table, value in (
         ("temperature_c", current.temperature_c, f.temperature_c),
         ("soc_pct", current.soc_pct, f.soc),

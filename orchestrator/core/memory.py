@@ -51,7 +51,7 @@ class Memory:
     sample: tuple[float, float] | None = None  #: (t_s, °C), the newest …
     sample_before: tuple[float, float] | None = None  #: … and the one before
     warmth: tuple[tuple[float, float], ...] = ()  #: (t_s, °C) of the last minutes, oldest first
-    running_s: float | None = None  #: since when the charger has reported that it runs
+    runs_s: float | None = None  #: since when the charger has reported that it runs, or delivers current
     idle_a_s: float | None = None  #: since when a running charger has delivered nothing
     mode_s: float = 0.0  #: since when the charger has shown its present mode …
     mode: int = 0  #: … which is this one

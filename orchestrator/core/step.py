@@ -103,7 +103,7 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step
         return Setpoint(run=True), None
     mode, precharge = SETPOINTS[memory.state]
     if memory.state is State.CHARGING:
-        chosen, memory.raise_s = limits.choose(f, faults[0].effect if faults else None)
+        chosen, memory.raise_s = limits.choose(f, faults[0] if faults else None)
     else:
         chosen, memory.raise_s = Step(0, rules.steps_a[0], "precharge is always on the lowest step"), None
     if memory.step is not None and memory.session is not None and chosen.index != memory.step.index:

@@ -16,7 +16,7 @@ def follow(f: Facts, last_s: float | None) -> None:
     """Bring the memory up to this step; `last_s` is the time of the one before."""
     memory, reading = f.memory, f.reading
     running = reading is not None and reading.operation is Operation.RUNNING
-    memory.running_s = _since(running, memory.running_s, f.now_s)
+    memory.runs_s = _since(f.runs, memory.runs_s, f.now_s)
     idle = running and reading is not None and reading.current_a < NO_CURRENT_A
     charging = reading is not None and reading.charge_mode is ChargeMode.CHARGE
     memory.idle_a_s = _since(idle and charging, memory.idle_a_s, f.now_s)
@@ -37,9 +37,12 @@ def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  #
 
 
 def _follow_warmth(f: Facts) -> None:
-    """Keep the last minutes' temperatures, thinned out, for the rate of warming and for jumps."""
+    """Keep the last minutes' temperatures, thinned out, for the rate of warming and for jumps.
+
+    After a silence it may be another battery, so nothing from before it is compared with.
+    """
     memory, newest = f.memory, f.snapshot.battery.temperature_c
-    if newest is None:
+    if newest is None or f.temperature_c is None:
         memory.sample, memory.sample_before, memory.warmth = None, None, ()
         return
     sample = (newest.t_s, newest.value)
@@ -63,13 +66,16 @@ def _follow_battery(f: Facts) -> None:
 
 
 def _follow_session(f: Facts, last_s: float | None) -> None:
-    """Count time and charge. A gap in the charger's readings counts as nothing beyond their age limit."""
+    """Count time and charge. A gap in the charger's readings counts as nothing beyond their age limit.
+
+    In standby nothing is counted: a suspended charge may last for days, and the offset of a measurement is no charge.
+    """
     memory, reading = f.memory, f.reading
     if memory.session is None:
         return
     ah = wh = 0.0
     if reading is not None and reading.t_s != memory.counted_t_s:
-        if memory.counted_t_s is not None:
+        if memory.counted_t_s is not None and not f.standby:
             hours = min(reading.t_s - memory.counted_t_s, CHARGER_STALE_S) / 3600
             ah, wh = reading.current_a * hours, reading.current_a * reading.voltage_v * hours
         memory.counted_t_s = reading.t_s
@@ -95,7 +101,7 @@ def follow_state(f: Facts, before: State) -> None:
     if memory.state not in ENERGISED:
         memory.order = None
     elif before not in ENERGISED:
-        memory.resumed, memory.resume_s, memory.order = False, f.now_s, None
+        memory.resumed, memory.resume_s, memory.order, memory.full_pct = False, f.now_s, None, None
         if memory.session is None:
             memory.session = Session(started_s=f.now_s, soc_start_pct=f.soc, soc_pct=f.soc)
             memory.counted_t_s = f.reading.t_s if f.reading else None

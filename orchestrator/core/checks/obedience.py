@@ -1,7 +1,7 @@
 """Faults of a charger that does not do as it is told, or does not answer."""
 
 from orchestrator.core.facts import CHARGER_STALE_S, Facts
-from orchestrator.core.safestop import OBEY_STOP_S
+from orchestrator.core.finish import early_below_pct
 from orchestrator.model import Action, ChargeMode, Operation
 
 #: A setting must be read back within this time (about ten attempts), and a run must be seen (FAULTS C7, C9).
@@ -17,8 +17,6 @@ NO_CURRENT_A = 0.1
 IDLE_MAX_S = 10.0
 #: Nearly full packs may take no current.
 NEARLY_FULL_PCT = 95.0
-#: The charger ends a charge by itself below this state of charge: something is wrong.
-EARLY_FULL_PCT = 80.0
 
 
 def charger_silent(f: Facts) -> str | None:
@@ -34,8 +32,8 @@ def charger_silent(f: Facts) -> str | None:
 
 
 def found_running(f: Facts) -> str | None:
-    """FAULTS G10: the last run of this service died, or somebody else commands this charger."""
-    return "the charger was found running when the service started" if f.runs else None
+    """FAULTS G10: the last run of this service died, or it was started by somebody else while we could not see it."""
+    return "the charger was found running though it was not commanded to" if f.runs else None
 
 
 def rogue_run(f: Facts) -> str | None:
@@ -46,13 +44,10 @@ def rogue_run(f: Facts) -> str | None:
 
 
 def will_not_stop(f: Facts) -> str | None:
-    """FAULTS C6: it answers, and the answer is that it goes on."""
-    sent_s, since_s = f.charger.stop_sent_s, f.memory.since_s
-    if sent_s is None or since_s is None or f.state_s < OBEY_STOP_S or sent_s < since_s:
+    """FAULTS C6: it answers, and the answer is that it goes on. (A line that is cut is no disobedience.)"""
+    if not f.runs or f.reading is None:
         return None
-    if f.reading is None or f.reading.t_s < since_s + OBEY_STOP_S or not f.runs:
-        return None
-    return f"the charger does not obey the stop: {f.reading.current_a:.2f} A, {f.state_s:.1f} s after it was sent"
+    return f"the charger does not obey the stop, which is repeated: it still delivers {f.reading.current_a:.2f} A"
 
 
 def will_not_start(f: Facts) -> str | None:
@@ -64,9 +59,9 @@ def will_not_start(f: Facts) -> str | None:
 
 def stopped_by_itself(f: Facts) -> str | None:
     """FAULTS C4: an emergency stop past this service looks like this, too; it is not for us to start again."""
-    if f.reading is None or not f.energised or not f.memory.ran or f.full_mode:
+    if f.reading is None or not f.energised or not f.memory.ran:
         return None
-    if f.reading.operation is not Operation.STOPPED:
+    if f.reading.operation is not Operation.STOPPED or (f.full_mode and f.rules.policy.finish.charger_full):
         return None
     return "the charger stopped though it was told to run"
 
@@ -103,7 +98,7 @@ def over_current(f: Facts) -> str | None:
 
 def early_full(f: Facts) -> str | None:
     """FAULTS C18."""
-    if not f.full_mode or f.soc is None or f.soc >= min(EARLY_FULL_PCT, f.rules.policy.finish.soc_pct):
+    if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f):
         return None
     return f"the charger reports full (mode 5), the BMU only {f.soc:.0f} %"
 
@@ -128,7 +123,9 @@ def wakes_too_long(f: Facts) -> str | None:
 
 
 def _mode_too_long(f: Facts, modes: tuple[ChargeMode, ...], limit_s: float, what: str) -> str | None:
-    lasted_s = f.now_s - f.memory.mode_s
-    if f.memory.mode not in modes or f.memory.running_s is None or lasted_s <= limit_s:
+    if f.memory.mode not in modes or f.memory.runs_s is None:
+        return None
+    lasted_s = f.now_s - max(f.memory.mode_s, f.memory.runs_s)  # a charger at rest may show any mode for hours
+    if lasted_s <= limit_s:
         return None
     return f"the charger {what} for {lasted_s / 60:.0f} min"

@@ -38,6 +38,6 @@ def amps_disagree(f: Facts) -> str | None:
 
 def back_feed(f: Facts) -> str | None:
     """FAULTS C12."""
-    if f.memory.running_s is None or f.pack_a is None or f.pack_a >= -BACK_FEED_A:
+    if f.memory.runs_s is None or f.pack_a is None or f.pack_a >= -BACK_FEED_A:
         return None
     return f"the BMU reports a discharge of {-f.pack_a:.2f} A while the charger runs"
