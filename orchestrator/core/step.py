@@ -23,6 +23,7 @@ from orchestrator.model import (
     ChargeMode,
     Command,
     Decision,
+    Effect,
     Precharge,
     Session,
     Setpoint,
@@ -62,7 +63,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
         Decision(
             state=memory.state,
             reason=memory.reason,
-            command=_order(f, setpoint),
+            command=_order(f, setpoint, faults),
             setpoint=setpoint,
             step=chosen,
             faults=faults,
@@ -112,9 +113,13 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step
     return Setpoint(run=True, current_limit=chosen.index, charge_mode=mode, precharge=precharge), chosen
 
 
-def _order(f: Facts, setpoint: Setpoint) -> Command | None:
-    """The standing order: a stop, the next value of the setpoint, or nothing."""
+def _order(f: Facts, setpoint: Setpoint, faults: tuple[ActiveFault, ...]) -> Command | None:
+    """The standing order: a stop, the next value of the setpoint, or nothing.
+
+    A fault that stops and is new orders a stop in every state, also where the charger was just seen to stand by.
+    """
     memory = f.memory
     if memory.state in ENERGISED:
         return next_order(f, setpoint)
-    return STOP if must_stop(f, memory.state) else None
+    news = any(fault.since_s == f.now_s and fault.effect >= Effect.STOP for fault in faults)
+    return STOP if news or must_stop(f, memory.state) else None
