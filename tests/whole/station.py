@@ -58,8 +58,9 @@ def station_document(directory: Path, cans: Sequence[Mapping[str, object]], bays
 class Service:
     """`python -m orchestrator run` on a station file; what it says is in `directory`/service.log."""
 
-    def __init__(self, directory: Path, document: Document) -> None:
+    def __init__(self, directory: Path, document: Document, run: Sequence[str] = ("-m", "orchestrator", "run")) -> None:
         self.directory = directory
+        self._run = run
         self.file = directory / "station.yaml"
         self.file.write_text(json.dumps(document, indent=1), encoding="utf-8")  # JSON is YAML, too
         self.socket = directory / "run" / "orchestrator.sock"
@@ -71,7 +72,7 @@ class Service:
     def start(self) -> Self:
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "orchestrator", "run", str(self.file)],
+                [sys.executable, *self._run, str(self.file)],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log,
@@ -94,10 +95,19 @@ class Service:
         assert self._process is not None
         self._process.send_signal(number)
 
-    def kill_controller(self) -> None:
+    @property
+    def guardian(self) -> int:
+        """The process that was started."""
         assert self._process is not None
-        children = Path(f"/proc/{self._process.pid}/task/{self._process.pid}/children").read_text().split()
-        os.kill(int(children[0]), signal.SIGKILL)
+        return self._process.pid
+
+    @property
+    def controller(self) -> int:
+        """Its child."""
+        return int(Path(f"/proc/{self.guardian}/task/{self.guardian}/children").read_text())
+
+    def kill_controller(self) -> None:
+        os.kill(self.controller, signal.SIGKILL)
 
     def kill_all(self) -> None:
         """Guardian and controller at one moment, as a power failure does."""

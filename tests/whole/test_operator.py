@@ -7,7 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.errors import ServiceError
+from orchestrator.service.control import ask
 from orchestrator.sim.client import PlantProcess
+from tests.sim.wires import udp_keys
 from tests.waiting import wait_until
 from tests.whole.station import Document, Service, orchestrator, whole_station
 
@@ -125,18 +128,25 @@ def test_wrong_use_is_told(station: Station) -> None:
     assert service.cli("start").returncode == 2
     assert service.cli("start", "bay-1", "--all").returncode == 2
     assert service.cli("explode").returncode == 2
+    for strange in ({"verb": "explode"}, {"verb": ["stop"]}, {}, {"verb": "stop", "bays": "bay-1"}):
+        with pytest.raises(ServiceError, match=r"unknown verb|'bays' is a list"):
+            ask(service.socket, strange)
     nowhere = orchestrator("status", "--socket", str(service.directory / "no.sock"))
     assert nowhere.returncode == 1
     assert "no service answers on" in nowhere.stderr
-    assert orchestrator("status", env={"ORCHESTRATOR_SOCKET": ""}).returncode == 1
+    assert orchestrator("status", env={"ORCHESTRATOR_SOCKET": ""}).returncode == 2
 
 
-def test_a_charger_that_is_not_there_is_offline(station: Station) -> None:
-    _, service = station
+def test_a_charger_that_is_not_there_at_the_start_is_used_once_it_is(station: Station) -> None:
+    plant, service = station
     bay = service.wait("OFFLINE", ["bay-4"])["bay-4"]
     assert "no such port" in bay["reason"]
     assert bay["charger"]["online"] is False
     assert bay["battery"]["online"] is True
+    port = Path(plant.bays[3]["port"])
+    port.with_name(f"{port.name}-missing").symlink_to(port)
+    charging(station, 4)
+    assert plant.state(4)["stops"] > 0
 
 
 def test_a_charger_in_another_mode_than_the_file_says_is_not_used(station: Station) -> None:
@@ -156,7 +166,9 @@ def test_a_second_service_is_refused(station: Station) -> None:
 def test_a_second_service_cannot_take_the_ports(station: Station, tmp_path: Path) -> None:
     charging(station)
     plant, service = station
-    thief = Service(tmp_path, json.loads(service.file.read_text()))
+    document = json.loads(service.file.read_text(encoding="utf-8"))
+    document["can"]["can0"] |= udp_keys()  # two masters on one bus would stop the charge, and rightly so
+    thief = Service(tmp_path, document)
     try:
         bay = thief.start().wait("OFFLINE")["bay-1"]
         assert "in use: another program holds it" in bay["reason"]
@@ -202,9 +214,11 @@ def test_a_battery_that_leaves_and_another_that_comes(station: Station) -> None:
 def test_the_end_names_the_charger_that_nobody_could_verify(station: Station) -> None:
     """The last one here."""
     plant, service = station
+    plant.inject("port_gone", 3)
+    service.wait("OFFLINE", ["bay-3"])
     service.signal(signal.SIGTERM)
     assert service.ended() == 1
     log = service.log().splitlines()
-    assert log[-1] == "ended: NOT verified: bay-4"
-    assert [plant.state(bay)["operation"] for bay in (1, 2, 3)] == [0, 0, 0]
+    assert log[-1] == "ended: NOT verified: bay-3"
+    assert [plant.state(bay)["operation"] for bay in (1, 2, 4)] == [0, 0, 0]
     assert all(line.startswith(("bay-", "whole: ", "SIGTERM: ", "ended: ")) for line in log)  # no traceback
