@@ -1,6 +1,10 @@
-"""A bay whose time jumps: an obedient charger and a healthy battery, which a test then spoils."""
+"""A bay whose time jumps: an obedient charger and a healthy battery, which a test then spoils.
 
-from dataclasses import replace
+Each tick the charger hears the last standing order, both devices are read, and one step is taken. Nothing is late and
+nothing gets lost unless a test says so; for that there is `site.py`.
+"""
+
+from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestrator.config.load import load_policy
@@ -32,7 +36,11 @@ from orchestrator.model import (
 from orchestrator.protocol.objects import ObjectMap
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
-TICK_S = 0.2
+#: A binary fraction, so that a limit can be hit exactly.
+TICK_S = 0.25
+#: What the devices' layer calls silence.
+MISSES_UNTIL_SILENT = 3
+BMU_SILENT_S = 1.5
 
 
 def bay(policy: Policy | None = None, control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> Bay:
@@ -46,6 +54,42 @@ def bay(policy: Policy | None = None, control: ControlMode = ControlMode.MANUAL,
     )
 
 
+@dataclass
+class Charger:
+    """As the document has it; like the one in `sim` it remembers its run command over a standby."""
+
+    manual: bool
+    resting: bool = True
+    run: bool = False
+    limit: int = 0
+    mode: ChargeMode = ChargeMode.FULL
+    precharge: Precharge = Precharge.OFF
+
+    @property
+    def running(self) -> bool:
+        return not self.resting and (self.run or not self.manual)
+
+    @property
+    def shown_mode(self) -> ChargeMode:
+        return ChargeMode.FULL if self.resting else self.mode
+
+    def obey(self, command: Command) -> None:
+        match command.action:
+            case Action.STOP:
+                self.resting, self.run = True, False
+            case Action.RESUME:
+                self.resting = False
+                self.mode = self.mode if self.manual else ChargeMode.CHARGE
+            case Action.SET_LIMIT:
+                self.limit = command.value
+            case Action.SET_MODE:
+                self.mode = ChargeMode(command.value)
+            case Action.SET_PRECHARGE:
+                self.precharge = Precharge(command.value)
+            case Action.RUN:
+                self.run = self.run or not self.resting
+
+
 class World:
     """Everything true of one bay; `run` lets time pass in ticks, `decision` is the newest."""
 
@@ -53,21 +97,16 @@ class World:
         self.rules = Rules.of(the_bay or bay())
         self.memory = Memory()
         self.now_s = 1000.0
-        self.obeys = True
+        self.charger = Charger(self.rules.manual)
+        self.deaf: set[Action] = set()  #: orders that the charger does not hear
+        self.writes = True  #: the port hands orders over
         self.charger_answers = True
         self.battery_answers = True
-        self.resumed = False
-        self.charger = ChargerReading(
-            self.now_s,
-            48.0,
-            0.0,
-            self.rules.bay.charger.control,
-            Operation.STOPPED,
-            0,
-            ChargeMode.FULL,
-            Precharge.OFF,
-            Connection.NORMAL,
-        )
+        self.port_hangs = False  #: nobody polls the charger any more, so nobody counts misses
+        self.shows: dict[str, Any] = {}  #: what the charger's status says instead of the truth
+        self.amps: float | None = None  #: what flows while it runs, whatever was set
+        self.leak_a = 0.0  #: what flows while it does not
+        self.volts: float | None = None  #: at the charger, if not those of the pack
         self.charger_link = ChargerLink(online=True)
         self.battery_link = BatteryLink(online=True)
         self.values: dict[str, float | None] = {
@@ -79,8 +118,12 @@ class World:
             "soh_pct": 100.0,
             **battery,
         }
-        self.charger_overrides: dict[str, Any] = {}
-        self.amps: float | None = None  #: overrides what flows
+        self.frozen: set[str] = set()  #: values that are not read any more
+        self.pack_amps: float | None = None  #: what the BMU measures, if not what flows
+        self.reading: ChargerReading | None = None
+        self.measured: dict[str, Measurement] = {}
+        self.heard_s = self.now_s  #: when the BMU last answered
+        self.internal = ""  #: an exception of our own, for one tick
         self.decisions: list[Decision] = []
 
     @property
@@ -91,9 +134,30 @@ class World:
     def state(self) -> State:
         return self.decision.state
 
-    def tick(self, dt_s: float = TICK_S, request: Request | None = None, internal: str = "") -> Decision:
+    def is_in(self, *states: State) -> bool:
+        return self.state in states
+
+    @property
+    def raised(self) -> dict[str, str]:
+        """The faults in force: id and text."""
+        return {fault.id: fault.text for fault in self.decision.faults}
+
+    @property
+    def orders(self) -> list[Command | None]:
+        """The standing orders so far, each once."""
+        commands = [decision.command for decision in self.decisions]
+        return [now for before, now in zip([None, *commands], commands, strict=False) if now != before]
+
+    def states(self, since_s: float = 0.0) -> list[State]:
+        """The states that were gone through in the last `since_s` seconds (0: ever), each once."""
+        ticks = round(since_s / TICK_S)
+        states = [decision.state for decision in self.decisions[-ticks:]]
+        return [now for before, now in zip([None, *states], states, strict=False) if now is not before]
+
+    def tick(self, dt_s: float = TICK_S, request: Request | None = None) -> Decision:
         self.now_s += dt_s
-        self._obey()
+        self._obey(dt_s)
+        internal, self.internal = self.internal, ""
         decision, self.memory = step(self.now_s, self.snapshot(request, internal), self.memory, self.rules)
         self.decisions.append(decision)
         return decision
@@ -110,52 +174,90 @@ class World:
                 return self.decision
         raise AssertionError(f"{state} not reached in {at_most_s} s, but {self.decision}")
 
+    def ask(self, request: Request) -> str:
+        """What becomes of the request; "" is yes."""
+        return self.tick(request=request).answer
+
+    def charging(self, state: State = State.CHARGING) -> "World":
+        """Until the charger does all that it was told in `state`."""
+        self.until(state, 4000.0)
+        while self.decision.command is not None:
+            self.tick()
+        return self
+
+    def boot(self) -> None:
+        """The BMU boots: nothing of what it said holds any more."""
+        link = self.battery_link
+        self.battery_link = replace(link, boots=link.boots + 1, boot_t_s=self.now_s, heartbeat_s=None)
+        self.measured = {}
+
+    def leave(self) -> None:
+        """Somebody takes the battery out."""
+        self.battery_answers, self.volts, self.amps = False, 0.0, 0.0
+
+    def arrive(self, **battery: float) -> None:
+        """Somebody puts a battery in."""
+        self.battery_answers, self.volts, self.amps = True, None, None
+        self.values.update(battery)
+
+    # --- what is read ---
+
     def snapshot(self, request: Request | None, internal: str) -> Snapshot:
-        t_s = self.now_s
-        reading = replace(self.charger, **self.charger_overrides)
-        battery = BatteryReading(**{k: Measurement(v, t_s) for k, v in self.values.items() if v is not None})
-        if self.charger_answers:
-            self.last_reading = replace(reading, t_s=t_s)
+        if self.charger_answers and not self.port_hangs:
+            self.reading = self._reading()
         if self.battery_answers:
-            self.last_battery = battery
+            self.heard_s = self.now_s
+            for name, value in self.values.items():
+                if value is None:
+                    self.measured.pop(name, None)
+                elif name not in self.frozen:
+                    self.measured[name] = Measurement(value, self.now_s)
+        silent = self.now_s - self.heard_s >= BMU_SILENT_S
         return Snapshot(
-            charger=getattr(self, "last_reading", None),
-            charger_link=replace(self.charger_link, online=self.charger_answers and self.charger_link.online),
-            battery=getattr(self, "last_battery", BatteryReading()),
-            battery_link=replace(self.battery_link, online=self.battery_answers and self.battery_link.online),
+            charger=self.reading,
+            charger_link=self._line(),
+            battery=BatteryReading(**self.measured),
+            battery_link=replace(self.battery_link, online=self.battery_link.online and not silent),
             request=request,
             internal=internal,
         )
 
-    def _obey(self) -> None:
-        """What an ideal port and charger make of the last decision within one tick."""
+    def _line(self) -> ChargerLink:
+        link = self.charger_link
+        misses = 0 if self.charger_answers else link.misses + 1
+        self.charger_link = replace(link, misses=misses)
+        if misses < MISSES_UNTIL_SILENT:
+            return self.charger_link
+        return replace(self.charger_link, online=False, problem="/dev/ttyX: no answer")
+
+    def _reading(self) -> ChargerReading:
+        charger = self.charger
+        truth: dict[str, Any] = {
+            "t_s": self.now_s,
+            "voltage_v": self.volts if self.volts is not None else self.values["voltage_v"] or 0.0,
+            "current_a": self._amps(),
+            "control_mode": self.rules.bay.charger.control,
+            "operation": Operation.RUNNING if charger.running else Operation.STOPPED,
+            "current_limit": charger.limit,
+            "charge_mode": charger.shown_mode,
+            "precharge": charger.precharge,
+            "connection": Connection.NORMAL,
+        }
+        return ChargerReading(**{**truth, **self.shows})
+
+    def _amps(self) -> float:
+        if not self.charger.running:
+            return self.leak_a
+        return STEPS_A[self.charger.limit] if self.amps is None else self.amps
+
+    def _obey(self, dt_s: float) -> None:
+        """What a port and a charger make of the last decision within one tick."""
         command = self.decisions[-1].command if self.decisions else None
-        if command is not None:
-            sent_s = self.now_s - TICK_S / 2
+        if command is not None and self.writes:
+            sent_s = self.now_s - dt_s / 2
             stop_s = sent_s if command.action is Action.STOP else self.charger_link.stop_sent_s
             self.charger_link = replace(self.charger_link, sent=Sent(command, sent_s), stop_sent_s=stop_s)
-            if self.obeys:
-                self.charger = obeyed(self.charger, command)
-        running = self.charger.operation is Operation.RUNNING
-        amps = (STEPS_A[self.charger.current_limit or 0] if running else 0.0) if self.amps is None else self.amps
-        self.charger = replace(self.charger, current_a=amps, voltage_v=self.values["voltage_v"] or 0.0)
-        if self.amps is None and self.values["current_a"] is not None:
-            self.values["current_a"] = amps
-
-
-def obeyed(charger: ChargerReading, command: Command) -> ChargerReading:
-    """What a charger shows after it has obeyed."""
-    match command.action:
-        case Action.STOP:
-            return replace(charger, operation=Operation.STOPPED, charge_mode=ChargeMode.FULL)
-        case Action.RESUME:
-            running = Operation.STOPPED if charger.control_mode is ControlMode.MANUAL else Operation.RUNNING
-            return replace(charger, charge_mode=ChargeMode.BATTERY_SEARCH, operation=running)
-        case Action.SET_LIMIT:
-            return replace(charger, current_limit=command.value)
-        case Action.SET_MODE:
-            return replace(charger, charge_mode=ChargeMode(command.value))
-        case Action.SET_PRECHARGE:
-            return replace(charger, precharge=Precharge(command.value))
-        case Action.RUN:
-            return replace(charger, operation=Operation.RUNNING)
+            if command.action not in self.deaf:
+                self.charger.obey(command)
+        if self.values["current_a"] is not None:
+            self.values["current_a"] = self._amps() if self.pack_amps is None else self.pack_amps

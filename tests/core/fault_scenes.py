@@ -1,0 +1,295 @@
+"""One scene for every way in which a row of the fault table comes true, and back."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from orchestrator.config.policy import Policy
+from orchestrator.keys import Range
+from orchestrator.model import (
+    Action,
+    BatteryStatus,
+    ChargeMode,
+    Connection,
+    ControlMode,
+    ErrorBit,
+    Operation,
+    Precharge,
+    Request,
+    State,
+)
+from tests.core.bays import POLICY, charging, full, idle, pulse, qualifying, running_at_the_start
+from tests.core.world import TICK_S, World, bay
+
+Act = Callable[[World], object]
+S = State
+
+# --- worlds for single rows -------------------------------------------------------------------------------------------
+
+
+def with_policy(policy: Policy) -> Callable[[], World]:
+    return lambda: World(bay(policy)).charging()
+
+
+def finish(max_hours: float = 12.0, max_ah: float = 44.0) -> Policy:
+    return replace(POLICY, finish=replace(POLICY.finish, max_hours=max_hours, max_ah=max_ah))
+
+
+def warm(celsius: float) -> Callable[[], World]:
+    return lambda: World(temperature_c=celsius).charging()
+
+
+def hot() -> World:
+    """Where a pack may have 56 °C, so that the trip comes before the pause."""
+    policy = replace(POLICY, pack=replace(POLICY.pack, temperature_c=Range(0, 56)))
+    the_bay = bay(policy)
+    return World(
+        replace(the_bay, limits=replace(the_bay.limits, temperature_c=Range(0, 60))), temperature_c=52
+    ).charging()
+
+
+def long_charging() -> World:
+    world = charging()
+    world.run(190, dt_s=1.0)
+    return world
+
+
+def short_continuous() -> World:
+    assert POLICY.precharge is not None
+    rule = replace(POLICY.precharge, continuous=replace(POLICY.precharge.continuous, max_min=4))
+    return World(bay(replace(POLICY, precharge=rule)), voltage_v=36.0).charging(S.PRECHARGE_CONTINUOUS)
+
+
+def ordered_to_run() -> World:
+    world = World()
+    world.deaf.add(Action.RUN)
+    world.until(S.CHARGING)
+    while world.decision.command is None or world.decision.command.action is not Action.RUN:
+        world.tick()
+    return world
+
+
+def beating() -> World:
+    world = World()
+    world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=1e9)
+    return world.charging()
+
+
+# --- what goes wrong, and how that ends -------------------------------------------------------------------------------
+
+
+def shows(**values: object) -> Act:
+    return lambda world: world.shows.update(values)
+
+
+def value(**values: float) -> Act:
+    return lambda world: world.values.update(values)
+
+
+def bmu(**changes: object) -> Act:
+    def act(world: World) -> None:
+        world.battery_link = replace(world.battery_link, **changes)  # type: ignore[arg-type]  # its fields by name
+
+    return act
+
+
+def charger(**changes: object) -> Act:
+    def act(world: World) -> None:
+        world.charger_link = replace(world.charger_link, **changes)  # type: ignore[arg-type]  # its fields by name
+
+    return act
+
+
+def world_has(**changes: object) -> Act:
+    def act(world: World) -> None:
+        for name, new in changes.items():
+            setattr(world, name, new)
+
+    return act
+
+
+def error_frame(bits: ErrorBit) -> Act:
+    return lambda world: charger(error_bits=int(bits), error_t_s=world.now_s + TICK_S)(world)
+
+
+def deaf(action: Action, **values: float) -> Act:
+    def act(world: World) -> None:
+        world.deaf.add(action)
+        world.values.update(values)
+
+    return act
+
+
+def hears(world: World) -> None:
+    world.deaf.clear()
+
+
+def shows_truth(world: World) -> None:
+    world.shows.clear()
+
+
+def nothing(world: World) -> None:
+    pass
+
+
+def frozen(*names: str) -> Act:
+    return lambda world: world.frozen.update(names)
+
+
+def thawed(world: World) -> None:
+    world.frozen.clear()
+
+
+def starts_by_itself(world: World) -> None:
+    world.charger.resting, world.charger.run = False, True
+
+
+def stops_by_itself(world: World) -> None:
+    world.charger.run = False
+
+
+def stopped_in_vain(world: World) -> None:
+    world.deaf.add(Action.STOP)
+    world.ask(Request.STOP)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """From a bay that is well to one fault, and back."""
+
+    fault: str
+    spoil: Act
+    heal: Act
+    evidence: tuple[str, ...]  #: what the fault's text must have
+    then: State  #: where the bay rests, or goes on, after it
+    after_s: float = TICK_S  #: from the spoil to the fault; one tick before there is none
+    begin: Callable[[], World] = charging
+    anywhere: bool = True  #: it can come like this in every state in which current flows
+    lapse: bool = True  #: with its cause gone one tick earlier, it does not come
+
+    @property
+    def name(self) -> str:
+        return f"{self.fault}-{self.evidence[0]}".replace(" ", "_")
+
+
+ILLEGAL = "charge mode 9 (documented: 1 … 8)"
+PACK_V, SOH = POLICY.source.at("pack.voltage_v"), POLICY.source.at("pack.soh_min_pct")
+BIT = {bit: float(1 << bit) for bit in BatteryStatus}
+NO_PRECHARGE = replace(POLICY, precharge=None)
+AS_BEFORE = value(temperature_c=20.0, voltage_v=48.0, status=0.0, soc_pct=50.0, soh_pct=100.0)
+QUIET_LINE = charger(error_bits=0, error_t_s=None)
+
+
+SCENES: tuple[Scene, ...] = (
+    Scene("reverse_polarity", shows(connection=Connection.REVERSED), shows_truth, ("connection 0",), S.TRIPPED),
+    Scene("reverse_polarity", shows(charge_mode=ChargeMode.REVERSED), shows_truth, ("mode 6",), S.TRIPPED),
+    Scene("error_stop", shows(charge_mode=ChargeMode.ERROR_STOP), shows_truth, ("mode 8",), S.TRIPPED),
+    Scene("system_stop", shows(charge_mode=ChargeMode.SYSTEM_STOP), shows_truth, ("mode 7",), S.IDLE),
+    Scene("illegal_value", shows(charge_mode=None, illegal=(ILLEGAL,)), shows_truth, (ILLEGAL,), S.SUSPENDED, 0.5),
+    Scene("mode_taken_over", shows(control_mode=ControlMode.AUTOMATIC), shows_truth,
+          ("automatic mode", "says manual"), S.IDLE, 0.5),
+    Scene("rejected_frame", error_frame(ErrorBit.COMMAND), QUIET_LINE, ("0x1F", "wrong command"), S.TRIPPED),
+    Scene("rejected_frame", error_frame(ErrorBit.ORDER), QUIET_LINE, ("0x1F", "wrong order"), S.TRIPPED),
+    Scene("noisy_line", error_frame(ErrorBit.LENGTH), QUIET_LINE, ("0x1F", "wrong length"), S.CHARGING),
+    Scene("noisy_line", error_frame(ErrorBit.CHECKSUM | ErrorBit.COMMAND), QUIET_LINE,
+          ("0x1F", "command and checksum"), S.CHARGING),
+    Scene("charger_silent", world_has(charger_answers=False), world_has(charger_answers=True),
+          ("/dev/ttyX: no answer",), S.UNCONTROLLABLE, 0.75),
+    Scene("charger_silent", world_has(port_hangs=True), world_has(port_hangs=False),
+          ("/dev/ttyX has sent no status for 1.5 s",), S.UNCONTROLLABLE, 1.75),
+    Scene("charger_silent", charger(online=False, problem="/dev/ttyX: Input/output error"),
+          charger(online=True, problem=""), ("/dev/ttyX: Input/output error",), S.OFFLINE),
+    Scene("charger_silent", charger(online=False, misses=2), charger(online=True), ("/dev/ttyX has not answered",),
+          S.OFFLINE),
+    Scene("found_running", nothing, nothing, ("found running",), S.IDLE, begin=running_at_the_start, anywhere=False),
+    Scene("rogue_run", starts_by_itself, nothing, ("2.00 A",), S.TRIPPED, begin=idle, anywhere=False),
+    Scene("rogue_run", world_has(leak_a=0.51), world_has(leak_a=0.5), ("0.51 A",), S.UNCONTROLLABLE, begin=full,
+          anywhere=False),
+    Scene("will_not_stop", stopped_in_vain, hears, ("14.00 A",), S.UNCONTROLLABLE, 3.25, anywhere=False),
+    Scene("will_not_start", nothing, hears, ("told 'run' for 5.0 s",), S.SUSPENDED, 5.0, begin=ordered_to_run,
+          anywhere=False, lapse=False),
+    Scene("stopped_by_itself", stops_by_itself, nothing, ("stopped though",), S.IDLE, 0.5, lapse=False),
+    Scene("setting_not_obeyed", deaf(Action.SET_LIMIT, temperature_c=16.0, soc_pct=90.0), hears,
+          ("told 'limit 2' for 5.0 s",), S.TRIPPED, 5.25, anywhere=False, lapse=False),
+    Scene("setting_not_obeyed", shows(charge_mode=ChargeMode.PRECHARGE), shows_truth, ("told 'mode 4'",), S.TRIPPED,
+          5.25, anywhere=False, lapse=False),
+    Scene("setting_not_obeyed", shows(precharge=Precharge.OFF), shows_truth, ("told 'precharge 1'",), S.TRIPPED, 5.25,
+          begin=pulse, anywhere=False, lapse=False),
+    Scene("over_current", world_has(amps=15.71), world_has(amps=None), ("15.71 A", "15.70 A"), S.TRIPPED, 0.5),
+    Scene("early_full", shows(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED), shows_truth,
+          ("mode 5", "only 50 %"), S.IDLE, 0.5, anywhere=False),
+    Scene("open_circuit", world_has(amps=0.09), world_has(amps=None), ("delivered nothing for 10 s",), S.SUSPENDED,
+          10.5, anywhere=False),
+    Scene("no_battery", shows(charge_mode=ChargeMode.BATTERY_SEARCH), shows_truth, ("looking for a battery for 1 min",),
+          S.SUSPENDED, 60.5, anywhere=False),
+    Scene("wakes_too_long", shows(charge_mode=ChargeMode.BATTERY_RECOVERY), shows_truth, ("for 30 min",), S.TRIPPED,
+          1800.5, anywhere=False),
+    Scene("over_voltage", world_has(volts=55.21), world_has(volts=None), ("55.21 V at the charger", "55.2 V"),
+          S.TRIPPED),
+    Scene("over_voltage", value(voltage_v=55.21), AS_BEFORE, ("55.21 V at the charger",), S.TRIPPED),
+    Scene("over_voltage", lambda world: (value(voltage_v=55.21)(world), world_has(volts=48.0)(world)),
+          lambda world: (AS_BEFORE(world), world_has(volts=None)(world)), ("55.21 V at the pack", "55.2 V"), S.TRIPPED),
+    Scene("volts_disagree", world_has(volts=49.01), world_has(volts=None), ("49.01 V", "48.00 V"), S.TRIPPED, 3.25,
+          anywhere=False),
+    Scene("not_paired", world_has(volts=46.99), world_has(volts=None), ("46.99 V", "48.00 V"), S.SUSPENDED, 1.25,
+          begin=qualifying, anywhere=False),
+    Scene("amps_disagree", world_has(pack_amps=12.59), world_has(pack_amps=None), ("14.00 A", "12.59 A"), S.TRIPPED,
+          5.25, anywhere=False),
+    Scene("back_feed", world_has(pack_amps=-0.51), world_has(pack_amps=None), ("0.51 A",), S.TRIPPED, 2.25),
+    Scene("bmu_silent", world_has(battery_answers=False), world_has(battery_answers=True), ("node 16",),
+          S.OFFLINE, 1.5),
+    Scene("bmu_silent", bmu(online=False, problem="two nodes share the id"), bmu(online=True, problem=""),
+          ("two nodes share the id",), S.OFFLINE),
+    Scene("stale_reading", frozen("voltage_v", "current_a"), thawed, ("voltage, current",), S.SUSPENDED, 1.75),
+    Scene("stale_reading", frozen("status"), thawed, ("status",), S.SUSPENDED, 1.75),
+    Scene("stale_reading", frozen("temperature_c"), thawed, ("temperature",), S.SUSPENDED, 1.75),
+    Scene("stale_reading", frozen("soc_pct"), thawed, ("SOC",), S.SUSPENDED, 3.25),
+    Scene("stale_reading", frozen("soh_pct"), thawed, ("SOH",), S.SUSPENDED, 3.25),
+    Scene("sdo_refused", bmu(abort="0x6004: no such object", abort_code=0x06020000), bmu(abort="", abort_code=0),
+          ("0x6004: no such object",), S.TRIPPED),
+    Scene("sdo_aborted", bmu(abort="0x6004: device state", abort_code=0x08000022), bmu(abort="", abort_code=0),
+          ("0x6004: device state",), S.SUSPENDED, 0.75),
+    Scene("heartbeat_lost", lambda world: bmu(heartbeat_t_s=world.now_s)(world), bmu(heartbeat_t_s=1e9),
+          ("no heartbeat", "1.5 s"), S.SUSPENDED, 1.5, begin=beating, anywhere=False),
+    Scene("bmu_rebooted", World.boot, nothing, ("booted while charging",), S.OFFLINE),
+    Scene("status_trip", value(status=BIT[BatteryStatus.OVER_VOLTAGE]), AS_BEFORE, ("over voltage", "0x0001"),
+          S.TRIPPED),
+    Scene("status_trip", value(status=BIT[BatteryStatus.CHARGE_OVER_CURRENT]), AS_BEFORE,
+          ("charge over current", "0x0004"), S.TRIPPED),
+    Scene("status_trip", value(status=BIT[BatteryStatus.HIGH_TEMPERATURE]), AS_BEFORE, ("high temperature",),
+          S.TRIPPED),
+    Scene("status_trip", value(status=BIT[BatteryStatus.BMU_ERROR]), AS_BEFORE, ("bmu error", "0x0040"), S.TRIPPED),
+    Scene("status_limit", value(status=BIT[BatteryStatus.LOW_TEMPERATURE]), AS_BEFORE, ("low temperature",),
+          S.CHARGING),
+    Scene("status_limit", value(status=BIT[BatteryStatus.DISCHARGE_OVER_CURRENT]), AS_BEFORE,
+          ("discharge over current", "0x0008"), S.CHARGING),
+    Scene("emergency", bmu(emergency="EMCY 0x4210: temperature"), bmu(emergency=""), ("EMCY 0x4210",), S.IDLE),
+    Scene("hot_trip", value(temperature_c=55.0), value(temperature_c=52.0), ("55.0 °C", "55 °C"), S.TRIPPED, begin=hot,
+          anywhere=False),
+    Scene("over_temperature", value(temperature_c=45.0), value(temperature_c=39.9), ("45.0 °C", "below 40 °C"),
+          S.SUSPENDED, begin=warm(42.0), anywhere=False),
+    Scene("under_temperature", value(temperature_c=-0.1), value(temperature_c=3.0), ("-0.1 °C", "at 3 °C"),
+          S.SUSPENDED, begin=warm(2.0), anywhere=False),
+    Scene("runaway", value(temperature_c=23.3), nothing, ("K/min, more than 1 K/min",), S.TRIPPED, 1.25,
+          begin=long_charging, anywhere=False, lapse=False),
+    Scene("temperature_invalid", bmu(implausible={"temperature_c": "temperature 3276.7 °C"}), bmu(implausible={}),
+          ("3276.7 °C",), S.TRIPPED),
+    Scene("temperature_invalid", value(temperature_c=25.1), nothing, ("from 20.0 to 25.1 °C in 0.25 s",), S.TRIPPED),
+    Scene("implausible", bmu(implausible={"soc_pct": "SOC 140 %", "temperature_c": "x"}), bmu(implausible={}),
+          ("SOC 140 %",), S.TRIPPED),
+    Scene("implausible", bmu(implausible={"soc_pct": "SOC 141 %"}), bmu(implausible={}), ("SOC 141 %",), S.SUSPENDED),
+    Scene("under_voltage", value(voltage_v=25.99), AS_BEFORE, ("25.99 V", "26 V", PACK_V), S.CHARGING,
+          1.25, anywhere=False),
+    Scene("needs_precharge", value(status=BIT[BatteryStatus.LOW_VOLTAGE]), AS_BEFORE, ("no precharge",), S.CHARGING,
+          1.25, begin=with_policy(NO_PRECHARGE), anywhere=False),
+    Scene("soh_low", value(soh_pct=59.0), AS_BEFORE, ("59 %", "60 %", SOH), S.CHARGING),
+    Scene("precharge_no_rise", value(voltage_v=33.29), value(voltage_v=34.0), ("0.29 V in 5.0 min", "0.3 V"),
+          S.TRIPPED, 299.0, begin=pulse, anywhere=False),
+    Scene("precharge_too_long", nothing, nothing, ("4.0 min", "39 V"), S.TRIPPED, 240.0, begin=short_continuous,
+          anywhere=False, lapse=False),
+    Scene("time_limit", nothing, nothing, ("0.10 h",), S.TRIPPED, 359.25, begin=with_policy(finish(max_hours=0.1)),
+          anywhere=False, lapse=False),
+    Scene("ah_limit", nothing, nothing, ("0.50 Ah",), S.TRIPPED, 128.5, begin=with_policy(finish(max_ah=0.5)),
+          anywhere=False, lapse=False),
+    Scene("internal", world_has(internal="KeyError('x') in step, line 9"), nothing, ("KeyError('x')", "line 9"),
+          S.TRIPPED),
+)  # fmt: skip

@@ -1,0 +1,249 @@
+"""Every row of the fault table: raised in time and not before, stopped in the same step, ended as the row says."""
+
+import inspect
+import re
+
+import pytest
+
+from orchestrator.core.checks import battery, charge, obedience, pair, reports
+from orchestrator.core.faults import FAULTS, ROW, Clear, Row
+from orchestrator.core.latches import BACKOFF_S, CLEAN_S
+from orchestrator.model import ENERGISED, STOP, Effect, Request, State
+from tests.core.bays import IN, running_at_the_start
+from tests.core.fault_scenes import SCENES, Scene
+from tests.core.world import TICK_S, World
+
+# --- the table itself -------------------------------------------------------------------------------------------------
+
+#: How a fault may end, by what it does.
+ENDS = {
+    Effect.WARN: {Clear.AUTO},
+    Effect.LIMIT: {Clear.AUTO},
+    Effect.NO_START: {Clear.AUTO},
+    Effect.PAUSE: {Clear.AUTO},
+    Effect.STOP: {Clear.BACKOFF, Clear.OPERATOR},
+    Effect.TRIP: {Clear.RESET},
+}
+
+
+@pytest.mark.parametrize("row", FAULTS, ids=lambda row: row.id)
+def test_a_row_makes_sense(row: Row) -> None:
+    assert re.fullmatch(r"[a-z]+(_[a-z]+)*", row.id)
+    assert re.fullmatch(r"[BCGP]\d+(, [BCGP]\d+)*", row.source)
+    assert row.clear in ENDS[row.effect]
+    assert row.where <= set(State)
+    assert row.where
+    assert row.polls >= 1
+    assert row.for_s >= 0
+    assert (row.clean_s > 0) >= (row.clear is Clear.AUTO)
+    assert row.clean_s == 0 or row.clear in (Clear.AUTO, Clear.RESET)
+    assert row.effect is Effect.STOP or not row.departs  # a latch does not leave with the battery
+    assert len(row.advice) > 10
+    assert row.advice[0].islower()
+    assert row.advice[-1] != "."
+
+
+def test_the_rows_are_one_each() -> None:
+    assert len(ROW) == len(FAULTS)
+
+
+def test_every_predicate_is_in_the_table_and_says_where_it_comes_from() -> None:
+    modules = (battery, charge, obedience, pair, reports)
+    predicates = {
+        function
+        for module in modules
+        for name, function in inspect.getmembers(module, inspect.isfunction)
+        if function.__module__ == module.__name__ and not name.startswith("_")
+    }
+    assert {row.check for row in FAULTS} == predicates
+    assert all(function.__doc__ for function in predicates)
+
+
+def test_every_row_has_a_scene() -> None:
+    assert {scene.fault for scene in SCENES} == set(ROW)
+
+
+# --- its rows, one after another --------------------------------------------------------------------------------------
+
+every_scene = pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+
+
+def spoilt(scene: Scene, world: World | None = None) -> World:
+    """The moment before the fault."""
+    world = world or scene.begin()
+    scene.spoil(world)
+    pass_time(world, scene.after_s - TICK_S)
+    return world
+
+
+def pass_time(world: World, seconds: float) -> None:
+    """In ticks; most of a long time in whole seconds."""
+    ticks = round(seconds / TICK_S)
+    whole_s = (ticks - 1) // 4 - 20 if ticks > 100 else 0
+    for tick in range(ticks - 4 * whole_s):
+        world.tick()
+        if tick == 0:
+            for _ in range(whole_s):
+                world.tick(dt_s=1.0)
+
+
+def raised(scene: Scene) -> World:
+    world = spoilt(scene)
+    world.tick()
+    assert scene.fault in world.raised, world.decision
+    return world
+
+
+@every_scene
+def test_it_is_raised_in_time_with_its_evidence(scene: Scene) -> None:
+    world = spoilt(scene)
+    assert not world.decisions or scene.fault not in world.raised
+    world.tick()
+    assert scene.fault in world.raised, world.decision
+    text = world.raised[scene.fault]
+    for evidence in scene.evidence:
+        assert evidence in text
+    assert text.endswith(ROW[scene.fault].advice)
+
+
+@every_scene
+def test_a_stop_is_ordered_in_the_very_same_step(scene: Scene) -> None:
+    world = raised(scene)
+    if ROW[scene.fault].effect < Effect.PAUSE:
+        assert world.is_in(scene.then, scene.begin().state)
+        return
+    assert world.decision.command == STOP
+    assert world.state not in ENERGISED
+    if scene.begin is not running_at_the_start and world.states()[-2] in ENERGISED:
+        assert world.is_in(State.STOPPING)
+        assert world.decision.reason == world.decision.faults[0].text
+
+
+@every_scene
+def test_it_leads_where_its_effect_says(scene: Scene) -> None:
+    world = raised(scene)
+    world.until(scene.then, 5.0)
+    if scene.then in ENERGISED:
+        effect = ROW[scene.fault].effect
+        world.run(5)
+        assert world.is_in(scene.then)
+        assert (world.decision.step is not None and world.decision.step.index == 0) is (effect >= Effect.LIMIT)
+    elif scene.then is not State.UNCONTROLLABLE and scene.then is not State.OFFLINE:
+        assert world.raised[scene.fault] in world.decision.reason or world.decision.faults[0].id != scene.fault
+
+
+DEBOUNCED = [scene for scene in SCENES if scene.lapse and scene.after_s > TICK_S]
+
+
+@pytest.mark.parametrize("scene", DEBOUNCED, ids=lambda scene: scene.name)
+def test_a_tick_less_is_none(scene: Scene) -> None:
+    world = spoilt(scene)
+    scene.heal(world)
+    world.run(scene.after_s if scene.after_s < 20 else 20)
+    assert all(fault.id != scene.fault for decision in world.decisions for fault in decision.faults)
+
+
+def healed(scene: Scene) -> World:
+    """After the fault, at the tick at which its cause is gone for the first time."""
+    world = raised(scene)
+    world.until(scene.then, 5.0)
+    scene.heal(world)
+    end_s = world.now_s + 400
+    while world.memory.faults[scene.fault].clean_s is None:
+        world.tick()
+        assert world.now_s < end_s, "the cause does not go away"
+    return world
+
+
+def wait_s(scene: Scene) -> float:
+    row = ROW[scene.fault]
+    return CLEAN_S + BACKOFF_S[0] if row.clear is Clear.BACKOFF else row.clean_s
+
+
+def of(*ends: Clear) -> pytest.MarkDecorator:
+    scenes = [scene for scene in SCENES if ROW[scene.fault].clear in ends]
+    return pytest.mark.parametrize("scene", scenes, ids=lambda scene: scene.name)
+
+
+@of(Clear.AUTO, Clear.BACKOFF)
+def test_it_clears_by_itself_and_not_before(scene: Scene) -> None:
+    world = healed(scene)
+    clean_s = world.memory.faults[scene.fault].clean_s
+    assert clean_s is not None
+    while world.now_s < clean_s + wait_s(scene) - TICK_S:
+        world.tick()
+        assert scene.fault in world.raised
+        if ROW[scene.fault].effect >= Effect.NO_START and scene.then not in ENERGISED:
+            assert world.state not in ENERGISED
+    world.tick()
+    assert scene.fault not in world.raised
+    if not world.raised:
+        world.until(State.CHARGING)  # by itself
+
+
+@of(Clear.OPERATOR)
+def test_it_waits_for_a_start(scene: Scene) -> None:
+    world = healed(scene)
+    world.run(30)
+    assert world.is_in(State.IDLE)
+    assert world.decision.reason == world.raised[scene.fault]
+    assert world.ask(Request.START) == ""
+    assert not world.raised
+    world.until(State.CHARGING)
+
+
+@of(Clear.RESET)
+def test_it_waits_for_a_reset_and_then_for_a_start(scene: Scene) -> None:
+    world = healed(scene)
+    row, text = ROW[scene.fault], scene.fault
+    if row.clean_s:
+        assert f"{text} must be gone for {row.clean_s:g} s first" in world.ask(Request.RESET)
+    world.run(30)
+    assert world.is_in(State.TRIPPED)
+    assert f"{text} is latched and needs a reset" in world.ask(Request.START)
+    assert world.ask(Request.RESET) == ""
+    assert not world.raised
+    world.run(30)
+    assert world.is_in(State.IDLE)
+    assert world.decision.reason == "reset by the operator; start to go on"
+    world.values["soc_pct"] = 50.0
+    assert world.ask(Request.START) == ""
+    while world.tick().state not in ENERGISED:
+        assert world.is_in(State.IDLE, State.QUALIFYING), world.decision
+
+
+LASTING = [scene for scene in SCENES if ROW[scene.fault].clear is Clear.RESET and scene.lapse]
+
+
+@pytest.mark.parametrize("scene", LASTING, ids=lambda scene: scene.name)
+def test_a_reset_is_refused_while_the_cause_is_there(scene: Scene) -> None:
+    world = raised(scene)
+    if world.memory.faults[scene.fault].clean_s is not None:
+        return  # it is not a lasting one: the stop has ended it
+    assert world.ask(Request.RESET) != ""
+    assert scene.fault in world.raised
+
+
+# --- the same from every state in which current flows -----------------------------------------------------------------
+
+ANYWHERE = [scene for scene in SCENES if scene.anywhere and ROW[scene.fault].effect >= Effect.PAUSE]
+
+
+@pytest.mark.parametrize("state", sorted(ENERGISED))
+@pytest.mark.parametrize("scene", ANYWHERE, ids=lambda scene: scene.name)
+def test_it_stops_whatever_is_going_on(scene: Scene, state: State) -> None:
+    world = spoilt(scene, IN[state]())
+    assert world.is_in(state)
+    world.tick()
+    assert scene.fault in world.raised
+    assert world.is_in(State.STOPPING)
+    assert world.decision.command == STOP
+
+
+def test_only_a_stop_that_is_due_stops() -> None:
+    """Nothing is wrong for an hour of charging: nothing is said."""
+    world = IN[State.CHARGING]()
+    world.amps = 5.0
+    world.run(3600, dt_s=1.0)
+    assert world.is_in(State.CHARGING)
+    assert all(decision.faults == () for decision in world.decisions)
