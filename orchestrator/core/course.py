@@ -158,11 +158,13 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
     if absent is not None:
         return absent
     wanted, why = _wanted(f)
-    if not wanted:
-        return (Trigger.REST if memory.full_pct is None else Trigger.FILL), why
+    if memory.full_pct is not None and not wanted:
+        return Trigger.FILL, why
+    if f.soc is not None and not wanted:
+        return Trigger.REST, why
     if worst is not None and worst.effect >= Effect.NO_START:
         return Trigger.SUSPEND, worst.text
-    return Trigger.QUALIFY, why
+    return (Trigger.QUALIFY if wanted else Trigger.REST), why
 
 
 def _absent(f: Facts) -> tuple[Trigger, str] | None:
