@@ -1,7 +1,7 @@
 """A decoded reading that means stop → the stop frame handed to the port: what lies between is our own code alone.
 
 From the moment at which the BMU's hot temperature can be seen in its view, before the control loop is woken, to the
-return of the write to the pty; 16 bays, emulators in another process. "Line idle": no poll was under way at that time.
+return of the write to the pty; 16 bays, emulators in another process. "Line idle": no poll was under way in between.
 Else the rest of that transaction, at most 120 ms, is waited for; what comes after its last byte is shown as well.
 """
 
@@ -72,5 +72,5 @@ def _stops(line: str, rounds: int) -> Iterator[Stop]:
 def _stop(text: str) -> Stop:
     times = json.loads(text)
     hot_s, stop_s = times["hot_s"], times["stop_s"]
-    in_flight = times["asked_s"] <= hot_s < times["free_s"]
+    in_flight = hot_s < times["free_s"]  # also if the poll began after the reading, yet before anybody was told of it
     return Stop(in_flight, 1000 * (stop_s - hot_s), 1000 * (stop_s - times["free_s"]))

@@ -3,7 +3,7 @@
     python -m benchmarks.latency_service STATION HOT_C
 
 Guardian and controller, as `orchestrator run` has them. Ends with SIGTERM; then the controller prints a JSON line for
-each bay: {"bay", "hot_s", "stop_s", "asked_s", "free_s"}.
+each bay: {"bay", "hot_s", "stop_s", "free_s"}.
 """
 
 import json
@@ -19,12 +19,11 @@ from orchestrator.config.station import BatteryConfig, Station
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.link.serial import SerialLine
-from orchestrator.protocol.charger import STOP_FRAME, Code
+from orchestrator.protocol.charger import STOP_FRAME
 from orchestrator.service import supervisor
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.guardian import Guardian
 
-COMMAND = 4  #: where in a frame its command stands
 CONTROLLER_ARGUMENTS = 3  #: more than so many: the guardian's socket is the last
 
 
@@ -34,8 +33,7 @@ class Times:
     def __init__(self) -> None:
         self.hot_s: float | None = None  #: the first reading of a hot pack has been decoded and is there to be seen
         self.stop_s: float | None = None  #: the first stop frame after it has been handed to the port
-        self.asked_s = 0.0  #: the last poll was written before the stop …
-        self.free_s = 0.0  #: … and the last read of its answer returned
+        self.free_s = 0.0  #: the last read of a poll's answer has returned, before the stop
 
 
 def main() -> int:
@@ -78,8 +76,6 @@ def _line_class(of_port: dict[str, Times]) -> type[SerialLine]:
             times = self.times
             if data == STOP_FRAME and times.hot_s is not None and times.stop_s is None:
                 times.stop_s = monotonic()
-            elif times.stop_s is None and data[COMMAND] == Code.STATUS_REQUEST:
-                times.asked_s = monotonic()
 
         def read(self, timeout_s: float, expected: int = 0) -> bytes:
             data = super().read(timeout_s, expected)

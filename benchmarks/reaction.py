@@ -50,10 +50,10 @@ class Case:
 
 CASES = (
     Case("over-temperature → stop byte, 1 bay", "over_temperature", 108, 12, share=1 / 2),
-    Case("reverse polarity → stop byte, 1 bay", "reverse_polarity", 36),
+    Case("reverse polarity → stop byte, 1 bay", "reverse_polarity", 24),
     Case("BMU silent → stop byte, 1 bay", "bmu_silent", 24),
     Case("over-temperature → stop byte, 16 bays", "over_temperature", 112, 16, bays=16, share=1 / 10),
-    Case("the same, all on 250 kbit/s", "over_temperature", 48, bays=16, bitrate=250_000, share=1 / 10),
+    Case("the same, all on 250 kbit/s", "over_temperature", 32, bays=16, bitrate=250_000, share=1 / 10),
 )
 
 
