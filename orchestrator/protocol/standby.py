@@ -5,7 +5,8 @@ STOP_FRAME = bytes.fromhex("AF FA 90 04 10 90 00 34 AF A0")
 #: 0x02 push 0x01 value 0: so that a later resume does not run on; acted on in manual mode only (§3.3.2).
 OPERATION_STOP_FRAME = bytes.fromhex("AF FA 90 05 02 90 01 00 28 AF A0")
 #: Kinds 0x12 and 0x01: amps, control mode, operation (§3.3.1). The service asks for eight values or more, so that no
-#: answer to a question of its own, from before the stop perhaps, can be taken for an answer to this one.
+#: answer to a question of its own, from before the stop perhaps, can be taken for an answer to this one. The control
+#: mode is for distance only: without it the frame would have the checksum of `run`.
 QUESTION = bytes.fromhex("AF FA 90 05 01 90 12 01 39 AF A0")
 
 #: How its answer begins: address, length (6 bytes of data + 3), command 0x03, order (§3.3.3).

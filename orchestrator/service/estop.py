@@ -73,21 +73,25 @@ def main(words: list[str]) -> int:
     if not bays:
         print("no port to stop: name a station file or --port PATH", file=sys.stderr)  # noqa: T201
         return 1
-    return _stop(bays, "" if options.leave_held else socket, options)
+    return _stop(bays, socket, options)
 
 
 def _stop(bays: Mapping[str, str], socket: str, options: Options) -> int:
     """Stop all of them, with whatever help there is, and tell what became of each."""
     opened = {port: first_stop(port, leave_held=options.leave_held) for port in bays}
-    from orchestrator.service.witness import Service  # noqa: PLC0415 - the first stops are out now
+    if options.leave_held:
+        whys, said = stop_all(opened, VERIFY_S), ""
+    else:
+        from orchestrator.service.witness import Service  # noqa: PLC0415 - the first stops are out now
 
-    service = Service(bays, socket, every_bay=not options.ports)
-    whys = stop_all(opened, VERIFY_S, leave_held=options.leave_held, on_stop=service.hold, witness=service.sees)
+        service = Service(bays, socket, every_bay=not options.ports)
+        whys = stop_all(opened, VERIFY_S, leave_held=False, on_stop=service.hold, witness=service.sees)
+        said = service.said
     for port, why in whys.items():
         name = f"{bays[port]} ({port})" if bays[port] else port
         print(f"{name}: {why or 'standby verified'}")  # noqa: T201
-    if not options.leave_held:
-        print(service.said, file=sys.stderr)  # noqa: T201
+    if said:
+        print(said, file=sys.stderr)  # noqa: T201
     return 1 if any(whys.values()) else 0
 
 

@@ -1,0 +1,94 @@
+"""The unchanged controller with one part of it broken on SIGUSR1: `python -m tests.guardian.saboteur MODE FD STATION`.
+
+What is put in place beforehand only looks whether it is time; the rest is the product.
+"""
+
+import os
+import re
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from orchestrator.devices.bus import BatteryBus
+from orchestrator.devices.charger import ChargerPort
+from orchestrator.service import bay, control, controller
+from orchestrator.service.control import ControlSocket
+from orchestrator.service.supervisor import Supervisor
+
+ARMED = threading.Event()
+
+
+def hang(*_: object) -> None:
+    threading.Event().wait()
+
+
+def end_thread(*_: object) -> None:
+    """Without a word: `except Exception` does not see it."""
+    raise SystemExit
+
+
+def loop(*_: object) -> None:
+    while True:
+        pass
+
+
+def keep_the_gil(*_: object) -> None:
+    """In C: no other thread of this process gets a turn for ages."""
+    re.match(r"(a|a)+$", "a" * 40 + "b")
+
+
+def leave(*_: object) -> None:
+    os._exit(0)
+
+
+def fail(*_: object) -> None:
+    raise RuntimeError("sabotage")
+
+
+def die(*_: object) -> None:
+    os.abort()
+
+
+def keep_the_lock(port: ChargerPort, *_: object) -> None:
+    """The lock between the port's thread and the control loop: both wait for it for ever."""
+    port._lock.acquire()
+    hang()
+
+
+#: Mode → what is spoilt, and what happens there instead.
+MODES: dict[str, tuple[Any, str, Callable[..., None]]] = {
+    "port_hangs": (ChargerPort, "_once", hang),
+    "port_dies": (ChargerPort, "_once", end_thread),
+    "port_deadlock": (ChargerPort, "_once", keep_the_lock),
+    "bus_hangs": (BatteryBus, "_turn", hang),
+    "bus_dies": (BatteryBus, "_turn", end_thread),
+    "control_hangs": (ControlSocket, "_answer", hang),
+    "control_dies": (ControlSocket, "_answer", end_thread),
+    "loop_hangs": (Supervisor, "_news", hang),
+    "loop_fails": (Supervisor, "_news", fail),
+    "step_loops": (bay, "step", loop),
+    "step_keeps_the_gil": (bay, "step", keep_the_gil),
+    "step_leaves": (bay, "step", leave),
+    "step_aborts": (bay, "step", die),
+}
+
+
+def spoil(owner: Any, name: str, instead: Callable[..., None]) -> None:
+    good = getattr(owner, name)
+
+    def spoilt(*arguments: Any, **named: Any) -> Any:
+        if ARMED.is_set():
+            instead(*arguments)
+        return good(*arguments, **named)
+
+    setattr(owner, name, spoilt)
+
+
+if __name__ == "__main__":
+    mode, fd, station = sys.argv[1:]
+    spoil(*MODES[mode])
+    control.STALL_S = 0.5  # a client is given 30 s otherwise
+    signal.signal(signal.SIGUSR1, lambda *_: ARMED.set())
+    sys.exit(controller.main(int(fd), station))

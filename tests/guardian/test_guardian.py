@@ -1,0 +1,434 @@
+"""The guardian with a controller made by hand: this test holds the other end of its connection."""
+
+import array
+import fcntl
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from orchestrator.service.guardian import ACTED, ALIVE, BEAT, DONE, DROP, PORT
+from tests.guardian.chargers import running_chargers
+from tests.waiting import wait_until
+from tests.whole.station import die_with_parent
+
+#: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3.
+LAUNCH = """
+import os, socket, sys
+from orchestrator.service import guardian
+for word in sys.argv[3:]:
+    name, _, value = word.partition("=")
+    assert hasattr(guardian, name)
+    setattr(guardian, name, float(value))
+child = os.posix_spawn(sys.executable, [sys.executable, "-c", sys.argv[2]], os.environ)
+sys.exit(guardian.Guardian(child, socket.socket(fileno=int(sys.argv[1]))).run())
+"""
+WAITS = "import signal; signal.pause()"
+ENDS_WITH_3 = "import sys; sys.exit(3)"
+ENDS_WITH_4_WHEN_TOLD = (
+    "import signal, sys; signal.signal(15, lambda *_: sys.exit(4)); print(flush=True); signal.pause()"
+)
+#: The guardian is done with whatever it has to do by then, on a busy machine, too.
+END_S = 20.0
+
+
+class Watched:
+    """A guardian, and the connection over which it expects a controller."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]", link: socket.socket, log: Path) -> None:
+        self.process, self.link = process, link
+        self._log = log
+
+    def send(self, message: bytes, fd: int | None = None) -> None:
+        rights = [] if fd is None else [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [fd]))]
+        self.link.sendmsg([message], rights)
+
+    def hand_over(self, name: str, fd: int | None = None) -> None:
+        self.send(PORT + name.encode(), fd)
+
+    def beat(self) -> None:
+        """One heartbeat; returns when it was answered, so that all that was sent before has been taken."""
+        self.send(BEAT)
+        assert self.link.recv(16) == ALIVE
+
+    def freeze(self) -> None:
+        self.process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: state_of(self.process.pid) == "T")
+
+    def thaw(self) -> None:
+        self.process.send_signal(signal.SIGCONT)
+
+    def ended(self) -> int:
+        return self.process.wait(END_S)
+
+    @property
+    def log(self) -> str:
+        return self._log.read_text()
+
+    @property
+    def files(self) -> int:
+        return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+    @property
+    def controller(self) -> int:
+        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
+        wait_until(children.read_text, END_S, "the controller")
+        return int(children.read_text())
+
+    def waits_for(self, text: str) -> None:
+        wait_until(lambda: text in self.log, what=text)
+
+
+def state_of(pid: int) -> str:
+    """A process's state as the kernel names it, "Z" (dead, not buried) also when it is buried already."""
+    with suppress(FileNotFoundError, ProcessLookupError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    return "Z"
+
+
+@contextmanager
+def watched(
+    directory: Path,
+    *constants: str,
+    controller: str = WAITS,
+    stderr: int | None = None,
+    notify: str = "",
+) -> Iterator[Watched]:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.settimeout(END_S)
+    log = directory / "guardian.log"
+    environment = {key: value for key, value in os.environ.items() if key != "NOTIFY_SOCKET"}
+    with log.open("ab") as file, ours:
+        process = subprocess.Popen(
+            [sys.executable, "-c", LAUNCH, str(theirs.fileno()), controller, *constants],
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=file if stderr is None else stderr,
+            pass_fds=[theirs.fileno()],
+            env={**environment, **({"NOTIFY_SOCKET": notify} if notify else {})},
+            preexec_fn=die_with_parent,
+        )
+        theirs.close()
+        try:
+            yield Watched(process, ours, log)
+        finally:
+            process.kill()
+            process.wait()
+
+
+# --- when it acts, and when not --------------------------------------------------------------------------------------
+
+
+def test_the_end_of_the_connection_stops_every_charger_and_what_is_left_is_killed(tmp_path: Path) -> None:
+    with running_chargers(tmp_path, 3) as benches, watched(tmp_path) as guardian:
+        for bench in benches:
+            guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        controller = guardian.controller
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        assert not any(bench.runs for bench in benches)
+        assert state_of(controller) == "Z"
+        assert guardian.log.splitlines() == [
+            "guardian: the controller was ended by SIGKILL: stopping the chargers on 3 ports",
+            *(f"guardian: {bench.name}: standby verified" for bench in benches),
+        ]
+
+
+def test_silence_is_a_hang(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        controller = guardian.controller
+        assert guardian.ended() == ACTED
+        assert not bench.runs
+        assert "the controller hangs: stopping" in guardian.log
+        assert state_of(controller) == "Z"
+
+
+def test_heartbeats_keep_it_quiet(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        end_s = time.monotonic() + 1.2
+        while time.monotonic() < end_s:
+            guardian.beat()
+        assert guardian.process.poll() is None
+        assert bench.stops == 0
+
+
+def test_a_controller_that_never_gets_going_is_killed(tmp_path: Path) -> None:
+    with watched(tmp_path, "STARTUP_S=0.3") as guardian:
+        assert guardian.ended() == ACTED
+
+
+@pytest.mark.parametrize(
+    ("controller", "status"),
+    [(ENDS_WITH_3, 3), ("pass", 0), ("import os; os.kill(os.getpid(), 9)", ACTED), ("import os; os.abort()", ACTED)],
+)
+def test_without_a_port_the_controllers_end_is_its_own(tmp_path: Path, controller: str, status: int) -> None:
+    with watched(tmp_path, controller=controller) as guardian:
+        guardian.link.close()
+        assert guardian.ended() == status
+        assert guardian.log == ""
+
+
+@pytest.mark.parametrize(("controller", "status"), [(ENDS_WITH_3, 3), ("pass", ACTED)])
+def test_with_a_port_no_end_is_a_good_one(tmp_path: Path, controller: str, status: int) -> None:
+    """A controller that leaves without a word has not stopped its chargers, whatever its exit status says."""
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, controller=controller) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        wait_until(lambda: state_of(guardian.controller) == "Z")
+        guardian.link.close()
+        assert guardian.ended() == status
+        assert not bench.runs
+        assert f"the controller has ended with status {status % ACTED}: stopping" in guardian.log
+
+
+@pytest.mark.parametrize(("controller", "status"), [(ENDS_WITH_3, 3), ("pass", 0)])
+def test_an_orderly_end_needs_no_stop(tmp_path: Path, controller: str, status: int) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, controller=controller) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        guardian.send(DONE)
+        guardian.send(DROP + bench.name.encode())
+        guardian.link.close()
+        assert guardian.ended() == status
+        assert bench.stops == 0
+
+
+def test_an_orderly_end_that_hangs_is_cut_short(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, "END_S=0.3") as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(DONE)
+        assert guardian.ended() == ACTED
+
+
+def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_anew(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, "VERIFY_S=0.6") as guardian:
+        bench.charger.ignores_stop = True
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        assert guardian.ended() == ACTED
+        assert "NOT stopped: the charger says that it goes on" in guardian.log
+
+
+# --- messages --------------------------------------------------------------------------------------------------------
+
+
+def test_ports_that_come_and_go_leave_nothing_behind(tmp_path: Path) -> None:
+    with running_chargers(tmp_path, 2) as benches, watched(tmp_path) as guardian:
+        guardian.beat()
+        before = guardian.files
+        for turn in range(1000):
+            bench = benches[turn % 2]
+            guardian.hand_over(bench.name, bench.fd)
+            if turn % 3:  # else it is handed over again without having been dropped
+                guardian.send(DROP + bench.name.encode())
+            if turn % 100 == 0:
+                guardian.beat()
+        for bench in benches:
+            guardian.send(DROP + bench.name.encode())
+        guardian.beat()
+        assert guardian.files == before
+
+
+def test_a_port_that_is_dropped_is_free(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        held = bench.duplicate()
+        fcntl.flock(held, fcntl.LOCK_EX)
+        guardian.hand_over(bench.name, held)
+        guardian.beat()
+        os.close(held)
+        os.close(bench.fd)
+        bench.fd = os.open(bench.name, os.O_RDWR | os.O_NOCTTY)
+        with pytest.raises(BlockingIOError):
+            fcntl.flock(bench.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        guardian.send(DROP + bench.name.encode())
+        guardian.beat()
+        fcntl.flock(bench.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_a_port_that_was_closed_when_the_controller_died_is_stopped_all_the_same(tmp_path: Path) -> None:
+    with running_chargers(tmp_path, 2) as (closed, sent_in_vain), watched(tmp_path) as guardian:
+        guardian.hand_over(closed.name, closed.fd)
+        guardian.send(DROP + closed.name.encode())
+        guardian.hand_over(sent_in_vain.name)  # as the kernel hands it over when the guardian has no descriptor left
+        guardian.beat()
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        assert not closed.runs
+        assert not sent_in_vain.runs
+
+
+def test_a_port_that_another_service_has_taken_is_left_to_it(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, "VERIFY_S=0.1") as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(DROP + bench.name.encode())
+        guardian.beat()
+        fcntl.flock(bench.fd, fcntl.LOCK_EX)
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        assert bench.stops == 0
+
+
+def test_strange_messages_are_no_harm(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.beat()
+        before = guardian.files
+        for message in (b"X", b"\xff" * 4000, DROP + b"never-heard-of", DROP + b"\xff\xfe"):
+            guardian.send(message, bench.fd)
+        guardian.beat()
+        assert guardian.files == before
+
+
+def test_the_last_words_of_a_controller_that_died_are_heard(tmp_path: Path) -> None:
+    """It died with answers unread: the kernel's first word is "connection reset", and what it had sent comes after."""
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.beat()
+        guardian.send(BEAT)
+        assert guardian.link.recv(16, socket.MSG_PEEK) == ALIVE
+        guardian.freeze()
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.link.close()
+        guardian.thaw()
+        assert guardian.ended() == ACTED
+        assert not bench.runs
+
+
+def test_a_guardian_that_slept_looks_at_its_messages_before_it_judges(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        guardian.freeze()
+        slept_s = time.monotonic()
+        wait_until(lambda: time.monotonic() > slept_s + 0.7)
+        guardian.send(BEAT)
+        guardian.thaw()
+        assert guardian.link.recv(16) == ALIVE
+        guardian.beat()
+        assert bench.stops == 0
+
+
+# --- signals, and who may listen -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT])
+def test_whoever_wants_it_to_end_ends_the_controller_first(tmp_path: Path, number: signal.Signals) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, controller=ENDS_WITH_4_WHEN_TOLD) as guardian:
+        guardian.waits_for("\n")  # the controller is ready to be told
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(DONE)
+        guardian.process.send_signal(number)
+        wait_until(lambda: state_of(guardian.controller) == "Z")
+        guardian.link.close()
+        assert guardian.ended() == 4
+
+
+def test_an_end_before_anything_has_begun_is_a_good_one(tmp_path: Path) -> None:
+    with watched(tmp_path) as guardian:
+        guardian.beat()
+        guardian.process.send_signal(signal.SIGTERM)
+        wait_until(lambda: state_of(guardian.controller) == "Z")
+        guardian.link.close()
+        assert guardian.ended() == 0
+
+
+def test_a_log_that_nobody_reads_does_not_hold_a_stop_up(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, stderr=writer) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        assert not bench.runs
+    os.close(reader)
+    os.close(writer)
+
+
+def test_a_log_that_is_gone_does_not_hold_a_stop_up(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, stderr=writer) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        assert not bench.runs
+    os.close(writer)
+
+
+@contextmanager
+def systemd(directory: Path) -> Iterator[socket.socket]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(directory / "notify"))
+        manager.settimeout(END_S)
+        yield manager
+
+
+def heard(manager: socket.socket) -> list[str]:
+    """Everything that was notified and not heard yet."""
+    said = []
+    manager.setblocking(False)
+    with suppress(BlockingIOError):
+        while True:
+            said.append(manager.recv(4096).decode())
+    manager.settimeout(END_S)
+    return said
+
+
+def test_systemd_hears_that_it_is_ready_that_it_lives_and_what_it_does(tmp_path: Path) -> None:
+    with systemd(tmp_path) as manager, running_chargers(tmp_path) as (bench,):
+        with watched(tmp_path, "WATCHDOG_S=60", notify=str(tmp_path / "notify")) as guardian:
+            guardian.hand_over(bench.name, bench.fd)
+            for _ in range(5):
+                guardian.beat()
+            assert heard(manager) == ["READY=1", "WATCHDOG=1"]  # not with each beat
+            guardian.process.send_signal(signal.SIGTERM)
+            assert manager.recv(99) == b"STOPPING=1"
+            guardian.link.close()
+            assert guardian.ended() == ACTED
+        assert heard(manager) == [
+            "WATCHDOG=1",
+            "STATUS=the controller was ended by SIGTERM; stopping the chargers",
+        ]
+
+
+def test_a_watchdog_is_fed_while_the_controller_beats(tmp_path: Path) -> None:
+    with systemd(tmp_path) as manager, watched(tmp_path, "WATCHDOG_S=0", notify=str(tmp_path / "notify")) as guardian:
+        for _ in range(3):
+            guardian.beat()
+        assert heard(manager) == ["READY=1", *["WATCHDOG=1"] * 3]
+
+
+def test_a_watchdog_is_fed_for_as_long_as_chargers_are_being_stopped(tmp_path: Path) -> None:
+    with systemd(tmp_path) as manager, running_chargers(tmp_path) as (bench,):
+        bench.charger.ignores_stop = True
+        with watched(tmp_path, "VERIFY_S=1.2", notify=str(tmp_path / "notify")) as guardian:
+            guardian.hand_over(bench.name, bench.fd)
+            guardian.beat()
+            guardian.link.close()
+            assert guardian.ended() == ACTED
+        assert heard(manager).count("WATCHDOG=1") >= 4
+
+
+def test_a_systemd_that_does_not_listen_holds_nothing_up(tmp_path: Path) -> None:
+    with systemd(tmp_path), running_chargers(tmp_path) as (bench,):
+        with watched(tmp_path, "WATCHDOG_S=0", notify=str(tmp_path / "notify")) as guardian:
+            guardian.hand_over(bench.name, bench.fd)
+            for _ in range(2000):  # far more than the socket takes
+                guardian.beat()
+            guardian.link.close()
+            assert guardian.ended() == ACTED
+        assert not bench.runs

@@ -1,0 +1,249 @@
+"""Everything that a controller or its guardian can die of, while its charger runs: it ends stopped and verified."""
+
+import json
+import os
+import signal
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import ServiceError
+from orchestrator.model import Action, Command
+from orchestrator.protocol.charger import encode
+from orchestrator.service.guardian import ACTED
+from orchestrator.sim.client import PlantProcess
+from tests.guardian.saboteur import MODES
+from tests.guardian.test_guardian import state_of
+from tests.sim.wires import udp_keys
+from tests.waiting import wait_until
+from tests.whole.station import Service, orchestrator, station_document
+
+GUARD = """
+import sys
+from orchestrator.service.guardian import guard
+sys.exit(guard(sys.argv[2:], ("-m", "tests.guardian.saboteur", sys.argv[1])))
+"""
+#: No unit test of timing (`make bench` measures that): only that nobody waited for somebody's time-out.
+SOON_S = 3.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """One way to die: the signal that the controller gets, and what the guardian says of it."""
+
+    name: str
+    number: signal.Signals
+    said: str
+    mode: str = ""  #: of the saboteur
+
+
+CASES = (
+    Case("SIGKILL, as the kernel's out-of-memory killer sends it", signal.SIGKILL, "was ended by SIGKILL"),
+    Case("SIGSEGV", signal.SIGSEGV, "was ended by SIGSEGV"),
+    Case("SIGSTOP", signal.SIGSTOP, "hangs"),
+    *(
+        Case(mode, signal.SIGUSR1, said, mode)
+        for mode, said in {
+            **dict.fromkeys(MODES, "hangs"),
+            "loop_fails": "has ended with status 1",
+            "step_leaves": "has ended with status 0",
+            "step_aborts": "was ended by SIGABRT",
+        }.items()
+    ),
+)
+#: So many services are started before they are needed.
+AHEAD = 4
+OTHERS = (
+    "half a frame",
+    "guardian killed",
+    "guardian frozen",
+    "both killed",
+    "told to end",
+    "a second one",
+    "a terminal",
+)
+BAYS = {name: number for number, name in enumerate([*(case.name for case in CASES), *OTHERS], start=1)}
+
+
+@dataclass(frozen=True)
+class Charging:
+    """A service whose one charger is running."""
+
+    plant: PlantProcess
+    service: Service
+    bay: int
+
+    @property
+    def port(self) -> str:
+        return str(self.plant.bays[self.bay - 1]["port"])
+
+    @property
+    def runs(self) -> bool:
+        return bool(self.plant.state(self.bay)["operation"])
+
+    def watch(self) -> float:
+        """From now on, look out for the first stop; returns the moment."""
+        return self.plant.inject("heal", self.bay)
+
+    def check_stopped(self, since_s: float) -> None:
+        truth = self.plant.state(self.bay)
+        assert (truth["operation"], truth["current_a"], truth["run"]) == (0, 0, False)
+        assert truth["first_stop_s"] - since_s < SOON_S
+
+
+class Services:
+    """A service for each test, with a bay and a bus of its own. Some are started ahead: they need 3 s to charge."""
+
+    def __init__(self, directory: Path, plant: PlantProcess, cans: Sequence[Mapping[str, object]]) -> None:
+        self._directory, self._plant, self._cans = directory, plant, cans
+        self._started: dict[str, Charging] = {}
+
+    def take(self, name: str) -> Charging:
+        """The one of this name, once its charger runs."""
+        names = list(BAYS)
+        for near in names[names.index(name) :][:AHEAD]:
+            if near not in self._started:
+                self._started[near] = self._start(near)
+        one = self._started[name]
+        one.service.wait("CHARGING")
+        wait_until(lambda: one.runs, what="current")
+        return one
+
+    def _start(self, name: str) -> Charging:
+        number = BAYS[name]
+        document = station_document(self._directory, [self._cans[number - 1]], 1)
+        document["bays"][0]["charger"]["port"] = self._plant.bays[number - 1]["port"]
+        own = self._directory / str(number)
+        own.mkdir()
+        mode = next((case.mode for case in CASES if case.name == name), "")
+        service = Service(own, document, ("-c", GUARD, mode) if mode else ("-m", "orchestrator", "run"))
+        return Charging(self._plant, service.start(), number)
+
+    def close(self) -> None:
+        for one in self._started.values():
+            one.service.close()
+
+
+@pytest.fixture(name="services", scope="module")
+def _services(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Services]:
+    directory = tmp_path_factory.mktemp("kills")
+    cans = [udp_keys() for _ in BAYS]
+    can_args = [arg for keys in cans for arg in ("--can", json.dumps(keys))]
+    with PlantProcess(directory, "--bays", str(len(BAYS)), *can_args) as plant:
+        services = Services(directory, plant, cans)
+        try:
+            yield services
+        finally:
+            services.close()
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_whatever_the_controller_dies_of_its_charger_is_stopped(services: Services, case: Case) -> None:
+    one = services.take(case.name)
+    since_s = one.watch()
+    os.kill(one.service.controller, case.number)
+    if case.mode.startswith("control_"):
+        wait_until(lambda: not answers(one.service), what="the end of its answers")
+    assert one.service.ended() in (ACTED, 1)
+    one.check_stopped(since_s)
+    assert f"guardian: the controller {case.said}: stopping the chargers on 1 ports" in one.service.log()
+    assert one.service.log().splitlines()[-1] == f"guardian: {one.port}: standby verified"
+
+
+def answers(service: Service) -> bool:
+    with suppress(ServiceError):
+        return bool(service.status())
+    return False
+
+
+def test_half_a_frame_of_the_dying_controller_is_no_harm(services: Services) -> None:
+    one = services.take("half a frame")
+    since_s = one.watch()
+    controller = one.service.controller
+    os.kill(controller, signal.SIGSTOP)
+    port = os.open(one.port, os.O_RDWR | os.O_NOCTTY)
+    os.write(port, encode(Command(Action.RUN))[:6])
+    os.close(port)
+    os.kill(controller, signal.SIGKILL)
+    assert one.service.ended() == ACTED
+    one.check_stopped(since_s)
+
+
+def test_without_its_guardian_the_controller_stops_and_ends(services: Services) -> None:
+    one = services.take("guardian killed")
+    controller, since_s = one.service.controller, one.watch()
+    one.service.signal(signal.SIGKILL)
+    wait_until(lambda: state_of(controller) == "Z", 15, "the controller's end")
+    one.check_stopped(since_s)
+    log = one.service.log().splitlines()
+    assert "the guardian has died: stopping every bay" in log
+    assert log[-1] == "ended: every charger stands by, verified"
+
+
+def test_a_guardian_that_hangs_is_none(services: Services) -> None:
+    one = services.take("guardian frozen")
+    controller, since_s = one.service.controller, one.watch()
+    one.service.signal(signal.SIGSTOP)
+    wait_until(lambda: state_of(controller) == "Z", 15, "the controller's end")
+    one.check_stopped(since_s)
+    assert "the guardian has not answered for 2 s: stopping every bay" in one.service.log()
+    one.service.signal(signal.SIGCONT)
+    assert one.service.ended() == 1
+
+
+def test_when_both_are_killed_only_an_emergency_stop_is_left(services: Services) -> None:
+    """Which is why the systemd unit has one as its ExecStopPost."""
+    one = services.take("both killed")
+    since_s = one.watch()
+    one.service.kill_all()
+    assert one.runs
+    done = orchestrator("estop", str(one.service.file), "--leave-held")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"bay-1 ({one.port}): standby verified\n", "")
+    one.check_stopped(since_s)
+
+
+def test_an_orderly_end_leaves_nothing_to_the_guardian(services: Services) -> None:
+    one = services.take("told to end")
+    since_s = one.watch()
+    one.service.signal(signal.SIGTERM)
+    assert one.service.ended() == 0
+    one.check_stopped(since_s)
+    assert "guardian" not in one.service.log()
+
+
+def test_a_second_service_stops_nothing(services: Services, tmp_path: Path) -> None:
+    """Neither with the same station file nor with another one, neither at its start nor when it is killed."""
+    one = services.take("a second one")
+    one.watch()
+    second = orchestrator("run", str(one.service.file))
+    assert second.returncode == 1
+    assert second.stderr.startswith(f"orchestrator: another service answers on {one.service.socket}: stop it first")
+    assert len(second.stderr.splitlines()) == 1
+    document = json.loads(one.service.file.read_text())
+    document["can"]["can0"] = udp_keys()  # two masters on one BMU are noticed, and are another matter
+    third = Service(tmp_path, document)
+    try:
+        third.start().wait("OFFLINE")
+        third.kill_controller()
+        assert third.ended() == ACTED
+    finally:
+        third.close()
+    fourth = orchestrator("estop", str(one.service.file), "--leave-held")
+    assert (fourth.returncode, fourth.stdout) == (1, f"bay-1 ({one.port}): left alone: a service holds this port\n")
+    truth = one.plant.state(one.bay)
+    assert (truth["operation"], truth["first_stop_s"]) == (1, None)
+    assert one.service.bay()["state"] == "CHARGING"
+
+
+def test_a_terminal_that_suspends_or_is_closed_is_no_way_round(services: Services) -> None:
+    """Ctrl-Z freezes nobody; closing it ends both at once, so it may be the guardian alone that is left to stop."""
+    one = services.take("a terminal")
+    os.killpg(one.service.guardian, signal.SIGTSTP)
+    assert one.service.bay()["state"] == "CHARGING"
+    since_s = one.watch()
+    os.killpg(one.service.guardian, signal.SIGHUP)
+    assert one.service.ended() != 0
+    one.check_stopped(since_s)
