@@ -1,0 +1,309 @@
+"""How faults come and go: debounce, backoff, strikes, latches, and what a person may clear."""
+
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.core.latches import release
+from orchestrator.core.memory import FaultMemory
+from orchestrator.model import Action, Connection, ControlMode, Effect, Request, State
+from tests.core.bays import charging, idle, stopping
+from tests.core.world import TICK_S, World
+
+
+def implausible(world: World, *, seen: bool = True) -> None:
+    """A fault with a backoff, that can come in every state and at once."""
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"} if seen else {})
+
+
+def strike(world: World) -> float:
+    """One bad sample in mid-charge; when it was gone again."""
+    implausible(world)
+    world.tick()
+    assert "implausible" in world.raised
+    implausible(world, seen=False)
+    world.tick()
+    return world.now_s
+
+
+# --- debounce ---------------------------------------------------------------------------------------------------------
+
+
+def test_polls_must_be_in_a_row() -> None:
+    world = charging()
+    for _ in range(10):
+        world.shows["control_mode"] = ControlMode.AUTOMATIC
+        world.tick()
+        world.shows.clear()
+        world.tick()
+    assert world.is_in(State.CHARGING)
+
+
+def test_one_poll_seen_in_many_steps_is_one_poll() -> None:
+    world = charging()
+    world.shows["control_mode"] = ControlMode.AUTOMATIC
+    world.tick()
+    world.port_hangs = True
+    for _ in range(5):
+        world.tick(dt_s=0.1)
+    assert world.is_in(State.CHARGING)
+    world.port_hangs = False
+    world.tick()
+    assert world.is_in(State.STOPPING)
+
+
+def test_a_time_must_be_without_a_break() -> None:
+    world = charging()
+    for _ in range(10):
+        world.volts = 50.0
+        world.run(2.75)
+        world.volts = None
+        world.tick()
+    assert world.is_in(State.CHARGING)
+
+
+# --- backoff and strikes ----------------------------------------------------------------------------------------------
+
+
+def test_backoffs_grow_and_the_fourth_strike_within_an_hour_latches() -> None:
+    world = charging()
+    for backoff_s in (10, 60, 300):
+        gone_s = strike(world)
+        world.until(State.CHARGING, 400)
+        # 10 s clean, the backoff, one step to qualify, then two seconds of everything
+        assert world.now_s - gone_s == 10 + backoff_s + TICK_S + 2
+        world.charging()
+    strike(world)
+    world.until(State.TRIPPED, 5)
+    assert world.decision.faults[0].effect is Effect.TRIP
+    assert world.decision.reason.endswith("it came 4 times within an hour: reset by a person")
+    world.run(2000, dt_s=1.0)
+    assert world.is_in(State.TRIPPED)
+    assert "latched and needs a reset" in world.ask(Request.START)
+    assert world.ask(Request.RESET) == ""
+    assert world.ask(Request.START) == ""
+    world.charging()
+    gone_s = strike(world)  # and it counts from one again
+    world.until(State.CHARGING, 400)
+    assert world.now_s - gone_s == 10 + 10 + TICK_S + 2
+
+
+def test_strikes_are_forgotten_after_an_hour() -> None:
+    world = charging()
+    world.amps = 0.5
+    first_s = world.now_s + TICK_S
+    for _ in range(3):
+        strike(world)
+        world.charging()
+    while world.now_s < first_s + 3600 - TICK_S:
+        world.tick(dt_s=min(1.0, first_s + 3600 - TICK_S - world.now_s))
+    strike(world)
+    world.run(2)
+    assert world.is_in(State.SUSPENDED)  # the first one is an hour old: this is the third
+    world.run(2 * 3600, dt_s=1.0)
+    assert world.is_in(State.CHARGING)
+    assert world.memory.faults == {}  # nothing is remembered for ever
+
+
+def test_flapping_prolongs_the_wait_and_is_no_strike() -> None:
+    world = charging()
+    for _ in range(10):
+        gone_s = strike(world)
+        world.run(19)
+    assert world.is_in(State.SUSPENDED)
+    assert len(world.memory.faults["implausible"].strikes) == 1
+    world.until(State.CHARGING)
+    assert world.now_s - gone_s == 20 + TICK_S + 2
+
+
+def test_a_start_does_not_skip_a_backoff() -> None:
+    world = charging()
+    gone_s = strike(world)
+    world.run(5)
+    assert world.ask(Request.START) == ""
+    world.until(State.CHARGING)
+    assert world.now_s - gone_s == 20 + TICK_S + 2
+
+
+# --- a battery that leaves --------------------------------------------------------------------------------------------
+
+
+def test_a_battery_that_leaves_in_mid_charge_is_no_strike() -> None:
+    world = charging()
+    for _ in range(6):
+        world.leave()
+        world.until(State.IDLE, 10)
+        assert world.decision.reason == "no battery"
+        assert not world.raised
+        world.run(5)
+        world.arrive()
+        world.charging()
+    assert world.memory.faults == {}
+
+
+def test_a_charger_that_stops_when_the_battery_leaves_needs_no_person() -> None:
+    world = charging()
+    world.leave()
+    world.charger.run = False
+    world.run(1)
+    assert "stopped_by_itself" in world.raised
+    world.run(2)
+    assert world.is_in(State.IDLE)
+    assert not world.raised
+    world.arrive()
+    world.until(State.CHARGING, 10)
+
+
+def test_a_bmu_that_leaves_alone_is_a_strike() -> None:
+    world = charging()
+    world.battery_answers = False  # but there are volts at the terminals
+    world.until(State.OFFLINE, 10)
+    assert len(world.memory.faults["bmu_silent"].strikes) == 1
+
+
+def test_five_volts_are_a_battery() -> None:
+    for volts, state in ((4.99, State.IDLE), (5.0, State.OFFLINE)):
+        world = charging()
+        world.leave()
+        world.volts = volts
+        world.run(10)
+        assert world.is_in(state)
+
+
+def test_a_latch_does_not_leave_with_the_battery() -> None:
+    world = charging()
+    for _ in range(4):
+        world.battery_answers = False
+        world.run(5)
+        world.battery_answers = True
+        world.run(400)
+    assert world.is_in(State.TRIPPED)
+    world.leave()
+    world.run(30)
+    assert world.is_in(State.TRIPPED)
+    assert "bmu_silent" in world.raised
+    assert world.ask(Request.RESET) == ""  # with no battery there, its cause is gone
+    world.run(1)
+    assert world.is_in(State.IDLE)
+
+
+# --- what a person may clear ------------------------------------------------------------------------------------------
+
+
+def test_a_refused_request_changes_nothing() -> None:
+    """One latch is clean, the other's cause is still there: neither is cleared."""
+    world = charging()
+    world.internal = "ValueError()"
+    world.battery_link = replace(world.battery_link, abort="0x6004: no such object", abort_code=0x06020000)
+    world.run(2)
+    assert world.is_in(State.TRIPPED)
+    assert world.ask(Request.RESET) == "sdo_refused is still there: 0x6004: no such object"
+    assert set(world.raised) == {"internal", "sdo_refused"}
+    assert "internal is latched" in world.ask(Request.START)
+    assert "sdo_refused is latched" in world.ask(Request.START)
+    world.battery_link = replace(world.battery_link, abort="", abort_code=0)
+    world.tick()
+    assert world.ask(Request.RESET) == ""
+    assert not world.raised
+
+
+def test_a_start_clears_only_what_waits_for_one() -> None:
+    before = {
+        "system_stop": FaultMemory(raised_s=1.0, clean_s=2.0, text="mode 7"),
+        "implausible": FaultMemory(raised_s=1.0, clean_s=2.0, strikes=(1.0,)),
+        "illegal_value": FaultMemory(present_s=2.0, polls=1),
+        "volts_disagree": FaultMemory(strikes=(), present_s=2.0),
+    }
+    left, reasons = release(before, 3.0, by_reset=False)
+    assert reasons == []
+    assert set(left) == {"implausible", "illegal_value", "volts_disagree"}
+    left, reasons = release(
+        {**before, "system_stop": replace(before["system_stop"], clean_s=None)}, 3.0, by_reset=False
+    )
+    assert reasons == ["system_stop is still there: mode 7"]
+    assert set(left) == set(before)
+
+
+def test_a_reset_clears_what_waits_for_a_start_too_but_starts_nothing() -> None:
+    world = charging()
+    world.charger.run = False
+    world.until(State.IDLE, 5)
+    assert "stopped_by_itself" in world.raised
+    assert world.ask(Request.RESET) == ""
+    world.run(10)
+    assert world.decision.reason == "reset by the operator; start to go on"
+    assert world.is_in(State.IDLE)
+
+
+def test_a_reset_while_the_stop_is_being_verified_is_no_start() -> None:
+    world = charging()
+    world.deaf.add(Action.STOP)
+    world.internal = "ValueError()"
+    world.run(1)
+    assert world.is_in(State.STOPPING)
+    assert world.ask(Request.RESET) == ""
+    world.deaf.clear()
+    world.run(30)
+    assert world.is_in(State.IDLE)
+    assert world.decision.reason == "reset by the operator; start to go on"
+
+
+def test_a_reset_of_nothing_changes_nothing() -> None:
+    world = charging()
+    assert world.ask(Request.RESET) == ""
+    world.run(5)
+    assert world.is_in(State.CHARGING)
+
+
+def test_a_cause_that_returns_with_the_reset_latches_again() -> None:
+    world = charging()
+    world.internal = "ValueError()"
+    world.run(2)
+    world.internal = "ValueError() again"
+    assert world.ask(Request.RESET) == ""
+    assert "again" in world.raised["internal"]
+    assert world.decision.faults[0].since_s == world.now_s
+
+
+# --- which one is shown first -----------------------------------------------------------------------------------------
+
+
+def test_the_worst_comes_first_then_the_oldest() -> None:
+    world = idle()
+    world.values["soh_pct"] = 50.0
+    world.tick()
+    implausible(world)
+    world.tick()
+    world.shows["connection"] = Connection.REVERSED
+    world.battery_link = replace(world.battery_link, emergency="EMCY 0x1000")
+    world.tick()
+    world.internal = "ValueError()"
+    world.tick()
+    assert [fault.id for fault in world.decision.faults] == ["reverse_polarity", "internal", "implausible", "emergency",
+                                                             "soh_low"]  # fmt: skip
+    assert [fault.effect for fault in world.decision.faults] == sorted(
+        (fault.effect for fault in world.decision.faults), reverse=True
+    )
+
+
+def test_a_text_is_what_was_seen_when_it_was_raised() -> None:
+    world = charging()
+    world.amps = 17.0
+    world.run(0.5)
+    text = world.raised["over_current"]
+    world.amps = 19.0
+    world.run(0.25)
+    assert world.raised["over_current"] == text
+
+
+@pytest.mark.parametrize("again", [State.STOPPING, State.UNCONTROLLABLE])
+def test_a_fault_is_followed_in_states_in_which_it_is_not_looked_for(again: State) -> None:
+    world = stopping()
+    world.charger_answers = False
+    world.until(State.UNCONTROLLABLE)
+    assert "charger_silent" not in world.raised  # at rest or stopping nobody minds, but for the stop
+    world = charging()
+    world.charger_answers = False
+    world.until(again)
+    assert "charger_silent" in world.raised
+    assert world.memory.faults["charger_silent"].clean_s is None
