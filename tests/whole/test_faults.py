@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 
 from orchestrator.sim.client import PlantProcess
 from orchestrator.sim.faults import FAULTS
 from tests.waiting import wait_until
-from tests.whole.station import Service, whole_station
+from tests.whole.station import Document, Service, whole_station
 
 #: What must be cut off at once, with a poll, a sweep and a busy machine in between.
 AT_ONCE_S = 2.0
@@ -39,7 +40,7 @@ CASES = (
     Case("bmu_silent", "OFFLINE", "heartbeat_lost", SILENCE_S),
     Case("sdo_abort", "TRIPPED", "sdo_refused"),
     Case("wrong_size", "TRIPPED", "temperature_invalid"),
-    Case("implausible_soc", "IDLE", "implausible"),
+    Case("implausible_soc", "SUSPENDED", "implausible"),
     Case("stale_reading", "OFFLINE", "bmu_silent", SILENCE_S, instead="stale_reading"),
     Case("temperature_jump", "TRIPPED", "temperature_invalid"),
     Case("over_temperature", "SUSPENDED", "over_temperature", 10.0),
@@ -66,9 +67,14 @@ GOES_ON = {"charger_cut_off", "charger_error_frames", "ignore_stop", "port_gone"
 STOPPED_BY = "stopped by the operator; start to go on"
 
 
-def steady(plant: PlantProcess) -> bool:
-    bays = plant.ask({"query": "state"})["bays"]
-    return all(bays[BAYS[case.name] - 1]["current_a"] > 13 for case in CASES if case.before != "precharge")
+def leisurely(document: Document) -> None:
+    """One emulator serves them all; it must not become the slow device that is found."""
+    for bay in document["bays"]:
+        bay["battery"]["sweep_s"] = 0.2
+
+
+def steady(plant: PlantProcess, bay: int) -> bool:
+    return bool(plant.state(bay)["current_a"] > 13)
 
 
 def bay_of(case: Case) -> str:
@@ -79,14 +85,17 @@ def bay_of(case: Case) -> str:
 def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PlantProcess, Service]]:
     """Every bay in the middle of a charge, one more than there are faults; then everything happens at once."""
     directory = tmp_path_factory.mktemp("faults")
-    with whole_station(directory, len(CASES) + 1, "--line", "perfect", buses=2) as (plant, service):
+    bays = len(CASES) + 1
+    with whole_station(directory, bays, "--line", "perfect", change=leisurely, buses=2) as (plant, service):
         for case in CASES:
             if case.before == "precharge":
                 plant.set(BAYS[case.name], soc_pct=-60)
         service.start()
         for before, state in (("precharge", "PRECHARGE_PULSE"), ("charging", "CHARGING"), ("stopped", "CHARGING")):
             service.wait(state, [bay_of(case) for case in CASES if case.before == before], 60)
-        wait_until(lambda: steady(plant), 20, "a steady charge everywhere")
+        for case in CASES:
+            if case.before != "precharge":
+                wait_until(partial(steady, plant, BAYS[case.name]), 20, "a steady charge")
         stopped = [bay_of(case) for case in CASES if case.before == "stopped"]
         service.ask("stop", *stopped)
         service.wait("IDLE", stopped)
