@@ -1,0 +1,93 @@
+"""What the processes of last resort import, with all that comes in by it: the standard library, little of ours."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.test_imports import PACKAGE, ROOT, Module, product
+
+PACKAGES = {"", "protocol", "service"}
+STOP = PACKAGES | {"protocol.standby", "service.laststop"}
+#: Module → all of the product that is imported with it.
+LEAN: dict[str, set[str]] = {
+    "protocol.standby": {"", "protocol", "protocol.standby"},
+    "service.say": {"", "service", "service.say"},
+    "service.laststop": STOP,
+    "service.estop": STOP | {"service.estop"},
+    "service.guardian": STOP | {"service.say", "service.guardian"},
+}
+MODULES = {module.name: module for module in product()}
+
+
+def at_import(module: Module) -> Iterator[str]:
+    """What is imported as soon as the module is: not what its functions import when they are called."""
+    body = ast.parse(module.source).body
+    for top in body:
+        within = [top] if isinstance(top, ast.Import | ast.ImportFrom) else []
+        if isinstance(top, ast.If | ast.Try | ast.With):
+            within = [node for node in ast.walk(top) if isinstance(node, ast.Import | ast.ImportFrom)]
+        for node in within:
+            if isinstance(node, ast.Import):
+                yield from (alias.name for alias in node.names)
+            else:
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def closure(name: str) -> tuple[set[str], set[str]]:
+    """All modules of the product, and all other libraries, that come in with one."""
+    ours: set[str] = set()
+    others: set[str] = set()
+    waiting = [name]
+    while waiting:
+        name = waiting.pop()
+        if name in ours:
+            continue
+        ours.add(name)
+        if name:
+            waiting.append(name.rpartition(".")[0])
+        for imported in at_import(MODULES[name]):
+            package, _, target = imported.partition(".")
+            if package != PACKAGE:
+                others.add(package)
+            elif target in MODULES:
+                waiting.append(target)
+            elif target.rpartition(".")[0] in MODULES:
+                waiting.append(target.rpartition(".")[0])
+    return ours, others
+
+
+@pytest.mark.parametrize("name", LEAN)
+def test_all_that_comes_in_is_the_standard_library_and_what_is_listed(name: str) -> None:
+    ours, others = closure(name)
+    assert ours == LEAN[name]
+    assert others <= sys.stdlib_module_names
+
+
+@pytest.mark.parametrize("name", LEAN)
+def test_it_is_imported_where_no_other_library_exists(name: str) -> None:
+    program = f"import sys, {PACKAGE}.{name}; print(*sorted(n for n in sys.modules if n.startswith('{PACKAGE}')))"
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", program], cwd=ROOT.parent, capture_output=True, text=True, check=True, timeout=30
+    )
+    assert {module.removeprefix(PACKAGE).removeprefix(".") for module in done.stdout.split()} == LEAN[name]
+
+
+def test_the_two_quick_verbs_wait_for_nobody_elses_imports(tmp_path: Path) -> None:
+    """The whole command line would cost 60 ms; without site-packages, nothing but these two verbs works at all."""
+    argv = [sys.executable, "-S", "-m", PACKAGE]
+    port = str(tmp_path / "none")
+    done = subprocess.run(
+        [*argv, "estop", "--port", port], cwd=ROOT.parent, capture_output=True, text=True, check=False, timeout=30
+    )
+    assert (done.returncode, done.stdout) == (1, f"{port}: No such file or directory\n")
+    assert subprocess.run([*argv, "estop", "-h"], cwd=ROOT.parent, check=False, timeout=30).returncode == 0
+
+
+def test_an_import_that_is_not_listed_is_seen() -> None:
+    spoilt = Module("service.say", "import os\ntry:\n    import yaml\nexcept ImportError:\n    import json\n")
+    assert list(at_import(spoilt)) == ["os", "yaml", "json"]
+    assert list(at_import(Module("service.say", "def f():\n    import yaml\n"))) == []
