@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import socket
 import stat
 import time
@@ -15,7 +16,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.errors import ServiceError
-from orchestrator.service.control import CLIENT_S, MAX_REQUEST, STALL_S, ControlSocket, ask, is_alive, parse_request
+from orchestrator.service.control import (
+    CLIENT_S,
+    MAX_REQUEST,
+    RETRY_S,
+    STALL_S,
+    ControlSocket,
+    ask,
+    is_alive,
+    parse_request,
+)
 from tests.waiting import wait_until
 
 
@@ -288,3 +298,36 @@ def test_every_object_is_a_request(request: dict[str, object]) -> None:
 def test_everything_else_is_not(value: object) -> None:
     with pytest.raises(ServiceError):
         parse_request(json.dumps(value).encode())
+
+
+def test_too_many_open_files_are_no_end(tmp_path: Path) -> None:
+    """accept() fails as soon as it is called; when there is room again, whoever has come meanwhile is answered."""
+    control = ControlSocket(tmp_path / "control.sock", answer, time.monotonic)
+    with client(tmp_path / "control.sock") as early, taken_files():
+        control.start()
+        early.sendall(b'{"verb": "status"}\n')
+        early.settimeout(3 * RETRY_S)
+        with pytest.raises(TimeoutError):
+            early.recv(1)
+        assert not control.stalled(time.monotonic())
+    with client(tmp_path / "control.sock") as late:
+        late.sendall(b'{"verb": "status"}\n')
+        assert reply(late)["ok"] is True
+    control.close()
+
+
+@contextmanager
+def taken_files() -> Iterator[None]:
+    """No file can be opened any more, in the whole process."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    files: list[int] = []
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(soft, 256), hard))
+        with suppress(OSError):
+            while True:
+                files.append(os.dup(0))
+        yield
+    finally:
+        for file in files:
+            os.close(file)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

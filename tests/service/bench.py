@@ -1,0 +1,150 @@
+"""A bay of the service without threads: the test is its control loop, its devices obey at once and time jumps."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from orchestrator.config.load import load_map, load_policy
+from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits
+from orchestrator.core.memory import Memory
+from orchestrator.interlock import Grant
+from orchestrator.keys import Range
+from orchestrator.model import (
+    STOP,
+    Action,
+    BatteryLink,
+    BatteryReading,
+    ChargeMode,
+    ChargerLink,
+    ChargerReading,
+    Command,
+    Connection,
+    ControlMode,
+    Measurement,
+    Operation,
+    Precharge,
+    Request,
+    Sent,
+    State,
+)
+from orchestrator.service.bay import Asked, BayRunner
+from orchestrator.service.journal import Journal
+
+STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
+STEP_S = 0.2
+
+
+def the_bay() -> Bay:
+    return Bay(
+        name="bay-1",
+        charger=ChargerConfig(port="/dev/ttyX", control=ControlMode.MANUAL, steps_a=STEPS_A),
+        battery=BatteryConfig(can="can0", node_id=0x10, map=load_map("tabos")),
+        limits=Limits(voltage_v=58.4, current_a=15.0, temperature_c=Range(0, 45)),
+        policy=load_policy("li-ion-48v"),
+    )
+
+
+class Charger:
+    """Has obeyed by the next time that it is looked at. `orders` are all that it was left."""
+
+    def __init__(self) -> None:
+        self.orders: list[tuple[Command | None, Grant | None]] = []
+        self.reading = ChargerReading(
+            0.0,
+            48.0,
+            0.0,
+            ControlMode.MANUAL,
+            Operation.STOPPED,
+            0,
+            ChargeMode.FULL,
+            Precharge.OFF,
+            Connection.NORMAL,
+        )
+        self.link = ChargerLink(online=True)
+
+    def order(self, command: Command | None, grant: Grant | None = None) -> None:
+        self.orders.append((command, grant))
+
+    @property
+    def view(self) -> tuple[ChargerReading, ChargerLink]:
+        return self.reading, self.link
+
+    def pass_time(self, now_s: float) -> None:
+        """Send what was ordered in the middle of the step, then answer a poll."""
+        command = self.orders[-1][0] if self.orders else None
+        changes: dict[str, object] = {}
+        if command is not None:
+            sent_s = now_s - STEP_S / 2
+            self.link = replace(self.link, sent=Sent(command, sent_s))
+            if command == STOP:
+                self.link = replace(self.link, stop_sent_s=sent_s)
+            effects: dict[Action, dict[str, object]] = {
+                Action.STOP: {"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL},
+                Action.SET_LIMIT: {"current_limit": command.value},
+                Action.SET_MODE: {"charge_mode": ChargeMode(command.value) if command.value else None},
+                Action.RUN: {"operation": Operation.RUNNING},
+            }
+            changes = effects.get(command.action, {})
+        reading = replace(self.reading, **changes)  # type: ignore[arg-type]  # the fields of a reading, by the order
+        running = reading.operation is Operation.RUNNING
+        self.reading = replace(reading, t_s=now_s, current_a=STEPS_A[reading.current_limit or 0] if running else 0.0)
+
+
+class Battery:
+    """Tells `values`, freshly."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.values = {
+            "voltage_v": 48.0,
+            "current_a": 0.0,
+            "status": 0.0,
+            "temperature_c": 20.0,
+            "soc_pct": 50.0,
+            "soh_pct": 100.0,
+        }
+
+    @property
+    def view(self) -> tuple[BatteryReading, BatteryLink]:
+        fresh = {name: Measurement(value, self.now_s) for name, value in self.values.items()}
+        return BatteryReading(**fresh), BatteryLink(online=True)
+
+
+class Bench:
+    """A bay, its devices, and a journal that nobody writes: its lines wait in it."""
+
+    def __init__(self, directory: Path, memory: Memory | None = None) -> None:
+        self.charger, self.battery = Charger(), Battery()
+        self.now_s = 1000.0
+        self.journal = Journal(directory, 1.0, lambda: self.now_s, time.time)
+        self.bay = BayRunner(the_bay(), self.charger, self.battery, self.journal, memory or Memory())
+
+    def step(self, count: int = 1) -> State:
+        for _ in range(count):
+            self.now_s += STEP_S
+            self.charger.pass_time(self.now_s)
+            self.battery.now_s = self.now_s
+            self.battery.values["current_a"] = self.charger.reading.current_a
+            self.bay.run(self.now_s)
+        assert self.bay.decision is not None
+        return self.bay.decision.state
+
+    def until(self, state: State, at_most: int = 100) -> None:
+        for _ in range(at_most):
+            if self.step() is state:
+                return
+        raise AssertionError(f"{state} not reached, but {self.bay.decision}")
+
+    def charging(self) -> None:
+        """Until it charges and the charger has been told everything."""
+        self.until(State.CHARGING)
+        self.step(10)
+        assert self.charger.reading.current_a > 0
+
+    def ask(self, request: Request) -> str:
+        asked = Asked(request)
+        self.bay.ask(asked)
+        assert not asked.done.is_set()
+        self.step()
+        assert asked.done.is_set()
+        return asked.answer
