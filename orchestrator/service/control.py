@@ -4,6 +4,7 @@ Only the owner of the service (and root) can open the socket, a request is bound
 served one after another, so that no number of them can hold the bays up: the control loop never waits for a client.
 """
 
+import errno
 import json
 import os
 import socket
@@ -12,6 +13,7 @@ import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
+from time import sleep
 
 from orchestrator.errors import OrchestratorError, ServiceError
 
@@ -22,6 +24,9 @@ CLIENT_S = 1.0
 WAITING = 128
 #: Reading, asking every bay and answering take at most this; longer means that the thread hangs.
 STALL_S = 30.0
+#: What accept() says of a listener that was closed; after anything else it is worth another try, a little later.
+CLOSED = (errno.EINVAL, errno.EBADF)
+RETRY_S = 0.1
 
 Answer = Mapping[str, object]
 Handler = Callable[[Mapping[str, object]], Answer]
@@ -56,8 +61,11 @@ class ControlSocket:
         while True:
             try:
                 client, _ = self._listener.accept()
-            except OSError:
-                return  # closed
+            except OSError as error:
+                if error.errno in CLOSED:
+                    return
+                sleep(RETRY_S)  # this client has left already, or there are too many open files
+                continue
             self._client_s = self._clock()
             with client, suppress(OSError):
                 answer = _line(self._answer(client))
