@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """All of it, or what takes a minute."""
+    """All of it, or what takes less than two minutes."""
 
     quick: bool = False
 
