@@ -82,6 +82,7 @@ class JournalConfig:
     """Where the journal goes and how large it may grow."""
 
     directory: Path = key("where the journal is kept")
+    snapshots: bool = key("also what every decision was made from, for a replay; false spares an SD card", default=True)
     max_mb: float = key("the most that it may take; the oldest goes first", unit="MB", ge=1, default=256.0)
 
 

@@ -21,17 +21,22 @@ class BatteryView:
         self._news = False
 
     def measured(self, fields: Fields) -> None:
-        """Take the plausible values over; a value that is not keeps the one before it, with its age, and says why."""
+        """Take the plausible values over; a value that is not keeps the one before it, with its age, and says why.
+
+        A value that has only been confirmed is no news: its new age is there for whoever looks next.
+        """
         values: dict[str, Measurement | None] = {}
         implausible = {name: why for name, why in self.link.implausible.items() if name not in fields}
         for name, value in fields.items():
             if isinstance(value, str):
                 implausible[name] = value
-            elif value is None or (old := getattr(self.reading, name)) is None or value.t_s >= old.t_s:
+                continue
+            old: Measurement | None = getattr(self.reading, name)
+            if value is None or old is None or value.t_s >= old.t_s:
                 values[name] = value
+                self._news |= (value and value.value) != (old and old.value)
         if values:
             self.reading = replace(self.reading, **values)
-            self._news = True
         self.set(implausible=implausible)
 
     def booted(self, now_s: float) -> None:

@@ -12,6 +12,10 @@ SHARE = 0.30  #: of the bus's bit rate, the most that SDO traffic may take
 PLANNED = 0.9  #: of that share, what the sweeps are planned for: without slack the queue would only grow
 BURST = 4  #: exchanges that may follow each other at once; below the 10 frames that SocketCAN's queue takes
 SLOW_S = 1.0  #: how often the slow objects are read
+#: On a bus that is too full, the slow objects yield to this first: their values may be 3 s old, the fast ones' 1.5 s.
+YIELDING_SLOW_S = 2.0
+#: Three sweeps within the 1.5 s that a fast value may be old: what is slower makes the slow objects yield.
+GOOD_SWEEP_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,19 +32,28 @@ class BusBudget:
         self.capacity_hz = SHARE * bitrate / EXCHANGE_BITS
         self._shares: list[_Share] = []
         self._stretch = 1.0
-        self._least_s = 0.0  # the period of every object, where even one a second is too much
+        self._slow_s = SLOW_S
+        self._least_s = 0.0  # the period of every object, where even that is too much
         self._spacing_s = 1.0 / self.capacity_hz
         self._next_s = float("-inf")  # when all that is reserved has had its time
 
     def join(self, fast: int, slow: int, sweep_s: float) -> None:
         """A node with so many fast and slow objects, the former wanted every `sweep_s`. All sweeps may stretch."""
         self._shares.append(_Share(fast, slow, sweep_s))
-        plan_hz = PLANNED * self.capacity_hz
+        longest_s = max(share.sweep_s for share in self._shares)
+        self._stretch = self._stretched(SLOW_S)
+        if self._stretch * longest_s > GOOD_SWEEP_S:
+            self._slow_s = YIELDING_SLOW_S
+            self._stretch = self._stretched(YIELDING_SLOW_S)
+        if self._stretch * longest_s > YIELDING_SLOW_S:
+            objects = sum(share.fast + share.slow for share in self._shares)
+            self._least_s = objects / (PLANNED * self.capacity_hz)
+
+    def _stretched(self, slow_s: float) -> float:
+        """The factor for the fast objects' sweeps when the slow ones are read every `slow_s`."""
         fast_hz = sum(share.fast / share.sweep_s for share in self._shares)
-        left_hz = plan_hz - sum(share.slow for share in self._shares) / SLOW_S
-        self._stretch = max(1.0, fast_hz / left_hz) if left_hz > 0 else float("inf")
-        if self._stretch * max(share.sweep_s for share in self._shares) > SLOW_S:
-            self._least_s = sum(share.fast + share.slow for share in self._shares) / plan_hz
+        left_hz = PLANNED * self.capacity_hz - sum(share.slow for share in self._shares) / slow_s
+        return max(1.0, fast_hz / left_hz) if left_hz > 0 else float("inf")
 
     def fast_s(self, sweep_s: float) -> float:
         """How often a fast object may be read that is wanted every `sweep_s`."""
@@ -49,7 +62,7 @@ class BusBudget:
     @property
     def slow_s(self) -> float:
         """How often a slow object may be read."""
-        return max(SLOW_S, self._least_s)
+        return max(self._slow_s, self._least_s)
 
     def reserve(self, now_s: float) -> float:
         """Count one exchange, and return when it may begin: now, or after those that were reserved before it.

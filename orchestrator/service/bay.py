@@ -64,7 +64,9 @@ class Asked:
 class BayRunner:
     """Runs `step()` for one bay. Used by the control loop's thread only, but for `ask` and `status`."""
 
-    def __init__(self, bay: Bay, charger: Charger, battery: Battery, journal: Journal, memory: Memory) -> None:
+    def __init__(
+        self, bay: Bay, charger: Charger, battery: Battery, journal: Journal, memory: Memory, *, snapshots: bool = True
+    ) -> None:
         self.name = bay.name
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
@@ -74,7 +76,7 @@ class BayRunner:
         self._ending = False
         self._charger, self._battery, self._journal = charger, battery, journal
         self._snapshot = Snapshot()
-        self._recorder = SnapshotRecorder()
+        self._recorder = SnapshotRecorder() if snapshots else None
         self._asked: list[Asked] = []
         self._internal = ""
 
@@ -125,7 +127,7 @@ class BayRunner:
         self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
         if before is None or decision != before:
             self._write_down(before, decision)
-        line = self._recorder.line(snapshot, memory, before, decision)
+        line = self._recorder.line(snapshot, memory, before, decision) if self._recorder else None
         if line is not None:
             self._journal.put(self.name, line)
         self._keep()

@@ -29,7 +29,9 @@ from orchestrator.service.kept import read_kept
 from orchestrator.service.status import station_status
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
-TICK_S = 0.1
+TICK_S = 0.2
+#: How often the guardian hears that every loop turns: five times before it acts.
+BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
 STOP_S = 3.0
 #: An operator's request is answered by the next step; longer than this means that the loop hangs.
@@ -68,7 +70,8 @@ class Supervisor:
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             self._ports.append(port)
-            self._bays.append(BayRunner(bay, port, node, self._journal, kept[bay.name].memory(monotonic())))
+            memory, snapshots = kept[bay.name].memory(monotonic()), self._station.journal.snapshots
+            self._bays.append(BayRunner(bay, port, node, self._journal, memory, snapshots=snapshots))
         self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
 
     @property
@@ -106,7 +109,7 @@ class Supervisor:
         for bay in self._bays:
             if now_s - bay.last_s >= TICK_S:
                 bay.run(monotonic())
-        if now_s - self._beat_s >= TICK_S:
+        if now_s - self._beat_s >= BEAT_S:
             self._beat(now_s)
 
     def _beat(self, now_s: float) -> None:
@@ -120,7 +123,7 @@ class Supervisor:
     def _news(self) -> set[int]:
         numbers: set[int | None] = set()
         try:
-            numbers.add(self._wake.get(timeout=TICK_S / 2))
+            numbers.add(self._wake.get(timeout=BEAT_S / 2))
             while True:
                 numbers.add(self._wake.get_nowait())
         except Empty:
