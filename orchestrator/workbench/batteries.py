@@ -1,0 +1,142 @@
+"""What a battery can show, cut by a policy's thresholds."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
+from orchestrator.model import BatteryLink, BatteryReading, BatteryStatus, Measurement
+
+#: A value that was asked for right before the step, and one that is far too old.
+FRESH_S, OLD_S = 0.05, 30.0
+HEARTBEAT_S = 0.5
+#: How far beside a bound "just below" and "just above" lie: the resolution of what a BMU sends.
+NEAR = {"voltage_v": 0.01, "temperature_c": 0.1, "soc_pct": 1.0, "soh_pct": 1.0}
+
+Link = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """One class: the true values, and how what the BMU says differs from them."""
+
+    values: Mapping[str, float]
+    takes: float = 0.9  #: of the charger's limit, what flows
+    differs_v: float = 0.0  #: how much more the charger reads than the BMU
+    differs_a: float = 0.0  #: how much more the BMU reads than the charger
+    connected: bool = True
+    old: frozenset[str] = frozenset()  #: values that are too old
+    link: Callable[[float, Memory], Link] = field(default=lambda _now_s, _memory: {})
+
+    @property
+    def volts(self) -> float:
+        """At the terminals."""
+        return self.values["voltage_v"]
+
+    def at(self, now_s: float, memory: Memory, charger_a: float) -> tuple[BatteryReading, BatteryLink]:
+        """As it is read at this moment."""
+        values = {**self.values, "current_a": charger_a + self.differs_a}
+        reading = BatteryReading(
+            **{
+                name: Measurement(value, now_s - (OLD_S if name in self.old else FRESH_S))
+                for name, value in values.items()
+            }
+        )
+        link: dict[str, Any] = {
+            "online": True, "boots": memory.boots, "heartbeat_s": HEARTBEAT_S, "heartbeat_t_s": now_s - FRESH_S,
+            **self.link(now_s, memory),
+        }  # fmt: skip
+        return (reading if link.pop("speaks", True) else BatteryReading()), BatteryLink(**link)
+
+
+def _fixed(**link: Any) -> Callable[[float, Memory], Link]:  # noqa: ANN401 - fields of BatteryLink
+    return lambda _now_s, _memory: link
+
+
+def _booted(now_s: float, memory: Memory) -> Link:
+    return {"boots": memory.boots + 1, "boot_t_s": now_s - 0.1, "heartbeat_s": None, "speaks": False}
+
+
+def _heartbeat_lost(now_s: float, _memory: Memory) -> Link:
+    return {"heartbeat_t_s": now_s - OLD_S}
+
+
+FAST = frozenset({"voltage_v", "current_a", "status", "temperature_c"})
+SLOW = frozenset({"soc_pct", "soh_pct"})
+
+
+def healthy(rules: Rules) -> Shown:
+    """In the middle of everything."""
+    pack, precharge = rules.policy.pack, rules.policy.precharge
+    low_v = precharge.below_v if precharge is not None else pack.voltage_v.low
+    soc = min(rules.policy.start.soc_below_pct, rules.policy.recharge.soc_below_pct) / 2
+    return Shown(
+        {
+            "voltage_v": (low_v + rules.max_v) / 2, "status": 0.0, "soc_pct": soc, "soh_pct": 100.0,
+            "temperature_c": (rules.temperature_c.low + rules.temperature_c.high) / 2,
+        }
+    )  # fmt: skip
+
+
+def batteries(rules: Rules) -> dict[str, Shown]:
+    """Every class for this bay, by its name."""
+    base = healthy(rules)
+    classes = {"healthy": base}
+    for field_name, bounds in _bounds(rules).items():
+        for bound in sorted(bounds):
+            for word, value in (
+                ("just below", bound - NEAR[field_name]), ("at", bound), ("just above", bound + NEAR[field_name]),
+            ):  # fmt: skip
+                name = f"{field_name} {word} {bound:g}"
+                classes[name] = replace(base, values={**base.values, field_name: value})
+    return classes | _events(base, rules)
+
+
+def _bounds(rules: Rules) -> dict[str, set[float]]:
+    """The thresholds of policy and station, by field."""
+    policy = rules.policy
+    volts = {policy.pack.voltage_v.low, rules.max_v}
+    if policy.precharge is not None:
+        volts |= {policy.precharge.below_v, policy.precharge.pulse.until_v}
+    if policy.finish.taper is not None:
+        volts.add(policy.finish.taper.above_v)
+    bounds = {
+        "voltage_v": volts,
+        "temperature_c": {rules.temperature_c.low, rules.temperature_c.high, policy.faults.temperature_trip_c},
+        "soc_pct": {policy.start.soc_below_pct, policy.recharge.soc_below_pct, policy.finish.soc_pct, 80.0},
+        "soh_pct": {policy.pack.soh_min_pct},
+    }
+    for name, limits in bounds.items():
+        limits |= {band.from_ for band in getattr(policy.current, name) or ()}
+    return bounds
+
+
+def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
+    """What no threshold cuts: a battery that leaves, falls silent, complains or lies."""
+    status = {**base.values, "status": float(1 << BatteryStatus.BMU_ERROR)}
+    limit = {**base.values, "status": float(1 << BatteryStatus.LOW_TEMPERATURE)}
+    full = {**base.values, "soc_pct": rules.policy.finish.soc_pct}
+    return {
+        "full": replace(base, values=full),
+        "takes nothing": replace(base, takes=0.0),
+        "tapers": replace(base, takes=0.01, values={**base.values, "voltage_v": rules.max_v - 0.1}),
+        "absent": replace(base, connected=False, link=_fixed(online=False, speaks=False, problem="no answer")),
+        "silent": replace(base, link=_fixed(online=False, speaks=False, problem="no answer")),
+        "not trusted": replace(base, link=_fixed(online=False, problem="answered twice")),
+        "old fast values": replace(base, old=FAST),
+        "old temperature": replace(base, old=frozenset({"temperature_c"})),
+        "old slow values": replace(base, old=SLOW),
+        "booted": replace(base, link=_booted),
+        "no heartbeat": replace(base, link=_heartbeat_lost),
+        "refuses a read": replace(base, link=_fixed(abort="0x6004 refused", abort_code=0x06020000)),
+        "cannot answer now": replace(base, link=_fixed(abort="0x6004 not now", abort_code=0x08000022)),
+        "implausible SOC": replace(base, link=_fixed(implausible={"soc_pct": "SOC 140 %"})),
+        "implausible temperature": replace(base, link=_fixed(implausible={"temperature_c": "−40.0 °C"})),
+        "status bit that trips": replace(base, values=status),
+        "status bit that limits": replace(base, values=limit),
+        "emergency": replace(base, link=_fixed(emergency="EMCY 0x5000")),
+        "another voltage than the charger's": replace(base, differs_v=5.0),
+        "another current than the charger's": replace(base, differs_a=5.0),
+        "discharges": replace(base, differs_a=-20.0),
+    }

@@ -1,0 +1,196 @@
+"""What every step of every bay must fulfil, and what must become of every bay: the safety properties, as data.
+
+Each check reads snapshot, decision and memory, and works out for itself what it needs: it asks none of the core's own
+predicates, so that a mistake in one of those does not hide here.
+"""
+
+from orchestrator.model import ENERGISED, STOP, Action, Decision, Effect, Operation, Request, State
+from orchestrator.workbench.explore import Ending, Property, Taken
+
+#: The ages that evidence may have (DESIGN §6): a charger's silence is noticed within 2 s, fast values of a BMU go stale
+#: after 1.5 s, slow ones after three readings.
+CHARGER_S, FAST_S, SLOW_S = 2.0, 1.5, 3.0
+#: From the order to stop until it must be proved, and a margin of steps.
+VERIFY_S = 3.0
+
+FAST, SLOW = ("voltage_v", "current_a", "status", "temperature_c"), ("soc_pct", "soh_pct")
+
+RUNS = frozenset({Action.RESUME, Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE, Action.RUN})
+UNPROVED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
+#: States of verified standby.
+STANDBY = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
+
+
+def _orders_run(decision: Decision) -> bool:
+    return decision.command is not None and decision.command.action in RUNS
+
+
+def no_run_without_fresh_readings(taken: Taken) -> str | None:
+    """DESIGN §2: unknown means no."""
+    if not _orders_run(taken.decision):
+        return None
+    charger, battery = taken.snapshot.charger, taken.snapshot.battery
+    if charger is None or taken.now_s - charger.t_s > CHARGER_S:
+        return f"{taken.decision.command} without a fresh status of the charger"
+    for age_s, names in ((FAST_S, FAST), (SLOW_S, SLOW)):
+        for name in names:
+            value = getattr(battery, name)
+            if value is None or taken.now_s - value.t_s > age_s:
+                return f"{taken.decision.command} without a fresh {name}"
+    return None
+
+
+def stop_at_once(taken: Taken) -> str | None:
+    """A fault of effect STOP or worse that is new commands a stop in the same step."""
+    new = [f for f in taken.decision.faults if f.since_s == taken.now_s and f.effect >= Effect.STOP]
+    if new and taken.decision.command != STOP:
+        return f"{new[0].id} ({new[0].effect.name}) is new, the order is {taken.decision.command}"
+    return None
+
+
+def no_current_under_a_fault(taken: Taken) -> str | None:
+    """While a fault of effect PAUSE or worse is in force, nothing runs."""
+    worst = max((fault.effect for fault in taken.decision.faults), default=Effect.WARN)
+    if worst >= Effect.PAUSE and (taken.decision.setpoint.run or _orders_run(taken.decision)):
+        return f"runs with {taken.decision.faults[0].id} in force"
+    return None
+
+
+def operator_stops(taken: Taken) -> str | None:
+    """A stop or a pause of the operator takes effect in the same step, unless it is answered with a reason."""
+    asked = taken.snapshot.request
+    if asked not in (Request.STOP, Request.PAUSE) or taken.decision.answer:
+        return None
+    return f"{asked} was accepted, and the bay runs" if taken.after.state in ENERGISED else None
+
+
+def held_until_started(taken: Taken) -> str | None:
+    """What an operator stopped, only an operator starts."""
+    before, after = taken.before, taken.after
+    if before.hold and not after.hold and taken.snapshot.request is not Request.START:
+        return "the hold was lifted without a start"
+    return "runs in spite of a hold" if after.hold and after.state in ENERGISED else None
+
+
+def tripped_until_reset(taken: Taken) -> str | None:
+    """TRIPPED is left by a person's reset, or to stop a charger that runs."""
+    if taken.before.state is not State.TRIPPED or taken.after.state in (State.TRIPPED, State.STOPPING):
+        return None
+    return None if taken.snapshot.request is Request.RESET else f"left for {taken.after.state} without a reset"
+
+
+def latched_until_reset(taken: Taken) -> str | None:
+    """A fault that has latched, only a reset takes away."""
+    gone = [
+        name for name, fault in taken.before.faults.items()
+        if fault.latched and (name not in taken.after.faults or not taken.after.faults[name].latched)
+    ]  # fmt: skip
+    return f"{gone[0]} has gone without a reset" if gone and taken.snapshot.request is not Request.RESET else None
+
+
+def charge_begins_qualified(taken: Taken) -> str | None:
+    """Current begins after QUALIFYING, or from one stage to the next, and nowhere else."""
+    if taken.after.state not in ENERGISED or taken.before.state in ENERGISED:
+        return None
+    return None if taken.before.state is State.QUALIFYING else f"{taken.before.state} → {taken.after.state}"
+
+
+def rest_is_verified(taken: Taken) -> str | None:
+    """A state of standby is entered only with a reading, asked for after a stop was sent in vain, that shows it."""
+    if taken.after.state not in STANDBY or taken.before.state not in UNPROVED:
+        return None
+    reading, sent_s = taken.snapshot.charger, taken.snapshot.charger_link.stop_sent_s
+    if reading is None or sent_s is None or reading.t_s < sent_s:
+        return f"{taken.after.state} without a status from after the stop"
+    if reading.operation is not Operation.STOPPED or reading.current_a > 0.5 or taken.now_s - reading.t_s > CHARGER_S:
+        return f"{taken.after.state} on {reading}"
+    return None
+
+
+def within_limits(taken: Taken) -> str | None:
+    """No step above the station's current limit, whatever the policy allows."""
+    setpoint, rules = taken.decision.setpoint, taken.rules
+    if not setpoint.run or setpoint.current_limit is None:
+        return None
+    amps = rules.bay.charger.steps_a[setpoint.current_limit]
+    return f"step of {amps:g} A above {rules.bay.limits.current_a:g} A" if amps > rules.bay.limits.current_a else None
+
+
+def unproved_stops(taken: Taken) -> str | None:
+    """In states that wait for a verified standby, stop is the standing order."""
+    if taken.after.state in UNPROVED and taken.decision.command != STOP:
+        return f"the order in {taken.after.state} is {taken.decision.command}"
+    return None
+
+
+def alarmed(taken: Taken) -> str | None:
+    """The interlock output is open in UNCONTROLLABLE, and only there."""
+    wrong = taken.decision.alarm is not (taken.after.state is State.UNCONTROLLABLE)
+    return f"alarm {taken.decision.alarm} in {taken.after.state}" if wrong else None
+
+
+def stops_in_time(taken: Taken) -> str | None:
+    """A stop that is not proved in time is called so."""
+    since_s = taken.after.since_s
+    if taken.after.state is not State.STOPPING or since_s is None or taken.now_s - since_s < VERIFY_S:
+        return None
+    return f"{taken.now_s - since_s:.2f} s in STOPPING"
+
+
+def precharge_ends(taken: Taken) -> str | None:
+    """A stage of precharge never takes longer than its policy allows."""
+    rule, since_s = taken.rules.policy.precharge, taken.after.since_s
+    if taken.after.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS) or since_s is None:
+        return None
+    if rule is None:
+        return "precharge without a rule for it"
+    pulse = taken.after.state is State.PRECHARGE_PULSE
+    minutes = rule.pulse.max_min if pulse else rule.continuous.max_min
+    return f"{taken.after.state} beyond {minutes:g} min" if taken.now_s - since_s > minutes * 60 else None
+
+
+def session_ends(taken: Taken) -> str | None:
+    """Energised never longer than the policy's hours."""
+    session, hours = taken.after.session, taken.rules.policy.finish.max_hours
+    if taken.after.state not in ENERGISED or session is None or session.energised_s <= hours * 3600:
+        return None
+    return f"energised for {session.energised_s / 3600:.2f} h, allowed are {hours:g} h"
+
+
+def _standby(taken: Taken) -> bool:
+    return taken.after.state in STANDBY and taken.decision.command is None
+
+
+def _called(taken: Taken) -> bool:
+    """Where people are told, and the stop is repeated for as long as it is not proved."""
+    named = taken.after.state in (State.UNCONTROLLABLE, State.OFFLINE, State.TRIPPED)
+    return named and taken.decision.command == STOP
+
+
+PROPERTIES: tuple[Property, ...] = (
+    Property("fresh", "no run command without fresh readings of everything", no_run_without_fresh_readings),
+    Property("stop at once", "a new fault of effect STOP or worse: stop in the same step", stop_at_once),
+    Property("no current", "nothing runs while a fault of effect PAUSE or worse is in force", no_current_under_a_fault),
+    Property("operator", "an accepted stop or pause takes effect in the same step", operator_stops),
+    Property("hold", "what an operator stopped, only an operator starts", held_until_started),
+    Property("tripped", "TRIPPED is left by a reset, or to stop", tripped_until_reset),
+    Property("latched", "a latched fault is taken away by a reset only", latched_until_reset),
+    Property("qualified", "current begins after QUALIFYING only", charge_begins_qualified),
+    Property("verified", "standby is entered on proof only", rest_is_verified),
+    Property("limits", "no step above the station's current limit", within_limits),
+    Property("standing stop", "stop is the order until standby is proved", unproved_stops),
+    Property("alarm", "the alarm means UNCONTROLLABLE", alarmed),
+    Property("in time", "STOPPING ends within 3 s, one way or the other", stops_in_time),
+    Property("precharge", "precharge never exceeds its time", precharge_ends),
+    Property("hours", "a charge never exceeds its hours", session_ends),
+)
+
+ENDINGS: tuple[Ending, ...] = (
+    Ending("to standby", "an operator's stop leads to verified standby wherever the charger obeys",
+           "obeys", "healthy", Request.STOP, 10.0, _standby),
+    Ending("to standby, no battery", "the same without a battery", "obeys", "absent", Request.STOP, 10.0, _standby),
+    Ending("named", "a charger that cannot be stopped is named: UNCONTROLLABLE or OFFLINE",
+           "runs, whatever it is told", "healthy", Request.STOP, 10.0, lambda t: t.after.state is State.UNCONTROLLABLE),
+    Ending("named, silent", "a charger that says nothing is named, too",
+           "silent", "healthy", Request.STOP, 10.0, _called),
+)  # fmt: skip

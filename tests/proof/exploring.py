@@ -1,0 +1,91 @@
+"""The checker of `orchestrator.workbench` on the design's bay, with all input classes or the fewer of a quick test."""
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+from orchestrator.config.load import load_policy
+from orchestrator.core.machine import TABLE
+from orchestrator.core.rules import Rules
+from orchestrator.model import ControlMode, State
+from orchestrator.workbench.endings import reaches, settles
+from orchestrator.workbench.explore import Explorer
+from orchestrator.workbench.inputs import StationInputs
+from orchestrator.workbench.properties import ENDINGS, PROPERTIES
+from tests.proof.report import say
+from tests.proof.virtual_service import station
+
+#: Shipped policies for the 48 V station of the tests; the other two need other limits only.
+POLICIES = ("li-ion-48v", "lfp-48v", "long-life-48v", "li-ion-24v")
+#: What the quick form leaves out: the neighbours of every bound. The jumps that it keeps lead past every kind of timer.
+NEIGHBOURS = ("just above", "just below")
+QUICK_JUMPS_S = {ControlMode.MANUAL: (3.1, 70.1, 1200.1, 43200.1), ControlMode.AUTOMATIC: (3.1, 43200.1)}
+SMALL_CHARGERS = (
+    "obeys", "stands by, whatever it is told", "runs, whatever it is told", "stands by, no stop written yet",
+    "full by itself", "stopped by an error", "silent", "never heard",
+)  # fmt: skip
+SMALL_BATTERIES = (
+    "healthy", "full", "absent", "silent", "takes nothing", "old temperature", "implausible SOC",
+    "voltage_v just below", "temperature_c at 45", "temperature_c at 55",
+)  # fmt: skip
+#: The table leads there, and nothing can: a service that has just started knows of no battery that it has charged full.
+NEVER = {(State.STARTING, State.FULL)}
+
+
+def rules(policy: str = "li-ion-48v", control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> Rules:
+    bay = station(1, control, load_policy(policy)).bays[0]
+    return Rules.of(replace(bay, limits=replace(bay.limits, current_a=current_a)))
+
+
+def quick(of: Rules) -> StationInputs:
+    """Fewer neighbours and jumps; no class is left out that is one of its kind."""
+    whole = StationInputs.of(of)
+    batteries = {name: shown for name, shown in whole.batteries.items() if not any(w in name for w in NEIGHBOURS)}
+    below = {name: shown for name, shown in whole.batteries.items() if "just below" in name and "_v" in name}
+    return StationInputs(of, QUICK_JUMPS_S[of.bay.charger.control], whole.chargers, batteries | below)
+
+
+def small(of: Rules) -> StationInputs:
+    """One class of each kind: enough to come everywhere, and to show a bug that is there."""
+    whole = quick(of)
+    chargers = {name: whole.chargers[name] for name in SMALL_CHARGERS}
+    batteries = {
+        name: shown for name, shown in whole.batteries.items()
+        if name in SMALL_BATTERIES or any(name.startswith(start) for start in SMALL_BATTERIES)
+    }  # fmt: skip
+    return replace(whole, chargers=chargers, batteries=batteries)
+
+
+def changes_of_table() -> set[tuple[State, State]]:
+    """Every change of state that the machine's table has."""
+    pairs = {(source, target) for _, sources, target in TABLE if target for source in sources}
+    return {(source, target) for source, target in pairs if source is not target}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """The whole exploration, for `make campaign`."""
+    parser = argparse.ArgumentParser(description="Explore everything that the core can come to.")
+    parser.add_argument("--policy", choices=POLICIES, action="append")
+    names = parser.parse_args(argv).policy or POLICIES
+    bad = 0
+    for name in names:
+        for control in ControlMode:
+            began_s = time.monotonic()
+            explorer = Explorer(rules(name, control), StationInputs.of(rules(name, control)), PROPERTIES)
+            explorer.run()
+            reaches(explorer, ENDINGS)
+            settles(explorer)
+            say(
+                f"{name:14} {control.name.lower():9} {len(explorer.nodes):5} memories {explorer.steps:9,} steps "
+                f"{time.monotonic() - began_s:5.0f} s  {len(explorer.found)} counterexamples"
+            )
+            bad += len(explorer.found)
+            for found in explorer.found.values():
+                say(found)
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,182 @@
+"""The checker itself: for each of its properties a core with a bug that it must catch, with the story of it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from orchestrator import model
+from orchestrator.core import course as course_module
+from orchestrator.core import latches, machine, operator, safestop
+from orchestrator.core import step as step_module
+from orchestrator.core.facts import Facts
+from orchestrator.core.faults import FAULTS, Clear
+from orchestrator.core.machine import Trigger
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
+from orchestrator.model import Effect, Request, State
+from orchestrator.workbench.endings import reaches, settles
+from orchestrator.workbench.explore import Explorer
+from orchestrator.workbench.properties import ENDINGS, PROPERTIES
+from tests.proof.exploring import rules, small
+
+Patch = pytest.MonkeyPatch
+
+
+def without(*names: str) -> Callable[[Patch], None]:
+    """Rows of the fault table that somebody has deleted."""
+    return lambda patch: patch.setattr(latches, "FAULTS", tuple(row for row in FAULTS if row.id not in names))
+
+
+def only_trips_stop(patch: Patch) -> None:
+    energised = course_module._energised
+    patch.setattr(
+        course_module, "_energised", lambda f, faults: energised(f, tuple(x for x in faults if x.effect != Effect.STOP))
+    )
+
+
+def pause_goes_on(patch: Patch) -> None:
+    energised = course_module._energised
+    patch.setattr(
+        course_module, "_energised", lambda f, faults: energised(f, tuple(x for x in faults if x.effect > Effect.PAUSE))
+    )
+
+
+def latches_wear_off(patch: Patch) -> None:
+    clear_after_s = latches.clear_after_s
+    patch.setattr(
+        latches, "clear_after_s",
+        lambda row, fault: 60.0 if row.clear is Clear.RESET else clear_after_s(row, fault),
+    )  # fmt: skip
+
+
+def trip_is_no_latch(patch: Patch) -> None:
+    place = course_module._resting_place
+
+    def forgets(f: Facts, faults: Any) -> Any:
+        tripped = f.memory.state is State.TRIPPED and f.state_s > 60
+        return place(f, tuple(x for x in faults if x.effect is not Effect.TRIP) if tripped else faults)
+
+    patch.setattr(course_module, "_resting_place", forgets)
+
+
+def stop_is_not_heard(patch: Patch) -> None:
+    hear = operator.hear
+    patch.setattr(step_module, "hear", lambda m, asked, now_s: "" if asked is Request.STOP else hear(m, asked, now_s))
+
+
+def reset_starts(patch: Patch) -> None:
+    def reset(memory: Memory, now_s: float) -> str:
+        memory.hold = ""
+        return operator._start(memory, now_s)
+
+    hear = operator.hear
+    patch.setattr(
+        step_module, "hear",
+        lambda memory, asked, now_s: reset(memory, now_s) if asked is Request.RESET else hear(memory, asked, now_s),
+    )  # fmt: skip
+
+
+def nobody_qualifies(patch: Patch) -> None:
+    fire = machine.fire
+    leads = {(State.IDLE, Trigger.QUALIFY): State.CHARGING}
+    patch.setattr(step_module, "fire", lambda state, trigger: leads.get((state, trigger)) or fire(state, trigger))
+
+
+def any_standby_proves(patch: Patch) -> None:
+    patch.setattr(Facts, "stopped", property(lambda f: f.standby))
+
+
+def station_limit_is_forgotten(patch: Patch) -> None:
+    patch.setattr(Rules, "of", classmethod(lambda cls, bay, of=Rules.of: replace(of(bay), top_step=4)))
+
+
+def nothing_must_stop(patch: Patch) -> None:
+    patch.setattr(step_module, "must_stop", lambda f, state: False)
+
+
+def silent_alarm(patch: Patch) -> None:
+    decide = model.Decision
+    patch.setattr(step_module, "Decision", lambda **fields: decide(**fields | {"alarm": False}))
+
+
+def never_gives_up(patch: Patch) -> None:
+    patch.setattr(course_module, "gives_up", lambda f: False)
+
+
+def nothing_proves(patch: Patch) -> None:
+    patch.setattr(Facts, "stopped", property(lambda f: False))
+
+
+def absent_battery_is_waited_for(patch: Patch) -> None:
+    stopping = course_module._stopping
+    patch.setattr(
+        course_module, "_stopping",
+        lambda f, faults: (None, f.memory.reason) if f.departed and f.state_s < 60 else stopping(f, faults),
+    )  # fmt: skip
+
+
+def silence_is_patient(patch: Patch) -> None:
+    gives_up = safestop.gives_up
+    patch.setattr(course_module, "gives_up", lambda f: f.charger.online and gives_up(f))
+
+
+def strikes_are_forgotten(patch: Patch) -> None:
+    patch.setattr(latches, "STRIKES_S", 0.0)
+
+
+def unwritten_row(patch: Patch) -> None:
+    fire = machine.fire
+
+    def without_row(state: State, trigger: Trigger) -> State:
+        return fire(State.TRIPPED if (state, trigger) == (State.STOPPING, Trigger.FILL) else state, trigger)
+
+    patch.setattr(step_module, "fire", without_row)
+
+
+#: The property that must fail → the bug.
+BUGS: dict[str, Callable[[Patch], None]] = {
+    "fresh": without("stale_reading"),
+    "stop at once": only_trips_stop,
+    "no current": pause_goes_on,
+    "operator": stop_is_not_heard,
+    "hold": reset_starts,
+    "tripped": trip_is_no_latch,
+    "latched": latches_wear_off,
+    "qualified": nobody_qualifies,
+    "verified": any_standby_proves,
+    "limits": station_limit_is_forgotten,
+    "standing stop": nothing_must_stop,
+    "alarm": silent_alarm,
+    "in time": never_gives_up,
+    "precharge": without("precharge_too_long", "precharge_no_rise"),
+    "hours": without("time_limit"),
+    "to standby": nothing_proves,
+    "to standby, no battery": absent_battery_is_waited_for,
+    "named": never_gives_up,
+    "named, silent": silence_is_patient,
+    "no livelock": strikes_are_forgotten,
+    "no exception": unwritten_row,
+}
+
+
+@pytest.mark.parametrize("name", BUGS)
+def test_the_bug_is_caught(name: str, monkeypatch: Patch) -> None:
+    BUGS[name](monkeypatch)
+    of = rules(current_a=12.0)
+    explorer = Explorer(of, small(of), PROPERTIES)
+    if name in {rule.name for rule in PROPERTIES} | {"no exception"}:
+        explorer.run(until=name)
+    else:
+        explorer.run(most=120)
+        reaches(explorer, [ending for ending in ENDINGS if ending.name == name])
+        settles(explorer) if name == "no livelock" else None
+    assert name in explorer.found, f"not seen; seen: {list(explorer.found)}"
+    story = str(explorer.found[name])
+    assert "t = " in story, "a counterexample has a story"
+
+
+def test_every_property_has_its_bug() -> None:
+    named = {rule.name for rule in PROPERTIES} | {ending.name for ending in ENDINGS} | {"no livelock", "no exception"}
+    assert named == set(BUGS)

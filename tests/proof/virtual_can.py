@@ -1,0 +1,106 @@
+"""A CAN bus in memory, as a python-can driver below the unchanged `link/can.py`, in virtual time.
+
+The controller's side is `Driver`; the emulated nodes have the other one, `BusWire`. A frame takes its time on the wire,
+and frames follow each other. Every call of the driver goes past `Calls`, which can make any one of them fail.
+"""
+
+from collections import deque
+
+import can
+
+from orchestrator.sim.can_wire import Handler
+from tests.proof.virtual_threads import Waiting
+from tests.proof.virtual_time import Time
+from tests.proof.virtual_tty import Calls
+
+#: One frame of 8 bytes at 250 kbit/s, stuff bits and pause included.
+FRAME_S = 0.0005
+
+
+class BusWire:
+    """The wire and the emulated nodes on it; what `sim.can_wire.CanWire` is to them."""
+
+    def __init__(self, time: Time, calls: Calls) -> None:
+        self.calls = calls
+        self.down = False  #: the interface: every call fails with ENETDOWN, and what was open stays deaf
+        self.lost = False  #: nobody hears anybody
+        self.epoch = 0  #: how often the interface went down
+        self.drivers: list[Driver] = []
+        self._time = time
+        self._free_s = 0.0
+        self._subscribers: dict[int, dict[object, Handler]] = {}
+
+    def subscribe(self, cob_id: int, owner: object, handler: Handler) -> None:
+        self._subscribers.setdefault(cob_id, {})[owner] = handler
+
+    def unsubscribe(self, cob_id: int, owner: object) -> None:
+        self._subscribers.get(cob_id, {}).pop(owner, None)
+
+    def send(self, cob_id: int, data: bytes) -> None:
+        """A node says something."""
+        self._time.call_at(self._slot(), self._to_drivers, cob_id, bytes(data))
+
+    def from_driver(self, cob_id: int, data: bytes) -> None:
+        self._time.call_at(self._slot(), self._to_nodes, cob_id, bytes(data))
+
+    def _slot(self) -> float:
+        self._free_s = max(self._free_s, self._time.now_s) + FRAME_S
+        return self._free_s
+
+    def _to_drivers(self, cob_id: int, data: bytes) -> None:
+        if not (self.down or self.lost):
+            for driver in self.drivers:
+                driver.deliver(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+
+    def _to_nodes(self, cob_id: int, data: bytes) -> None:
+        if not (self.down or self.lost):
+            for handler in tuple(self._subscribers.get(cob_id, {}).values()):
+                handler(cob_id, data)
+
+    def go_down(self) -> None:
+        self.down = True
+        self.epoch += 1
+        for driver in self.drivers:
+            driver.news.wake()
+
+
+class Driver(can.BusABC):
+    """What python-can would open."""
+
+    def __init__(self, wire: BusWire, time: Time) -> None:
+        self.calls = wire.calls
+        self.calls("can open")
+        if wire.down:
+            raise OSError(100, "Network is down")
+        self._wire, self._time, self._epoch = wire, time, wire.epoch
+        self._heard: deque[can.Message] = deque()
+        self.news = Waiting(time)
+        super().__init__(channel="virtual time")
+        wire.drivers.append(self)
+
+    def deliver(self, message: can.Message) -> None:
+        if self._epoch == self._wire.epoch:
+            self._heard.append(message)
+            self.news.wake()
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        told = self.calls("can recv")
+        if told is not None:
+            return told  # type: ignore[no-any-return]  # a message
+        if not self._heard and not self._wire.down:
+            self.news.wait(timeout)
+        if self._wire.down:
+            raise can.CanOperationError("Error receiving: Network is down", 100)
+        return self._heard.popleft() if self._heard else None
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self.calls("can send")
+        if self._wire.down:
+            raise can.CanOperationError("Failed to transmit: Network is down", 100)
+        self._wire.from_driver(msg.arbitration_id, bytes(msg.data))
+
+    def shutdown(self) -> None:
+        if self in self._wire.drivers:
+            self._wire.drivers.remove(self)
+            super().shutdown()
+            self.calls("can shutdown")

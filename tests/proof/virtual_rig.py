@@ -1,0 +1,106 @@
+"""The emulated bays of `orchestrator.sim` in virtual time: same models, same bytes, no pty and no bus."""
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+from durand.scheduler import AsyncScheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
+
+from orchestrator.model import ControlMode
+from orchestrator.sim.bay import Bay
+from orchestrator.sim.bmu import Bmu
+from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger_wire import ChargerWire
+from orchestrator.sim.line import LINES
+from orchestrator.sim.pack import Pack, Readout
+from orchestrator.sim.rig import FRESH_S, AsBuilt, Rig
+from tests.proof.virtual_can import BusWire
+from tests.proof.virtual_time import Time
+from tests.proof.virtual_tty import Tty
+
+#: A BMU needs this long for an answer.
+ANSWER_S = 0.002
+
+
+@dataclass(frozen=True, slots=True)
+class Nature:
+    """What a bay is made of."""
+
+    pack: Pack
+    control: ControlMode = ControlMode.MANUAL
+    line: str = "real"
+    seed: int = 1
+    speed: float = 1.0  #: model seconds in one second
+
+
+class MemoryWire(ChargerWire):
+    """The emulated charger's end of a virtual tty."""
+
+    def __init__(self, time: Time, charger: Charger, tty: Tty, line: Any, now: Any) -> None:
+        super().__init__(cast("Any", time), charger, line=line, now=now)
+        self._time, self._tty = time, tty
+        self._plugged = False
+        tty.listener = self._receive
+        self.heard_s = time.now_s  #: when the controller was last given a status reply
+
+    def open(self) -> None:
+        self._plugged = self._tty.present = True
+
+    def close(self) -> None:
+        self._plugged = False
+        self._tty.unplug()
+        self._ear.forget()
+
+    @property
+    def is_open(self) -> bool:
+        return self._plugged
+
+    def _receive(self, chunk: bytes) -> None:
+        now_s = self._time.now_s
+        if self.counters.first_byte_s is None:
+            self.counters.first_byte_s = now_s
+        if self.on_bytes is not None:
+            self.on_bytes(now_s, chunk)
+        if self._line.echo:
+            self._write(chunk)
+        if self.mute_rx:
+            return
+        if self._line.byte_s:
+            self._time.call_later(len(chunk) * self._line.byte_s, self._hear, now_s, chunk)
+        else:
+            self._hear(now_s, chunk)
+
+    def _write(self, data: bytes) -> None:
+        if self._plugged:
+            self._tty.deliver(data)
+
+
+class VirtualRig(Rig):
+    """What `sim.faults` acts upon."""
+
+    def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:
+        charger = Charger(nature.control)
+        self.bay = Bay(charger, nature.pack)
+        self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c)
+        self.injected_s: float | None = None
+        self.tty = tty
+        self._loop = cast("Any", time)
+        self._speed = nature.speed
+        self._advanced_s = time.now_s
+        line = LINES[nature.line]
+        line = type(line)(**{name: getattr(line, name) for name in line.__slots__} | {"seed": nature.seed})
+        self.wire = MemoryWire(time, charger, tty, line, self.catch_up)
+        set_scheduler(AsyncScheduler(time))
+        self.bmu = Bmu(cast("Any", time), cast("Any", bus), node_id, self._readout)
+        self.bmu.port.faults.delay_s = ANSWER_S
+        self.wire.open()
+        self.catch_up(force=True)
+
+    def catch_up(self, *, force: bool = False) -> None:
+        now_s = self._loop.time()
+        if force or now_s - self._advanced_s >= FRESH_S:
+            self.bay.advance(max(now_s - self._advanced_s, 0.001) * self._speed)
+            self._advanced_s = now_s
+
+    def _readout(self) -> Readout:
+        self.catch_up()
+        return self.bay.readout()

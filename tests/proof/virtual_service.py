@@ -1,0 +1,259 @@
+"""The whole controller in virtual time: the unchanged supervisor, ports, buses, pyserial and core on emulated bays.
+
+Replaced are the kernel below (ttys, the CAN driver, clock, threads) and what is beside the chargers: the journal's
+disk, the control socket and the guardian. `Service.run` ends as the process would: by a signal, every bay stopped.
+"""
+
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+
+import serial.serialposix
+import serial.serialutil
+
+from orchestrator.config.load import load_map, load_policy
+from orchestrator.config.policy import Policy
+from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Control, JournalConfig, Limits, Station
+from orchestrator.core.memory import Memory
+from orchestrator.devices import bus as bus_module
+from orchestrator.devices import charger as charger_module
+from orchestrator.keys import Range
+from orchestrator.link import can as can_module
+from orchestrator.link import serial as serial_module
+from orchestrator.model import ControlMode, Decision, Request
+from orchestrator.service import bay as bay_module
+from orchestrator.service import supervisor as supervisor_module
+from orchestrator.service.bay import Asked, BayRunner
+from orchestrator.service.kept import Kept
+from orchestrator.service.supervisor import Supervisor
+from tests.proof.virtual_can import BusWire, Driver
+from tests.proof.virtual_rig import Nature, VirtualRig
+from tests.proof.virtual_threads import Event, SimpleQueue, Thread
+from tests.proof.virtual_time import Time
+from tests.proof.virtual_tty import Kernel
+
+STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
+FIRST_NODE = 0x10
+LIMITS = Limits(voltage_v=58.4, current_a=15.0, temperature_c=Range(0, 45))
+
+
+class Guardian:
+    """Answers every heartbeat and says nothing."""
+
+    beats = 0
+
+    def beat(self, _now_s: float) -> str:
+        self.beats += 1
+        return ""
+
+    def hold(self, _port: str, _fd: int) -> None:
+        """As the real one."""
+
+    def drop(self, _port: str) -> None:
+        """As the real one."""
+
+    def done(self) -> None:
+        """As the real one."""
+
+
+class Notebook:
+    """A journal that is read at once."""
+
+    problem = ""
+
+    def __init__(self, *_: object) -> None:
+        self.said: list[str] = []
+        self.lines: list[tuple[str, Any]] = []
+        self.kept: dict[str, Kept] = {}
+
+    def start(self) -> None:
+        """No disk, no thread."""
+
+    close = start
+
+    def stalled(self, _now_s: float) -> bool:
+        return False
+
+    def say(self, text: str) -> None:
+        self.said.append(text)
+
+    def put(self, bay: str, line: Any) -> None:
+        if line[0] == "fault":
+            self.lines.append((bay, line[1]))
+
+    def keep(self, bay: str, kept: Kept) -> None:
+        self.kept[bay] = kept
+
+
+class Silence:
+    """A control socket that nobody uses, a recorder that records nothing."""
+
+    def __init__(self, *_: object) -> None:
+        """Whatever it is given."""
+
+    def start(self) -> None:
+        """Nobody comes."""
+
+    close = start
+
+    def stalled(self, _now_s: float) -> bool:
+        return False
+
+    def line(self, *_: object) -> None:
+        """Nothing."""
+
+
+def station(bays: int, control: ControlMode, policy: Policy | None = None, **battery: Any) -> Station:
+    """Bays of the design's example, on one bus."""
+    policy = policy or load_policy("li-ion-48v")
+    settings = {"can": "can0", "map": load_map("tabos"), **battery}
+    return Station(
+        station="virtual",
+        can={"can0": {"interface": "virtual", "bitrate": 250_000}},
+        bays=tuple(
+            Bay(
+                name=f"bay-{number + 1}",
+                charger=ChargerConfig(port=f"/virtual/{number + 1}", control=control, steps_a=STEPS_A),
+                battery=BatteryConfig(node_id=FIRST_NODE + number, **settings),
+                limits=LIMITS,
+                policy=policy,
+            )
+            for number in range(bays)
+        ),
+        control=Control(socket=Path("/virtual/socket")),
+        journal=JournalConfig(directory=Path("/virtual/journal")),
+    )
+
+
+class World:
+    """A station, its emulated bays, and the service on it. Make it by `world()`."""
+
+    def __init__(self, time: Time, the_station: Station, natures: Sequence[Nature], kept: Mapping[str, Memory]) -> None:
+        self.time = time
+        self.kernel = Kernel(time)
+        self.bus = BusWire(time, self.kernel.calls)
+        self.rigs = [
+            VirtualRig(time, self.bus, self.kernel.add(bay.charger.port), bay.battery.node_id, nature)
+            for bay, nature in zip(the_station.bays, natures, strict=True)
+        ]
+        self._station = the_station
+        self._kept = kept
+        self._patches = ExitStack()
+        self._patch()
+        self.supervisor = Supervisor(the_station, Guardian())  # type: ignore[arg-type]  # as the real one
+        self.on_step: Callable[[BayRunner], None] = lambda _: None
+        self._watch_steps()
+
+    @property
+    def bays(self) -> list[BayRunner]:
+        return self.supervisor._bays
+
+    @property
+    def journal(self) -> Notebook:
+        return self.supervisor._journal  # type: ignore[return-value]  # it was put there by `_patch`
+
+    def decision(self, bay: int = 0) -> Decision:
+        decision = self.bays[bay].decision
+        assert decision is not None
+        return decision
+
+    def ask(self, request: Request, bay: int = 0) -> Asked:
+        """As the control socket would."""
+        asked = Asked(request)
+        self.bays[bay].ask(asked)
+        self.supervisor._wake.put(bay)
+        return asked
+
+    def end(self) -> None:
+        self.supervisor._on_signal(signal.SIGTERM, None)
+
+    def run(self) -> int:
+        """Until somebody ends it; the exit status. What breaks the world is raised."""
+        try:
+            return self.supervisor.run()
+        except BaseException:
+            if self.time.failure is not None:
+                raise self.time.failure from None
+            raise
+
+    def close(self) -> None:
+        try:
+            self.time.close()
+        finally:
+            self._patches.close()
+
+    def _watch_steps(self) -> None:
+        for bay in self.bays:
+            take = bay._step
+
+            def watched(now_s: float, request: Request | None, bay: BayRunner = bay, take: Any = take) -> None:
+                take(now_s, request)
+                self.on_step(bay)
+
+            bay._step = watched  # type: ignore[method-assign]  # whoever watches sees every step
+
+    def _patch(self) -> None:
+        time = self.time
+        event, thread = partial(Event, time), partial(Thread, time)
+        fake = self.kernel.modules()
+        change = self._patches.enter_context
+        replaced: dict[Any, dict[str, Any]] = {
+            supervisor_module: {
+                "monotonic": time.clock, "SimpleQueue": _Queues(time), "Journal": Notebook, "ControlSocket": Silence,
+                "signal": SimpleNamespace(signal=lambda *_: None, SIGTERM=15, SIGINT=2, Signals=signal.Signals),
+                "read_kept": lambda _, names: {name: _Kept(self._kept.get(name, Memory())) for name in names},
+            },
+            bay_module: {"Event": event, "SnapshotRecorder": Silence},
+            charger_module: {"Event": event, "Thread": thread},
+            bus_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
+            serial_module: {"time": SimpleNamespace(sleep=self._sleep), "select": fake["select"]},
+            can_module: {"_open_bus": lambda _: Driver(self.bus, time)},
+            serial.serialposix: fake,
+            serial.serialutil.Timeout: {"TIME": time.clock},
+        }  # fmt: skip
+        for module, names in replaced.items():
+            for name, value in names.items():
+                change(patch.object(module, name, value))
+
+    def _sleep(self, seconds: float) -> None:
+        self.time.wait(self.time.now_s + seconds)
+
+
+class _Queues:
+    """`SimpleQueue`, `SimpleQueue[int]` and `SimpleQueue()`."""
+
+    def __init__(self, time: Time) -> None:
+        self._time = time
+
+    def __getitem__(self, _: object) -> "_Queues":
+        return self
+
+    def __call__(self) -> SimpleQueue[Any]:
+        return SimpleQueue(self._time)
+
+
+class _Kept:
+    """What the last run left, as a memory made by hand."""
+
+    def __init__(self, memory: Memory) -> None:
+        self._memory = memory
+
+    def memory(self, _now_s: float) -> Memory:
+        return self._memory
+
+
+@contextmanager
+def world(
+    the_station: Station, natures: Sequence[Nature], *, end_s: float = 600.0, kept: Mapping[str, Memory] | None = None
+) -> Iterator[World]:
+    """A world that is taken down whole, however it ends; `end_s` is its last moment if nobody ends it before."""
+    made = World(Time(end_s), the_station, natures, kept or {})
+    try:
+        yield made
+    finally:
+        made.close()

@@ -1,0 +1,157 @@
+"""Time that jumps, for the unchanged service: its threads run one at a time, and the clock moves when all of them wait.
+
+A virtual thread is a real one that holds a baton. Whoever waits looks for what comes next in one queue of moments:
+callbacks are run on the spot, a thread is handed the baton. Thus everything happens in one order, the same in every
+run, and an hour passes as quickly as it can be computed.
+"""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+from itertools import count
+from math import inf
+
+#: A clock never shows the same time twice; that is also the time that one look at it costs.
+TICK_S = 1e-6
+#: More moments than this within a millisecond: somebody turns without ever waiting.
+BUSY = 20_000
+
+
+class StuckError(BaseException):
+    """The world has been ended from outside, or can only be; no boundary of the product may swallow it."""
+
+
+@dataclass(slots=True)
+class Handle:
+    """A callback that is still to come."""
+
+    callback: Callable[..., object] | None
+    args: tuple[object, ...]
+
+    def cancel(self) -> None:
+        self.callback = None
+
+
+@dataclass(slots=True)
+class Runner:
+    """One virtual thread; `turn` counts its wake-ups, so that a later one for the same wait is void."""
+
+    baton: threading.Lock = field(default_factory=threading.Lock)
+    turn: int = 0
+    ended: bool = False
+
+
+class Time:
+    """The clock, the queue of moments and the baton. `call_later`, `call_soon` and `time` are as in an asyncio loop."""
+
+    def __init__(self, end_s: float = inf) -> None:
+        self.now_s = 1000.0
+        self.end_s = self.now_s + end_s
+        self.failure: BaseException | None = None  #: what ended the world, if anything did
+        self._moments: list[tuple[float, int, Handle | Runner, int]] = []
+        self._order = count()
+        self._main = self._running = Runner()
+        self._main.baton.acquire()
+        self._runners: list[Runner] = [self._main]
+        self._busy_from = (self.now_s, 0)
+
+    # --- for those that live in it ------------------------------------------------------------------------------------
+
+    def time(self) -> float:
+        return self.now_s
+
+    def clock(self) -> float:
+        """The product's clock."""
+        self.now_s += TICK_S
+        return self.now_s
+
+    def call_at(self, at_s: float, callback: Callable[..., object], *args: object) -> Handle:
+        handle = Handle(callback, args)
+        heappush(self._moments, (at_s, next(self._order), handle, 0))
+        return handle
+
+    def call_later(self, delay_s: float, callback: Callable[..., object], *args: object) -> Handle:
+        return self.call_at(self.now_s + delay_s, callback, *args)
+
+    def call_soon(self, callback: Callable[..., object], *args: object) -> Handle:
+        return self.call_at(self.now_s, callback, *args)
+
+    def me(self) -> Runner:
+        """Whoever holds the baton."""
+        return self._running
+
+    def wake(self, runner: Runner, at_s: float | None = None) -> None:
+        """End the runner's present wait, now or then."""
+        heappush(self._moments, (self.now_s if at_s is None else at_s, next(self._order), runner, runner.turn))
+
+    def wait(self, until_s: float) -> None:
+        """Let others run until then (`inf`: until somebody wakes me), or until I am woken."""
+        me = self._running
+        if until_s < inf:
+            self.wake(me, max(until_s, self.now_s))
+        following = self._next()
+        if following is not me:
+            following.baton.release()
+            me.baton.acquire()
+        self._running = me
+        if self.failure is not None:
+            raise StuckError from self.failure
+
+    def start(self, target: Callable[[], object], name: str) -> Runner:
+        runner = Runner()
+        runner.baton.acquire()
+        self._runners.append(runner)
+        threading.Thread(target=self._live, args=(runner, target), name=name, daemon=True).start()
+        self.wake(runner)
+        return runner
+
+    def close(self) -> None:
+        """Let every thread that is left run into its end. By the main runner, at the end of a world."""
+        self.failure = self.failure or StuckError("closed")
+        while left := [runner for runner in self._runners[1:] if not runner.ended]:
+            left[0].baton.release()
+            self._main.baton.acquire()
+        self._moments.clear()
+
+    # --- the baton ----------------------------------------------------------------------------------------------------
+
+    def _live(self, runner: Runner, target: Callable[[], object]) -> None:
+        runner.baton.acquire()
+        self._running = runner
+        try:
+            if self.failure is None:
+                target()
+        except BaseException as error:  # noqa: BLE001 - it is shown where the world was started
+            self.failure = self.failure or error
+        runner.ended = True
+        following = self._main if self.failure is not None else self._next()
+        following.baton.release()
+
+    def _next(self) -> Runner:
+        """Let moments happen until one is a thread's; the main one's where nothing may happen any more."""
+        try:
+            while self.failure is None:
+                at_s, _, what, turn = heappop(self._moments)
+                self._pass(at_s)
+                if isinstance(what, Handle):
+                    if what.callback is not None:
+                        what.callback(*what.args)
+                elif what.turn == turn and not what.ended:
+                    what.turn += 1
+                    return what
+        except BaseException as error:  # noqa: BLE001 - a callback belongs to nobody: the world ends
+            self.failure = self.failure or error
+        return self._main
+
+    def _pass(self, at_s: float) -> None:
+        self.now_s = max(self.now_s, at_s)
+        if self.now_s > self.end_s:
+            raise StuckError(f"the world has not ended by {self.end_s:g} s")
+        since_s, moments = self._busy_from
+        if self.now_s - since_s > 0.001:
+            self._busy_from = (self.now_s, 0)
+        elif moments > BUSY:
+            raise StuckError(f"{BUSY} moments without any time passing, at {self.now_s:.3f} s")
+        else:
+            self._busy_from = (since_s, moments + 1)
