@@ -5,8 +5,10 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.config.policy import Band, Policy
+from orchestrator.core.facts import Facts
+from orchestrator.core.limits import choose
 from orchestrator.keys import Range, Source
-from orchestrator.model import BatteryStatus, Request, State
+from orchestrator.model import BatteryStatus, Request, Snapshot, State
 from tests.core.bays import POLICY, charging
 from tests.core.world import STEPS_A, TICK_S, World, bay
 
@@ -163,6 +165,14 @@ def test_a_new_charge_needs_no_hold() -> None:
     world.ask(Request.START)
     world.charging()
     assert index(world) == 4
+
+
+def test_what_is_not_known_is_the_lowest_step() -> None:
+    """The fault table ends such a charge in the same step; the limit does not rely on that."""
+    world = charging()
+    step, raise_s = choose(Facts(world.now_s, Snapshot(), world.memory, world.rules), None)
+    at = POLICY.source.at("current.temperature_c")
+    assert (step.index, step.rule, raise_s) == (0, f"temperature unknown, {at}", None)
 
 
 # --- faults that limit ------------------------------------------------------------------------------------------------

@@ -228,7 +228,7 @@ class World:
         self.charger_link = replace(link, misses=misses)
         if misses < MISSES_UNTIL_SILENT:
             return self.charger_link
-        return replace(self.charger_link, online=False, problem="/dev/ttyX: no answer")
+        return replace(self.charger_link, online=False, problem=self.charger_link.problem or "/dev/ttyX: no answer")
 
     def _reading(self) -> ChargerReading:
         charger = self.charger
