@@ -69,8 +69,8 @@ def _charging_reason(f: Facts, faults: Faults) -> str:
 
 def _precharging(f: Facts) -> Course:
     memory, rule, source = f.memory, f.rules.policy.precharge, f.rules.policy.source
-    if rule is None or f.pack_v is None:
-        return None, memory.reason
+    if rule is None or f.pack_v is None:  # unknown means no, whoever lets it come to this
+        return Trigger.STOP, "precharge without a rule for it, or without the pack's voltage"
     pulse = memory.state is State.PRECHARGE_PULSE
     target_v = rule.pulse.until_v if pulse else rule.below_v
     if f.pack_v < target_v:

@@ -80,9 +80,7 @@ def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
     memory, before = f.memory, f.memory.state
     trigger, reason = course(f, faults)
     memory.reason = reason
-    if trigger is None:
-        return None
-    memory.state = fire(before, trigger)
+    memory.state = fire(before, trigger) if trigger is not None else before
     if memory.state is before:
         return None
     follow_state(f, before)
