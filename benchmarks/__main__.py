@@ -6,13 +6,14 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from benchmarks import decoding, footprint, latency, reaction, startup, stepping
+from benchmarks import decoding, footprint, laststop, latency, reaction, startup, stepping
 from benchmarks.effort import Effort
 from benchmarks.report import Result, machine, table, write_json
 
 PARTS: Mapping[str, Callable[[Effort], Iterator[Result]]] = {
     "reaction": reaction.measure,
     "latency": latency.measure,
+    "laststop": laststop.measure,
     "start": startup.measure,
     "footprint": footprint.measure,
     "step": stepping.measure,

@@ -34,8 +34,6 @@ SILENCE_S = 0.5
 STARTUP_S = 20.0
 #: A controller that has verified its chargers closes everything and is gone within this.
 END_S = 10.0
-#: The longest frame of ours is 11 bytes: 5.7 ms at 19200 baud. What the dying controller was sending is out by then.
-FRAME_GAP_S = 0.006
 #: How long the chargers' standby is waited for. Whoever starts the service anew goes on with it.
 VERIFY_S = 5.0
 #: A process that was killed is gone within this, if anything can make it go.
@@ -75,7 +73,8 @@ class Guardian:
         if self._done or not self._ports:
             return self._status(END_S)
         self._signal(signal.SIGKILL)
-        time.sleep(FRAME_GAP_S)
+        # Without waiting for a gap: what the dying controller has written goes out first, the kernel keeps the order.
+        # Was that half a frame, or was it just then in a write, the second stop comes 20 ms later.
         for name, why in stop_all(self._ports, VERIFY_S, on_stop=self._stopping).items():
             say(f"guardian: {name}: {why or 'standby verified'}")
         return self._status(KILLED_S) or ACTED
