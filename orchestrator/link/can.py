@@ -180,6 +180,12 @@ class CanBus:
 # --- the libraries; imported here because that takes 0.2 s, which the chargers' first poll must not wait for ----------
 
 
+def load() -> None:
+    """Import the libraries now: a quarter of a second on a fast machine, which nothing that is watched should take."""
+    import can  # noqa: F401, PLC0415 - only here and below, so that other verbs do not wait for it
+    import canopen  # noqa: F401, PLC0415 - as above
+
+
 def _open_bus(settings: Mapping[str, Any]) -> "can.BusABC":
     import can  # noqa: PLC0415 - see above
 

@@ -18,7 +18,7 @@ from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
-from orchestrator.link.can import CanBus
+from orchestrator.link.can import CanBus, load
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
 from orchestrator.service.bay import Asked, BayRunner
@@ -87,8 +87,11 @@ class Supervisor:
             signal.signal(number, self._on_signal)
         self._journal.start()
         self._control.start()
-        for worker in self._devices:
-            worker.start()
+        for port in self._ports:
+            port.start()
+        load()  # the ports are stopping their chargers meanwhile; the first heartbeat comes when it is done
+        for bus in self._buses:
+            bus.start()
         self._journal.say(
             f"{self._station.station}: {len(self._bays)} bays, control socket {self._station.control.socket}"
         )
