@@ -302,18 +302,41 @@ def test_the_last_words_of_a_controller_that_died_are_heard(tmp_path: Path) -> N
         assert not bench.runs
 
 
+def sleep_through(guardian: Watched, seconds: float) -> None:
+    """The guardian is not let run for so long."""
+    guardian.freeze()
+    slept_s = time.monotonic()
+    wait_until(lambda: time.monotonic() > slept_s + seconds)
+
+
 def test_a_guardian_that_slept_looks_at_its_messages_before_it_judges(tmp_path: Path) -> None:
     with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
         guardian.hand_over(bench.name, bench.fd)
         guardian.beat()
-        guardian.freeze()
-        slept_s = time.monotonic()
-        wait_until(lambda: time.monotonic() > slept_s + 0.7)
+        sleep_through(guardian, 0.7)
         guardian.send(BEAT)
         guardian.thaw()
         assert guardian.link.recv(16) == ALIVE
         guardian.beat()
         assert bench.stops == 0
+
+
+def test_a_machine_that_stood_still_is_no_hang_once(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        for _ in range(2):  # each heartbeat gives the next excuse
+            guardian.beat()
+            sleep_through(guardian, 0.7)
+            guardian.thaw()
+        assert bench.stops == 0
+        guardian.beat()
+        sleep_through(guardian, 0.7)
+        guardian.thaw()
+        wait_until(lambda: state_of(guardian.process.pid) == "S")
+        sleep_through(guardian, 0.7)
+        guardian.thaw()
+        assert guardian.ended() == ACTED
+        assert not bench.runs
 
 
 # --- signals, and who may listen -------------------------------------------------------------------------------------
