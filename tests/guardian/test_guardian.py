@@ -78,12 +78,18 @@ class Watched:
 
     @property
     def controller(self) -> int:
-        children = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
-        wait_until(children.read_text, END_S, "the controller")
-        return int(children.read_text())
+        wait_until(lambda: children_of(self.process.pid), END_S, "the controller")
+        return children_of(self.process.pid)[0]
 
     def waits_for(self, text: str) -> None:
         wait_until(lambda: text in self.log, what=text)
+
+
+def children_of(pid: int) -> list[int]:
+    """Those that live, or are not buried yet."""
+    with suppress(FileNotFoundError, ProcessLookupError):
+        return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return []
 
 
 def state_of(pid: int) -> str:
@@ -119,8 +125,11 @@ def watched(
         try:
             yield Watched(process, ours, log)
         finally:
+            left = children_of(process.pid)
             process.kill()
             process.wait()
+            for child in left:  # it knows of no guardian, and would wait for ever
+                os.kill(child, signal.SIGKILL)
 
 
 # --- when it acts, and when not --------------------------------------------------------------------------------------
