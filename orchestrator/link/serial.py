@@ -89,11 +89,11 @@ class SerialLine:
     def write(self, data: bytes) -> None:
         """Hand `data` to the port; it is on the wire `BYTE_S` a byte later. LinkError if the line takes nothing."""
         try:
-            # Asked first: on a full line pyserial's write burns the processor until its timeout.
-            if not self._writable.poll(WRITE_TIMEOUT_S * 1000):
+            # Not by pyserial's write: on a full line it burns the processor until its time-out, and costs twice as much.
+            room = self._writable.poll(WRITE_TIMEOUT_S * 1000)
+            if not room or os.write(self._port.fileno(), data) < len(data):
                 raise serial.SerialTimeoutException
-            self._port.write(data)
-        except serial.SerialTimeoutException as error:
+        except (serial.SerialTimeoutException, BlockingIOError) as error:
             self._forget_output()
             raise LinkError(f"{self._port.port}: {_STALLED}") from error
         except _FAILURES as error:
@@ -109,11 +109,14 @@ class SerialLine:
         if pause_s > 0:
             time.sleep(pause_s)
         try:
-            if self._readable.poll(max(0.0, timeout_s - pause_s) * 1000):
-                return self._port.read(_READ_SIZE)
+            if not self._readable.poll(max(0.0, timeout_s - pause_s) * 1000):
+                return b""
+            data = os.read(self._port.fileno(), _READ_SIZE)
+            if not data:
+                raise serial.SerialException("the end of the line was read: it is gone, or has a second reader")
         except _FAILURES as error:
             raise self._failed(error) from error
-        return b""
+        return data
 
     def fileno(self) -> int:
         """The open file, for whom it is to be shared with. LinkError once closed."""

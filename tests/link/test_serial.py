@@ -230,7 +230,7 @@ def test_whatever_pyserial_raises_is_translated(
     def fails(*_: object) -> None:
         raise raised
 
-    monkeypatch.setattr(serial.Serial, "write", fails)  # these come of races that no test can win reliably
+    monkeypatch.setattr(serial.Serial, "fileno", fails)  # these come of races that no test can win reliably
     with pytest.raises(LinkError, match="unplugged"):
         line.write(b"x")
 
