@@ -71,7 +71,7 @@ def test_the_runtime_needs_five_libraries(installed: Path) -> None:
 
 def test_the_command_is_there(installed: Path) -> None:
     (path,) = installed.glob("*.dist-info/entry_points.txt")
-    assert "orchestrator = orchestrator.cli:main" in path.read_text().splitlines()
+    assert "orchestrator = orchestrator.__main__:main" in path.read_text().splitlines()
 
 
 def test_the_installed_package_finds_what_ships(installed: Path, tmp_path: Path) -> None:

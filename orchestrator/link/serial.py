@@ -89,7 +89,7 @@ class SerialLine:
     def write(self, data: bytes) -> None:
         """Hand `data` to the port; it is on the wire `BYTE_S` a byte later. LinkError if the line takes nothing."""
         try:
-            # Not by pyserial's write: on a full line it burns the processor until its time-out, and costs twice as much.
+            # Not by pyserial: on a full line its write burns the processor until the time-out, and always costs twice.
             room = self._writable.poll(WRITE_TIMEOUT_S * 1000)
             if not room or os.write(self._port.fileno(), data) < len(data):
                 raise serial.SerialTimeoutException
