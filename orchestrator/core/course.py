@@ -143,9 +143,10 @@ def _rest(f: Facts, faults: Faults) -> Course:
 def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
     memory = f.memory
     worst = faults[0] if faults else None
-    if worst is not None and worst.effect is Effect.TRIP:
+    lost = not f.charger.online or f.reading is None
+    if worst is not None and worst.effect is Effect.TRIP and (memory.state is State.TRIPPED or not lost):
         return Trigger.TRIP, worst.text
-    if not f.charger.online or f.reading is None:
+    if lost:  # a trip promises a stop that was verified: first the line
         return Trigger.LOSE, _offline_reason(f)
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
     if waits is not None:

@@ -116,7 +116,7 @@ def release(
         row = ROW[name]
         if fault.raised_s is None or clear_after_s(row, fault) is not None:
             left[name] = fault  # it is not a fault, or clears by itself
-        elif not by_reset and (fault.latched or row.clear is Clear.RESET):
+        elif not by_reset and fault.latched:
             left[name] = fault
             reasons.append(f"{name} is latched and needs a reset: {fault.text}")
         elif fault.clean_s is None:

@@ -53,7 +53,7 @@ TABLE: tuple[tuple[Trigger, tuple[State, ...], State | None], ...] = (
     (T.REST, (*RESTING, *UNVERIFIED), S.IDLE),
     (T.SUSPEND, (*RESTING, *UNVERIFIED), S.SUSPENDED),
     (T.FILL, (*RESTING, *UNVERIFIED), S.FULL),
-    (T.TRIP, (*RESTING, *UNVERIFIED), S.TRIPPED),
+    (T.TRIP, (S.OFFLINE, *UNVERIFIED), S.TRIPPED),  # only after a stop that was verified just now
     (T.RESET, (S.TRIPPED,), S.IDLE),
     (T.QUALIFY, (S.IDLE, S.FULL, S.SUSPENDED), S.QUALIFYING),
     (T.PULSE, (S.QUALIFYING,), S.PRECHARGE_PULSE),

@@ -16,13 +16,13 @@ MATRIX = """
                       stop       give_up         lose     rest  suspend    fill  trip     reset  qualify     pulse            continue              charge
 STARTING              =          UNCONTROLLABLE  OFFLINE  IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
 OFFLINE               STOPPING   ·               =        IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
-IDLE                  STOPPING   ·               OFFLINE  =     SUSPENDED  FULL  TRIPPED  ·      QUALIFYING  ·                ·                     ·
-QUALIFYING            STOPPING   ·               OFFLINE  IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           PRECHARGE_PULSE  ·                     CHARGING
+IDLE                  STOPPING   ·               OFFLINE  =     SUSPENDED  FULL  ·        ·      QUALIFYING  ·                ·                     ·
+QUALIFYING            STOPPING   ·               OFFLINE  IDLE  SUSPENDED  FULL  ·        ·      ·           PRECHARGE_PULSE  ·                     CHARGING
 PRECHARGE_PULSE       STOPPING   ·               ·        ·     ·          ·     ·        ·      ·           ·                PRECHARGE_CONTINUOUS  ·
 PRECHARGE_CONTINUOUS  STOPPING   ·               ·        ·     ·          ·     ·        ·      ·           ·                ·                     CHARGING
 CHARGING              STOPPING   ·               ·        ·     ·          ·     ·        ·      ·           ·                ·                     ·
-FULL                  STOPPING   ·               OFFLINE  IDLE  SUSPENDED  =     TRIPPED  ·      QUALIFYING  ·                ·                     ·
-SUSPENDED             STOPPING   ·               OFFLINE  IDLE  =          FULL  TRIPPED  ·      QUALIFYING  ·                ·                     ·
+FULL                  STOPPING   ·               OFFLINE  IDLE  SUSPENDED  =     ·        ·      QUALIFYING  ·                ·                     ·
+SUSPENDED             STOPPING   ·               OFFLINE  IDLE  =          FULL  ·        ·      QUALIFYING  ·                ·                     ·
 STOPPING              =          UNCONTROLLABLE  OFFLINE  IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
 TRIPPED               STOPPING   ·               ·        ·     ·          ·     ·        IDLE   ·           ·                ·                     ·
 UNCONTROLLABLE        =          ·               OFFLINE  IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
@@ -87,6 +87,11 @@ def test_current_ends_only_by_a_stop() -> None:
     for state in ENERGISED:
         out = {trigger: target for trigger, target in leads(state).items() if target not in ENERGISED}
         assert out == {Trigger.STOP: State.STOPPING}
+
+
+def test_a_trip_is_entered_only_from_where_a_stop_was_just_verified() -> None:
+    into = {state for state in State if State.TRIPPED in leads(state).values()}
+    assert into == {State.STARTING, State.STOPPING, State.UNCONTROLLABLE, State.OFFLINE}
 
 
 def test_a_trip_is_left_only_by_a_reset_or_a_stop() -> None:

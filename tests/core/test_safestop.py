@@ -189,6 +189,17 @@ def test_nothing_begins_before_the_line_is_back_and_a_stop_is_verified_on_it() -
     world.until(State.TRIPPED, 1.0)
 
 
+@pytest.mark.parametrize("begin", [idle, full, suspended], ids=lambda begin: begin.__name__)
+def test_a_latch_without_a_line_is_stopped_blindly_first(begin: Callable[[], World]) -> None:
+    world = begin()
+    world.charger_link = replace(world.charger_link, online=False, problem="/dev/ttyX: no such port")
+    world.internal = "KeyError()"
+    assert world.tick().command == STOP
+    assert world.is_in(State.OFFLINE)
+    world.charger_link = replace(world.charger_link, online=True, problem="")
+    world.until(State.TRIPPED, 1.0)
+
+
 # --- the start --------------------------------------------------------------------------------------------------------
 
 
