@@ -120,7 +120,8 @@ class BatteryNode:
         link = self._view.link
         if link.online:
             if now_s - self._answer_s >= ANSWER_LIMIT_S:
-                self._view.set(online=False, problem=self._why_silent())
+                # The next one to answer may be another battery: what this one complained of is not its fault.
+                self._view.set(online=False, problem=self._why_silent(), emergency="")
             elif link.heartbeat_s is not None and link.heartbeat_t_s is not None:
                 self._setup.watch(now_s, link.heartbeat_t_s)
         elif expired:

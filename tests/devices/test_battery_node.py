@@ -431,6 +431,14 @@ def test_an_emergency_is_shown_in_words_until_it_is_reset(data: str, words: str)
     assert bench.link.emergency == ""
 
 
+def test_an_emergency_is_forgotten_when_the_node_has_left() -> None:
+    """Another battery may come that never resets it, and whose boot-up frame nobody heard."""
+    bench = online()
+    bench.hear(EMERGENCY, "10 42 08 01 02 03 04 05")
+    bench.run(1.6)
+    assert (bench.link.online, bench.link.emergency) == (False, "")
+
+
 def test_the_bus_that_breaks_takes_the_node_offline_with_its_reason() -> None:
     bench = online()
     before = bench.reading
