@@ -1,4 +1,4 @@
-"""For every test: signals that whoever started the tests has ignored (`nohup`, a job in the background) are heard again.
+"""Signals that whoever started the tests has ignored (`nohup`, a job in the background) are heard again.
 
 What is ignored stays ignored in all child processes, and ending a service by a signal is what some tests are about.
 """

@@ -441,7 +441,10 @@ def test_a_watchdog_is_fed_while_the_controller_beats(tmp_path: Path) -> None:
     with systemd(tmp_path) as manager, watched(tmp_path, "WATCHDOG_S=0", notify=str(tmp_path / "notify")) as guardian:
         for _ in range(3):
             guardian.beat()
-        assert heard(manager) == ["READY=1", *["WATCHDOG=1"] * 3]
+        ready, *fed = heard(manager)
+        assert ready == "READY=1"
+        assert set(fed) == {"WATCHDOG=1"}
+        assert len(fed) >= 3  # it may be fed once more while it waits
 
 
 def test_a_watchdog_is_fed_for_as_long_as_chargers_are_being_stopped(tmp_path: Path) -> None:
