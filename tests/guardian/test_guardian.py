@@ -444,7 +444,7 @@ def test_a_watchdog_is_fed_while_the_controller_beats(tmp_path: Path) -> None:
         ready, *fed = heard(manager)
         assert ready == "READY=1"
         assert set(fed) == {"WATCHDOG=1"}
-        assert len(fed) >= 3  # it may be fed once more while it waits
+        assert len(fed) >= 2  # the last one may still be on its way, and it may be fed once more meanwhile
 
 
 def test_a_watchdog_is_fed_for_as_long_as_chargers_are_being_stopped(tmp_path: Path) -> None:
