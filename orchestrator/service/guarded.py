@@ -10,6 +10,7 @@ from orchestrator.service.guardian import ALIVE, BEAT, DONE, DROP, PORT
 
 #: A guardian that has not answered a heartbeat for this long is gone, or hangs.
 SILENCE_S = 2.0
+DIED = "the guardian has died"
 
 
 class GuardianLink:
@@ -51,11 +52,10 @@ class GuardianLink:
                 data = self._socket.recv(16)
             except BlockingIOError:
                 return heard
-            except OSError as error:
-                self._gone = f"the guardian is gone: {error.strerror}"
-                return heard
+            except OSError:
+                data = b""  # it died with messages of ours unread
             if not data:
-                self._gone = "the guardian has died"
+                self._gone = DIED
                 return heard
             heard = heard or data == ALIVE
 
@@ -65,8 +65,10 @@ class GuardianLink:
         try:
             with self._lock:
                 self._socket.sendmsg([message], ancillary)
-        except OSError as error:
-            self._gone = self._gone or f"the guardian takes no messages: {error.strerror}"
+        except BlockingIOError:
+            self._gone = self._gone or "the guardian takes no messages"
+        except OSError:
+            self._gone = self._gone or DIED
 
 
 class GuardedLine:

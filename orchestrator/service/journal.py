@@ -86,6 +86,10 @@ class Journal:
             )
         return self._problem
 
+    def stalled(self, _now_s: float) -> bool:
+        """True when the writer has died. That it waits for a disk is no hang: no disk stops a charge."""
+        return not self._thread.is_alive()
+
     def close(self) -> None:
         """Write what is left and end; gives a stalled disk one second."""
         self._ended.set()

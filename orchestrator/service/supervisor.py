@@ -116,8 +116,8 @@ class Supervisor:
             self._beat(now_s)
 
     def _beat(self, now_s: float) -> None:
-        """Let the guardian know that every loop turns (but the journal's: no disk stops a charge); without it, end."""
-        workers = (*self._devices, self._control)
+        """Let the guardian know that every loop turns; without it, end."""
+        workers = (*self._devices, self._control, self._journal)
         well = not any(worker.stalled(now_s) for worker in workers)
         self._beat_s = now_s
         self._lost = self._guardian.beat(now_s, well=well)

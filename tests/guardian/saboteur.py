@@ -15,6 +15,7 @@ from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.service import bay, control, controller
 from orchestrator.service.control import ControlSocket
+from orchestrator.service.journal import Journal
 from orchestrator.service.supervisor import Supervisor
 
 ARMED = threading.Event()
@@ -66,6 +67,7 @@ MODES: dict[str, tuple[Any, str, Callable[..., None]]] = {
     "bus_dies": (BatteryBus, "_turn", end_thread),
     "control_hangs": (ControlSocket, "_answer", hang),
     "control_dies": (ControlSocket, "_answer", end_thread),
+    "journal_dies": (Journal, "_write", end_thread),
     "loop_hangs": (Supervisor, "_news", hang),
     "loop_fails": (Supervisor, "_news", fail),
     "step_loops": (bay, "step", loop),
