@@ -162,9 +162,7 @@ def test_silent_devices_are_told_what_to_check(site: Site) -> None:
     finally:
         site.plant.inject("heal", 2)
     assert status == 1
-    assert (
-        "no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + and −)" in shown
-    )
+    assert "no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + and −)" in shown
     assert "BMU 0x11 on can0: no answer: nothing at all is heard: check its power, the cable, the terminators" in shown
     assert shown.splitlines()[-1] == "NO ANSWER: bay-2's charger, bay-2's BMU"
 
