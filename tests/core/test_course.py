@@ -671,3 +671,13 @@ def test_automatic_mode_ends_when_the_charger_is_full() -> None:
     charger_says_full(world)
     world.until(S.FULL, 2)
     assert world.charger.resting
+
+
+def test_a_node_that_falls_silent_is_not_said_to_withhold_a_temperature() -> None:
+    """Where heartbeat and values go stale in the same step, the one that says more is the reason."""
+    world = charging()
+    world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=world.now_s + 0.25)
+    world.frozen.update(("temperature_c", "status"))
+    reason = world.until(S.STOPPING, 3).reason
+    assert {"heartbeat_lost", "stale_reading"} == set(world.raised)
+    assert reason.startswith("no heartbeat of the BMU for 1.5 s")
