@@ -72,7 +72,7 @@ def stop_all(
         for line in doubtful:
             line.why = seen.get(line.name, line.why)
         _question([line for line in doubtful if line.name not in seen])
-        doubtful = [line for line in doubtful if line.why]
+        doubtful = [line for line in doubtful if line.why not in ("", HELD)]
         if doubtful:
             _pause_until(now_s + ROUND_S)
         now_s = time.monotonic()
