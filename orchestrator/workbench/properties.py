@@ -97,7 +97,8 @@ def charge_begins_qualified(taken: Taken) -> str | None:
 
 def rest_is_verified(taken: Taken) -> str | None:
     """A state of standby is entered only with a reading, asked for after a stop was sent in vain, that shows it."""
-    if taken.after.state not in STANDBY or taken.before.state not in UNPROVED:
+    found = taken.before.state is not State.STARTING and taken.after.state is State.OFFLINE  # it was there
+    if taken.before.state not in UNPROVED or not (found or taken.after.state in STANDBY):
         return None
     reading, sent_s = taken.snapshot.charger, taken.snapshot.charger_link.stop_sent_s
     if reading is None or sent_s is None or reading.t_s < sent_s:

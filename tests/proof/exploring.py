@@ -35,8 +35,8 @@ NEVER = {(State.STARTING, State.FULL)}
 
 
 def rules(policy: str = "li-ion-48v", control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> Rules:
-    bay = station(1, control, load_policy(policy)).bays[0]
-    return Rules.of(replace(bay, limits=replace(bay.limits, current_a=current_a)))
+    bay = station([control], [load_policy(policy)], current_a).bays[0]
+    return Rules.of(bay)
 
 
 def quick(of: Rules) -> StationInputs:

@@ -5,6 +5,7 @@ and frames follow each other. Every call of the driver goes past `Calls`, which 
 """
 
 from collections import deque
+from collections.abc import Callable
 
 import can
 
@@ -25,6 +26,7 @@ class BusWire:
         self.down = False  #: the interface: every call fails with ENETDOWN, and what was open stays deaf
         self.lost = False  #: nobody hears anybody
         self.epoch = 0  #: how often the interface went down
+        self.on_frame: Callable[[int, bytes], None] = lambda _cob_id, _data: None  #: what a node said and was heard
         self.drivers: list[Driver] = []
         self._time = time
         self._free_s = 0.0
@@ -49,6 +51,8 @@ class BusWire:
 
     def _to_drivers(self, cob_id: int, data: bytes) -> None:
         if not (self.down or self.lost):
+            if self.drivers:
+                self.on_frame(cob_id, data)
             for driver in self.drivers:
                 driver.deliver(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
 
@@ -86,6 +90,7 @@ class Driver(can.BusABC):
     def recv(self, timeout: float | None = None) -> can.Message | None:
         told = self.calls("can recv")
         if told is not None:
+            self._time.wait(self._time.now_s + FRAME_S)
             return told  # type: ignore[no-any-return]  # a message
         if not self._heard and not self._wire.down:
             self.news.wait(timeout)
@@ -100,7 +105,7 @@ class Driver(can.BusABC):
         self._wire.from_driver(msg.arbitration_id, bytes(msg.data))
 
     def shutdown(self) -> None:
+        super().shutdown()
         if self in self._wire.drivers:
             self._wire.drivers.remove(self)
-            super().shutdown()
             self.calls("can shutdown")

@@ -1,14 +1,16 @@
 """The emulated bays of `orchestrator.sim` in virtual time: same models, same bytes, no pty and no bus."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
 from durand.scheduler import AsyncScheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
 
-from orchestrator.model import ControlMode
+from orchestrator.model import ChargeMode, ControlMode
 from orchestrator.sim.bay import Bay
 from orchestrator.sim.bmu import Bmu
 from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger_frames import Request
 from orchestrator.sim.charger_wire import ChargerWire
 from orchestrator.sim.line import LINES
 from orchestrator.sim.pack import Pack, Readout
@@ -30,6 +32,7 @@ class Nature:
     line: str = "real"
     seed: int = 1
     speed: float = 1.0  #: model seconds in one second
+    running: bool = False  #: as the last service left it
 
 
 class MemoryWire(ChargerWire):
@@ -40,7 +43,7 @@ class MemoryWire(ChargerWire):
         self._time, self._tty = time, tty
         self._plugged = False
         tty.listener = self._receive
-        self.heard_s = time.now_s  #: when the controller was last given a status reply
+        self.on_started: Callable[[float], None] = lambda _now_s: None  #: a frame has switched the output on
 
     def open(self) -> None:
         self._plugged = self._tty.present = True
@@ -69,6 +72,12 @@ class MemoryWire(ChargerWire):
         else:
             self._hear(now_s, chunk)
 
+    def _obey(self, request: Request, came_s: float) -> None:
+        stood = not self.charger.running
+        super()._obey(request, came_s)
+        if stood and self.charger.running:
+            self.on_started(self._time.now_s)
+
     def _write(self, data: bytes) -> None:
         if self._plugged:
             self._tty.deliver(data)
@@ -77,8 +86,12 @@ class MemoryWire(ChargerWire):
 class VirtualRig(Rig):
     """What `sim.faults` acts upon."""
 
+    wire: MemoryWire
+
     def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:
         charger = Charger(nature.control)
+        if nature.running:
+            charger.run, charger.mode, charger.current_limit = True, ChargeMode.CHARGE, len(charger.steps_a) - 1
         self.bay = Bay(charger, nature.pack)
         self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c)
         self.injected_s: float | None = None

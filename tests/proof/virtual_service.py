@@ -39,16 +39,15 @@ from tests.proof.virtual_tty import Kernel
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10
-LIMITS = Limits(voltage_v=58.4, current_a=15.0, temperature_c=Range(0, 45))
 
 
 class Guardian:
-    """Answers every heartbeat and says nothing."""
+    """Answers every heartbeat; `unwell` are those that the real one would not have been sent."""
 
-    beats = 0
+    unwell = 0
 
-    def beat(self, _now_s: float) -> str:
-        self.beats += 1
+    def beat(self, _now_s: float, *, well: bool = True) -> str:
+        self.unwell += not well
         return ""
 
     def hold(self, _port: str, _fd: int) -> None:
@@ -63,8 +62,6 @@ class Guardian:
 
 class Notebook:
     """A journal that is read at once."""
-
-    problem = ""
 
     def __init__(self, *_: object) -> None:
         self.said: list[str] = []
@@ -91,7 +88,7 @@ class Notebook:
 
 
 class Silence:
-    """A control socket that nobody uses, a recorder that records nothing."""
+    """A control socket that nobody uses."""
 
     def __init__(self, *_: object) -> None:
         """Whatever it is given."""
@@ -104,14 +101,13 @@ class Silence:
     def stalled(self, _now_s: float) -> bool:
         return False
 
-    def line(self, *_: object) -> None:
-        """Nothing."""
 
-
-def station(bays: int, control: ControlMode, policy: Policy | None = None, **battery: Any) -> Station:
-    """Bays of the design's example, on one bus."""
-    policy = policy or load_policy("li-ion-48v")
+def station(
+    controls: Sequence[ControlMode], policies: Sequence[Policy] = (), limit_a: float = 15.0, **battery: Any
+) -> Station:
+    """A bay of the design's example for each control mode, on one bus; li-ion-48v where there is no other policy."""
     settings = {"can": "can0", "map": load_map("tabos"), **battery}
+    chosen = policies or [load_policy("li-ion-48v")] * len(controls)
     return Station(
         station="virtual",
         can={"can0": {"interface": "virtual", "bitrate": 250_000}},
@@ -120,13 +116,13 @@ def station(bays: int, control: ControlMode, policy: Policy | None = None, **bat
                 name=f"bay-{number + 1}",
                 charger=ChargerConfig(port=f"/virtual/{number + 1}", control=control, steps_a=STEPS_A),
                 battery=BatteryConfig(node_id=FIRST_NODE + number, **settings),
-                limits=LIMITS,
+                limits=Limits(voltage_v=58.4, current_a=limit_a, temperature_c=Range(0, 45)),
                 policy=policy,
             )
-            for number in range(bays)
+            for number, (control, policy) in enumerate(zip(controls, chosen, strict=True))
         ),
         control=Control(socket=Path("/virtual/socket")),
-        journal=JournalConfig(directory=Path("/virtual/journal")),
+        journal=JournalConfig(directory=Path("/virtual/journal"), snapshots=False),
     )
 
 
@@ -145,7 +141,8 @@ class World:
         self._kept = kept
         self._patches = ExitStack()
         self._patch()
-        self.supervisor = Supervisor(the_station, Guardian())  # type: ignore[arg-type]  # as the real one
+        self.guardian = Guardian()
+        self.supervisor = Supervisor(the_station, self.guardian)  # type: ignore[arg-type]  # as the real one
         self.on_step: Callable[[BayRunner], None] = lambda _: None
         self._watch_steps()
 
@@ -208,10 +205,10 @@ class World:
                 "signal": SimpleNamespace(signal=lambda *_: None, SIGTERM=15, SIGINT=2, Signals=signal.Signals),
                 "read_kept": lambda _, names: {name: _Kept(self._kept.get(name, Memory())) for name in names},
             },
-            bay_module: {"Event": event, "SnapshotRecorder": Silence},
+            bay_module: {"Event": event},
             charger_module: {"Event": event, "Thread": thread},
             bus_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
-            serial_module: {"time": SimpleNamespace(sleep=self._sleep), "select": fake["select"]},
+            serial_module: {"time": SimpleNamespace(sleep=self._sleep), "select": fake["select"], "os": fake["os"]},
             can_module: {"_open_bus": lambda _: Driver(self.bus, time)},
             serial.serialposix: fake,
             serial.serialutil.Timeout: {"TIME": time.clock},

@@ -43,6 +43,7 @@ class Tty:
     stalled: bool = False  #: takes nothing any more
     waiting_bytes: bytes = b""
     listener: Callable[[bytes], None] = lambda _: None
+    on_delivered: Callable[[int], None] = lambda _: None  #: so many bytes have come in
     opened: int = 0  #: how many descriptors
     locked: bool = False
     news: Waiting = field(init=False)
@@ -54,6 +55,7 @@ class Tty:
         if self.present and self.opened:
             self.waiting_bytes = (self.waiting_bytes + data)[:ROOM]
             self.news.wake()
+            self.on_delivered(len(data))
 
     def unplug(self) -> None:
         self.present, self.waiting_bytes = False, b""

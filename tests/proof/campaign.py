@@ -1,0 +1,108 @@
+"""The campaign: random fault scripts on the whole service in virtual time, replayable, failures shrunk to their core.
+
+python -m tests.proof.campaign                    1,000 scripts on all processors
+python -m tests.proof.campaign --seed 1249 -v     one of them again, with what was injected
+python -m tests.proof.campaign --script FILE      a script that was printed (JSON)
+"""
+
+import argparse
+import multiprocessing
+import os
+import statistics
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from tests.proof.play import Injected, Played, play
+from tests.proof.report import say
+from tests.proof.script import Script, shrink
+
+#: A failure is made smaller with at most this many plays.
+SHRINK_PLAYS = 400
+
+
+def play_seed(seed: int) -> Played:
+    return play(Script.of_seed(seed))
+
+
+def campaign(seeds: Iterable[int], workers: int) -> list[Played]:
+    """Every script; on one processor in this process, so that a debugger can follow."""
+    if workers == 1:
+        return [play_seed(seed) for seed in seeds]
+    with multiprocessing.get_context("fork").Pool(workers) as pool:
+        return pool.map(play_seed, seeds, chunksize=4)
+
+
+def smallest(script: Script) -> Script:
+    """The smallest script that breaks the same invariant."""
+    wrong = kinds(play(script))
+    plays = iter(range(SHRINK_PLAYS))
+    return shrink(script, lambda smaller: next(plays, None) is not None and bool(kinds(play(smaller)) & wrong))
+
+
+def kinds(played: Played) -> set[str]:
+    """Which invariants were broken: "t = 1.00 s, bay 0, hot: …" is "hot"."""
+    return {line.split(", ", 2)[2].split(":")[0] for line in played.violations}
+
+
+def table(injected: Iterable[Injected]) -> list[str]:
+    """What was injected while the charger ran, and what came of it."""
+    by_name: dict[str, list[Injected]] = defaultdict(list)
+    for one in injected:
+        by_name[one.name].append(one)
+        by_name["all"].append(one)
+    head = f"{'injected':22} {'times':>5} {'detected':>8} {'verified':>8} {'named':>5}"
+    names = (*sorted(set(by_name) - {"all"}), "all")
+    return [f"{head}   stop after, s: median   p99    max", *(_row(name, by_name[name]) for name in names)]
+
+
+def _row(name: str, rows: list[Injected]) -> str:
+    detected = sum(bool(one.fault) or one.named for one in rows)
+    verified, named = sum(one.verified for one in rows), sum(one.named for one in rows)
+    times_s = sorted(one.stop_s for one in rows if one.stop_s is not None and one.alone and one.fault)
+    latency = "–"
+    if times_s:
+        p99_s = times_s[min(len(times_s) - 1, int(0.99 * len(times_s)))]
+        latency = f"{statistics.median(times_s):6.3f} {p99_s:6.3f} {times_s[-1]:6.3f}"
+    return f"{name:22} {len(rows):5} {detected:8} {verified:8} {named:5}   {latency:>37}"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Play, tell, and shrink what failed; 1 if anything did."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--scripts", type=int, default=1000, help="how many (default: %(default)s)")
+    parser.add_argument("--first", type=int, default=0, help="the first seed (default: %(default)s)")
+    parser.add_argument("--seed", type=int, help="only this one")
+    parser.add_argument("--script", type=Path, help="only the script in this file")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("-v", "--verbose", action="store_true")
+    arguments = parser.parse_args(argv)
+    began_s = time.monotonic()
+    if arguments.script is not None:
+        all_played = [play(Script.from_json(arguments.script.read_text(encoding="utf-8")))]
+    elif arguments.seed is not None:
+        all_played = [play_seed(arguments.seed)]
+    else:
+        all_played = campaign(range(arguments.first, arguments.first + arguments.scripts), arguments.workers)
+    injected = [one for played in all_played for one in played.injected]
+    if arguments.verbose:
+        for one in injected:
+            say(one)
+    say("\n".join(table(injected)))
+    failed = [played for played in all_played if played.violations]
+    virtual_s = sum(played.script.end_s * len(played.script.bays) for played in all_played)
+    say(
+        f"{len(all_played)} scripts, {virtual_s / 3600:.1f} h of bays in {time.monotonic() - began_s:.0f} s; "
+        f"{len(injected)} faults while a charger ran; {len(failed)} scripts failed"
+    )
+    for played in failed[:5]:
+        say(f"\nseed {played.script.seed}:\n  " + "\n  ".join(played.violations))
+        small = smallest(played.script)
+        say("smallest script:\n" + small.to_json() + "\n  " + "\n  ".join(play(small).violations))
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

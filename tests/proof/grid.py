@@ -1,0 +1,308 @@
+"""The exhaustive grid: every state × every row of the fault table × what the line is just doing.
+
+A bay is brought into the state, on the whole service in virtual time; then, at a moment at which the line is idle, has
+a request in flight, or has half of a reply, the row's condition becomes true for as long as the row needs. A row whose
+effect stops must end in verified standby, its stop written as soon as the line is free; any other must leave the bay
+where the operator's stop ends it in verified standby.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from math import inf
+from typing import Any
+from unittest.mock import patch
+
+from orchestrator.config.load import load_policy
+from orchestrator.core import latches
+from orchestrator.core.faults import FAULTS, Row
+from orchestrator.model import STOP, Action, ControlMode, Effect, Request, State
+from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
+from orchestrator.service.bay import VERIFIED
+from orchestrator.sim.faults import FAULTS as INJECTIONS
+from orchestrator.sim.pack import Pack
+from orchestrator.sim.presets import PACKS
+from tests.proof.play import POLICIES
+from tests.proof.virtual_rig import ANSWER_S, Nature
+from tests.proof.virtual_service import World, station, world
+
+
+class Phase(StrEnum):
+    """What the line is doing when the fault comes."""
+
+    IDLE = "idle line"
+    IN_FLIGHT = "request in flight"
+    HALF = "reply half received"
+
+
+#: From the step that orders a stop to its first byte: at most the rest of a transaction, the reply's deadline.
+STOP_WITHIN_S = {Phase.IDLE: 0.01, Phase.IN_FLIGHT: 0.125, Phase.HALF: 0.125}
+#: A frame's time on the wire, and the gap behind it.
+FRAME_S = 0.01
+#: A status request, and half a reply to it.
+POLL, HALF_REPLY = 0x01, 14
+#: A stop is proved within this; then the operator's is given as much.
+SETTLE_S = 3.5
+REACH_S = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """How a bay comes into a state: its pack, and what befalls it in which state on the way."""
+
+    soc_pct: float | None = 50.0  #: None: the toy pack, deeply discharged
+    acts: tuple[tuple[State, str], ...] = ()
+    speed: float = 1.0
+
+    def nature(self) -> Nature:
+        pack = PACKS["demo"]()
+        if self.soc_pct is not None:
+            pack = Pack()
+            pack.set_soc(self.soc_pct)
+        if self.speed > 1:
+            pack = replace(PACKS["demo"]())
+            pack.set_soc(self.soc_pct or 0.0)
+        return Nature(pack, line="bytewise", speed=self.speed)
+
+
+#: Not an act: go on when the charger runs.
+RUNS = "until it runs"
+
+S = State
+SITUATIONS: dict[State, Situation] = {
+    S.STARTING: Situation(),
+    S.OFFLINE: Situation(acts=((S.STARTING, "bmu_silent"),)),
+    S.IDLE: Situation(soc_pct=99.0),
+    S.QUALIFYING: Situation(),
+    S.PRECHARGE_PULSE: Situation(soc_pct=None),
+    S.PRECHARGE_CONTINUOUS: Situation(soc_pct=None, acts=((S.PRECHARGE_PULSE, "fast forward"),)),
+    S.CHARGING: Situation(),
+    S.FULL: Situation(soc_pct=93.0, speed=6),
+    S.SUSPENDED: Situation(acts=((S.QUALIFYING, "pause"),)),
+    S.STOPPING: Situation(acts=((S.CHARGING, RUNS), (S.CHARGING, "stop"))),
+    S.TRIPPED: Situation(acts=((S.QUALIFYING, "status_bits"),)),
+    S.UNCONTROLLABLE: Situation(acts=((S.CHARGING, RUNS), (S.CHARGING, "ignore_stop"), (S.CHARGING, "stop"))),
+}
+
+
+#: These may be over before a row has lasted for long enough.
+PASSING = frozenset({S.STARTING, S.STOPPING, S.QUALIFYING})
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One cell of the grid."""
+
+    state: State
+    row: Row
+    phase: Phase
+
+    def __str__(self) -> str:
+        return f"{self.state} × {self.row.id} × {self.phase}"
+
+
+@dataclass(slots=True)
+class Used:
+    """Rows of tables that were used, over many cells."""
+
+    rows: set[str] = field(default_factory=set)
+    changes: set[tuple[State, State]] = field(default_factory=set)
+
+
+class Run:
+    """One cell, played."""
+
+    def __init__(self, cell: Cell, on: World, used: Used) -> None:
+        self.cell, self.world, self.time, self.used = cell, on, on.time, used
+        self.rig = on.rigs[0]
+        self.wrong: list[str] = []
+        self.forced = ""
+        self._acts = list(SITUATIONS[cell.state].acts)
+        self._armed = self._injected = self._standing = False
+        self._raised_s: float | None = None
+        self._stopped_s: float | None = None
+        self._heard = 0
+        self._free_s = inf  # from when on the line is idle
+        self._before = S.STARTING
+        on.on_step = self._stepped
+        self.rig.wire.on_bytes = self._asked
+        self.rig.tty.on_delivered = self._answered
+
+    def run(self) -> list[str]:
+        self.time.call_later(REACH_S, self._too_late)
+        status = self.world.run()
+        if status:
+            self.wrong.append(f"the service ended with {self.world.journal.said[-1]!r}")
+        if self.rig.bay.charger.running:
+            self.wrong.append("the charger runs at the end")
+        self.wrong += [line for line in self.world.journal.said if "internal error" in line]
+        if self.world.guardian.unwell:
+            self.wrong.append("a thread of the service ended or hung")
+        return self.wrong
+
+    def rows(self) -> tuple[Row, ...]:
+        """The fault table, with the cell's row under control."""
+        row, check = self.cell.row, self.cell.row.check
+
+        def forced(f: Any) -> str | None:
+            return self.forced or check(f)
+
+        return tuple(replace(row, check=forced) if other is row else other for other in FAULTS)
+
+    # --- on the way to the state --------------------------------------------------------------------------------------
+
+    def _stepped(self, runner: Any) -> None:
+        decision = runner.decision
+        self.used.rows |= {fault.id for fault in decision.faults}
+        if decision.state is not self._before:
+            self.used.changes.add((self._before, decision.state))
+            self._before = decision.state
+        while self._acts and self._acts[0][0] is decision.state:
+            if self._acts[0][1] == RUNS and not self.rig.bay.charger.running:
+                break
+            self._act(self._acts.pop(0)[1])
+        if decision.state is self.cell.state and not self._acts and not self._armed:
+            self._armed = True
+            if self.cell.phase is Phase.IDLE:
+                self._when_idle()
+        if self._raised_s is None and self._injected and any(x.id == self.cell.row.id for x in decision.faults):
+            self._raised_s = self.time.now_s
+
+    def _act(self, name: str) -> None:
+        if name in set(Request):
+            self.world.ask(Request(name))
+        elif name == "fast forward":
+            self.rig._speed = 5.0
+        elif name != RUNS:
+            same = (name, self.cell.row.id) == ("status_bits", "status_trip")  # it would be there already
+            other = "error_stop" if same else name
+            self.rig.inject(lambda rig: INJECTIONS[other].happen(rig, None))
+
+    # --- the moment ---------------------------------------------------------------------------------------------------
+
+    def _when_idle(self) -> None:
+        """Nothing is being sent, and nothing is waited for."""
+        schedule = self.world.supervisor._ports[0]._schedule
+        if self._free_s < self.time.now_s < schedule.next().at_s - 0.001:
+            self._inject()
+        else:
+            self.time.call_later(0.003, self._when_idle)
+
+    def _asked(self, now_s: float, data: bytes) -> None:
+        if STOP_FRAME in data and self._raised_s is not None and self._stopped_s is None:
+            self._stopped_s = now_s
+        self._free_s = now_s + FRAME_S
+        if len(data) > 4 and data[4] == POLL:
+            self._heard, self._free_s = 0, inf
+            if self._armed and self.cell.phase is Phase.IN_FLIGHT:
+                self.time.call_later(0.002, self._inject)
+
+    def _answered(self, count: int) -> None:
+        self._heard += count
+        if self._heard >= STATUS_REPLY_BYTES:
+            self._free_s = self.time.now_s + FRAME_S
+        if self._armed and self.cell.phase is Phase.HALF and self._heard >= HALF_REPLY:
+            self._inject()
+
+    def _inject(self) -> None:
+        if self._injected:
+            return
+        self._injected = True
+        decision = self.world.decision()
+        if decision.state is not self.cell.state:
+            self.wrong.append(f"the fault came in {decision.state}")
+        self._standing = decision.command == STOP
+        self.forced = "seen by the grid"
+        self.world.supervisor._wake.put(0)
+        lasts_s = self.cell.row.for_s + 0.3 + 0.5 * self.cell.row.polls
+        self.time.call_later(lasts_s, self._gone)
+        self.time.call_later(lasts_s + SETTLE_S, self._judge)
+
+    def _gone(self) -> None:
+        self.forced = ""
+
+    # --- what became of it --------------------------------------------------------------------------------------------
+
+    def _judge(self) -> None:
+        cell, decision = self.cell, self.world.decision()
+        raised = self._raised_s is not None
+        at_once = cell.row.for_s == 0 and cell.row.polls == 1
+        if cell.state in cell.row.where and not raised and (at_once or cell.state not in PASSING):
+            self.wrong.append(f"{cell.row.id} was not raised")
+        if raised and cell.row.effect >= Effect.PAUSE:
+            uncontrolled = (
+                decision.state is State.UNCONTROLLABLE and decision.alarm and self.rig.bay.charger.ignores_stop
+            )
+            if not (uncontrolled or (decision.state in VERIFIED and not self.rig.bay.charger.running)):
+                self.wrong.append(f"{decision.state}: {decision.reason}")
+        if raised and cell.row.effect >= Effect.STOP:
+            self._judge_stop()
+        self.rig.inject(lambda rig: INJECTIONS["heal"].happen(rig, None))
+        self.rig.bmu.port.faults.delay_s = ANSWER_S
+        self.world.ask(Request.STOP)
+        self.time.call_later(SETTLE_S, self.world.end)
+
+    def _judge_stop(self) -> None:
+        if self._standing:
+            return  # it was ordered before, is repeated each 500 ms, and the end is a verified one
+        if self._stopped_s is None or self._raised_s is None:
+            self.wrong.append("no stop was written")
+            return
+        at_once = self.cell.row.for_s == 0 and self.cell.row.polls == 1  # else it is raised whenever it has lasted
+        took_s = self._stopped_s - self._raised_s
+        allowed_s = STOP_WITHIN_S[self.cell.phase if at_once else Phase.IN_FLIGHT]
+        if took_s > allowed_s:
+            self.wrong.append(
+                f"the stop was written {took_s * 1000:.0f} ms after the step, allowed are {allowed_s * 1000:.0f}"
+            )
+
+    def _too_late(self) -> None:
+        if not self._injected:
+            self.wrong.append(f"{self.cell.state} or its moment was not reached, but {self.world.decision().state}")
+            self.world.end()
+
+
+def cells(phases: Callable[[int], tuple[Phase, ...]]) -> Iterator[Cell]:
+    """The whole grid, or for each pair of state and row the phases that `phases(number)` names."""
+    number = 0
+    for state in State:
+        for row in FAULTS:
+            yield from (Cell(state, row, phase) for phase in phases(number))
+            number += 1
+
+
+def play(cell: Cell, used: Used) -> list[str]:
+    """What is wrong with this cell."""
+    situation = SITUATIONS[cell.state]
+    small = situation.soc_pct is None or situation.speed > 1
+    the_station = station([ControlMode.MANUAL], [POLICIES["demo" if small else "48v"]], sweep_s=0.3)
+    with world(the_station, [situation.nature()], end_s=120.0) as made:
+        run = Run(cell, made, used)
+        with patch.object(latches, "FAULTS", run.rows()):
+            return run.run()
+
+
+def orders(limit_a: float, soc_pct: float | None) -> set[tuple[Action, int]]:
+    """The orders that are let out in a charge with this station limit.
+
+    Without a SOC it is a whole charge, from the first pulse to full.
+    """
+    policy = load_policy("li-ion-48v") if soc_pct is not None else POLICIES["demo"]
+    let_out: set[tuple[Action, int]] = set()
+    with world(
+        station([ControlMode.MANUAL], [policy], limit_a, sweep_s=0.3),
+        [Situation(soc_pct=soc_pct).nature()],
+        end_s=120.0,
+    ) as made:
+        made.rigs[0].bay.charger.current_limit = 4  # as whoever was here before has left it
+        port = made.supervisor._ports[0]
+        write = port._write
+
+        def written(line: Any, frame: bytes, order: Any, *args: Any, **named: Any) -> None:
+            let_out.add((order.action, order.value))
+            write(line, frame, order, *args, **named)
+
+        port._write = written  # type: ignore[method-assign]  # whoever watches sees every order
+        made.time.call_later(9.0 if soc_pct is not None else 75.0, made.end)
+        assert made.run() == 0
+    return let_out

@@ -1,0 +1,36 @@
+"""Fail the Nth call in its short form: a sample of every call with every error, and a boundary that leaks is seen."""
+
+import pytest
+
+from orchestrator.link import serial as serial_module
+from tests.proof.nth_call import ERRORS, Case, cases, charge
+
+#: Each so-and-so-many-th of all failures; `make campaign` plays them all.
+SAMPLE = 60
+
+
+@pytest.fixture(name="sample", scope="module")
+def _sample() -> list[Case]:
+    return list(cases(SAMPLE))
+
+
+@pytest.mark.parametrize("call", ERRORS)
+def test_nothing_but_a_verified_stop_or_a_recovery(call: str, sample: list[Case]) -> None:
+    chosen = [case for case in sample if case.call == call]
+    for case in chosen:
+        assert not charge(case, brief=True).violations, case
+
+
+def test_every_call_of_a_charge_has_its_errors() -> None:
+    assert set(charge(None).calls) == set(ERRORS)
+
+
+def test_a_charge_goes_on_after_a_port_that_failed() -> None:
+    played = charge(Case("write", "EIO", lasting=True, number=500))
+    assert (played.word, played.full) == ("recovered", True)
+
+
+def test_an_exception_that_leaks_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serial_module, "_FAILURES", (OSError,))
+    leaks = [case for case in cases(SAMPLE) if (case.call, case.error) == ("read", "TypeError")]
+    assert any(charge(case, brief=True).violations for case in leaks)
