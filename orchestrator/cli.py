@@ -86,6 +86,9 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     check = verbs.add_parser("check", help="every error of policies, stations and object maps, with its line")
     check.add_argument("file", nargs="+", help="files; what each is, it says itself")
     check.set_defaults(run=_check)
+    schema = verbs.add_parser("schema", help="JSON Schema of a kind of file, so that an editor completes and checks")
+    schema.add_argument("kind", choices=SCHEMAS, help="which kind")
+    schema.set_defaults(run=_schema)
     decode = verbs.add_parser("decode", help="explain frames of the charger's protocol")
     decode.add_argument("hex", nargs="+", help="bytes in hexadecimal, e.g. AF FA 90 04 10 90 00 34 AF A0")
     decode.add_argument("--kinds", type=_kinds, metavar="K1,K2", help="which values a reply holds, e.g. 03,04")
@@ -105,6 +108,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     demo.set_defaults(run=_demo)
 
 
+SCHEMAS = ("policy", "station", "map")
 NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
@@ -177,6 +181,15 @@ def _check(arguments: argparse.Namespace) -> int:
     for finding in findings:
         print(finding, file=sys.stderr)
     return 1 if findings else 0
+
+
+def _schema(arguments: argparse.Namespace) -> int:
+    from orchestrator.config.files import KINDS
+    from orchestrator.config.json_schema import json_schema
+
+    kind = next(kind for kind in KINDS if kind.key == arguments.kind)
+    print(json.dumps(json_schema(kind), ensure_ascii=False, indent=1))
+    return 0
 
 
 def _decode(arguments: argparse.Namespace) -> int:

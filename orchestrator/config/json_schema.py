@@ -1,0 +1,96 @@
+"""JSON Schema (draft 7) of the three kinds of file, for editors: made from the same dataclasses that the reader fills.
+
+It says what each key means and allows, so that an editor completes, explains and checks while one types. What holds
+between keys it cannot say: `orchestrator check` decides.
+"""
+
+from collections.abc import Mapping
+from enum import Enum
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin
+
+from orchestrator.config.files import MAP, POLICY, Kind
+from orchestrator.config.policy import Policy
+from orchestrator.config.scalars import allowed
+from orchestrator.config.schema import INVALID, Slot, slots
+from orchestrator.config.shipped import shipped_names
+from orchestrator.keys import Key, Range
+from orchestrator.protocol.objects import ObjectMap
+
+Schema = dict[str, Any]
+
+#: Types that are named in the file and described in another one.
+REFERENCES: Mapping[object, Kind] = {Policy: POLICY, ObjectMap: MAP}
+_BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
+
+
+def json_schema(kind: Kind) -> Schema:
+    """The schema of a whole file of this kind."""
+    title = f"{kind.about} of a charging station" if kind.key != "station" else "charging station"
+    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": title, **_record(kind.record)}
+
+
+def _record(record: type) -> Schema:
+    known = slots(record)
+    return {
+        "type": "object",
+        "properties": {name: _slot(slot) for name, slot in known.items()},
+        "required": [name for name, slot in known.items() if slot.default is INVALID],
+        "additionalProperties": False,
+    }
+
+
+def _slot(slot: Slot) -> Schema:
+    schema = {"description": _description(slot.key), **_value(slot.hint, slot.key)}
+    default = slot.default.name.lower() if isinstance(slot.default, Enum) else slot.default
+    if isinstance(default, (bool, int, float, str, NoneType)) and default != "":
+        schema["default"] = default
+    return schema
+
+
+def _description(key: Key) -> str:
+    bounds = allowed(key) or key.unit
+    return f"{key.about} ({bounds})" if bounds else key.about
+
+
+def _value(hint: Any, key: Key) -> Schema:  # noqa: ANN401 - any type expression
+    if get_origin(hint) in (Union, UnionType):
+        (inner,) = (arg for arg in get_args(hint) if arg is not NoneType)
+        return _or_null(_value(inner, key))
+    if get_origin(hint) is tuple:
+        return {"type": "array", "items": _value(get_args(hint)[0], key), "minItems": 1}
+    if get_origin(hint) is Mapping:
+        return {"type": "object", "additionalProperties": _value(get_args(hint)[1], key), "minProperties": 1}
+    if hint is Range:
+        return {"type": "array", "items": _value(float, key), "minItems": 2, "maxItems": 2}
+    if hint in REFERENCES:
+        return _reference(REFERENCES[hint])
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return {"enum": [member.name.lower() for member in hint]}
+    return _scalar(hint, key) or _record(hint)
+
+
+def _scalar(hint: object, key: Key) -> Schema:
+    """A number, a text …; empty for anything else."""
+    bounds = {_BOUNDS[name]: bound for name in _BOUNDS if (bound := getattr(key, name)) is not None}
+    scalars: dict[object, Schema] = {
+        float: {"type": "number", **bounds},
+        int: {"type": "integer", **bounds},
+        bool: {"type": "boolean"},
+        str: {"type": "string", "minLength": 1, **({"pattern": "/"} if key.is_path else {})},
+        Path: {"type": "string", "minLength": 1},
+        object: {"type": ["string", "number", "boolean", "null"]},
+    }
+    return scalars.get(hint, {})
+
+
+def _reference(kind: Kind) -> Schema:
+    """The name of a shipped file, or a path."""
+    return {"anyOf": [{"enum": list(shipped_names(kind.folder))}, {"type": "string", "pattern": r"/|\.ya?ml$"}]}
+
+
+def _or_null(schema: Schema) -> Schema:
+    if "type" in schema:
+        return {**schema, "type": [schema["type"], "null"]}
+    return {"anyOf": [schema, {"type": "null"}]}
