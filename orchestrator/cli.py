@@ -102,6 +102,11 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--old-protocol", action="store_true", help="ask for the BMU's older, undocumented pages as well"
     )
     probe.set_defaults(run=_probe)
+    diagram = verbs.add_parser("diagram", help="the state machine as a picture")
+    diagram.add_argument("--policy", metavar="FILE", help="as this policy uses it, with its thresholds")
+    diagram.add_argument("--format", choices=PICTURES, default=PICTURES[0], help="default: %(default)s, which is text")
+    diagram.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
+    diagram.set_defaults(run=_diagram)
     demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
     demo.add_argument("--fault", metavar="NAME", help="inject a fault in mid-charge; 'list' shows the names")
     demo.add_argument("--plain", action="store_true", help="lines instead of a live picture")
@@ -109,6 +114,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 SCHEMAS = ("policy", "station", "map")
+PICTURES = ("mermaid", "svg", "png")
 NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
@@ -211,11 +217,46 @@ def _probe(arguments: argparse.Namespace) -> int:
     return probe(station, arguments.bay, arguments.nmt, old_protocol=arguments.old_protocol)
 
 
+def _diagram(arguments: argparse.Namespace) -> int:
+    from orchestrator.config.load import load_policy
+    from orchestrator.workbench.diagram import diagram, mermaid
+
+    of = diagram(load_policy(arguments.policy) if arguments.policy else None)
+    if arguments.format == "mermaid":
+        _give(mermaid(of).encode(), arguments.out)
+        return 0
+    try:
+        from orchestrator.workbench.drawing import draw
+    except ImportError as error:
+        raise _missing("workbench", error) from None
+    if arguments.out is None and sys.stdout.isatty():
+        raise UsageError("a picture is nothing for a terminal: name a file with --out")
+    _give(draw(of, arguments.format), arguments.out)
+    return 0
+
+
+def _give(data: bytes, out: Path | None) -> None:
+    """To a file, or to standard output."""
+    if out is None:
+        sys.stdout.buffer.write(data)
+        sys.stdout.flush()
+        return
+    try:
+        out.write_bytes(data)
+    except OSError as error:
+        raise OrchestratorError(f"{out}: {error.strerror}") from None
+
+
+def _missing(extra: str, error: ImportError) -> OrchestratorError:
+    """What to install for a verb whose libraries a gateway need not have."""
+    return OrchestratorError(
+        f"this needs the package {error.name}: pip install 'charging-station-orchestrator[{extra}]'"
+    )
+
+
 def _demo(arguments: argparse.Namespace) -> int:
     try:
         from orchestrator.demo.run import demo
     except ImportError as error:
-        raise OrchestratorError(
-            f"the demo needs the package {error.name}: pip install 'charging-station-orchestrator[demo]'"
-        ) from None
+        raise _missing("demo", error) from None
     return demo(arguments.fault, plain=arguments.plain)

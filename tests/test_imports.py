@@ -36,7 +36,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "demo": ("config", "errors", "keys", "model", "service", "show", "sim"),
     "cli": (
         "config", "core", "demo", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service",
-        "show", "sim",
+        "show", "sim", "workbench",
     ),
     "__main__": ("cli", "service.estop", "service.guardian"),
 }  # fmt: skip
@@ -46,6 +46,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
     "durand": ("sim",),
+    "pygraphviz": ("workbench.drawing",),
     "rich": ("demo",),
     "serial": ("link.serial",),
     "transitions": ("core.machine",),
