@@ -102,6 +102,11 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--old-protocol", action="store_true", help="ask for the BMU's older, undocumented pages as well"
     )
     probe.set_defaults(run=_probe)
+    replay = verbs.add_parser("replay", help="take recorded decisions again, with the same policy or with another")
+    replay.add_argument("journal", nargs="+", type=Path, help="a journal's directory, or files of one (may be gzipped)")
+    replay.add_argument("--policy", metavar="FILE", help="what this policy would have decided, and what that changes")
+    replay.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
+    replay.set_defaults(run=_replay)
     diagram = verbs.add_parser("diagram", help="the state machine as a picture")
     diagram.add_argument("--policy", metavar="FILE", help="as this policy uses it, with its thresholds")
     diagram.add_argument("--format", choices=PICTURES, default=PICTURES[0], help="default: %(default)s, which is text")
@@ -215,6 +220,14 @@ def _probe(arguments: argparse.Namespace) -> int:
 
     station = load_station(arguments.station)
     return probe(station, arguments.bay, arguments.nmt, old_protocol=arguments.old_protocol)
+
+
+def _replay(arguments: argparse.Namespace) -> int:
+    try:
+        from orchestrator.workbench.replaying import replay
+    except ImportError as error:
+        raise _missing("workbench", error) from None
+    return replay(arguments.journal, arguments.policy, arguments.bay)
 
 
 def _diagram(arguments: argparse.Namespace) -> int:

@@ -31,7 +31,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
     # What it checks is the core itself, so it runs on nothing but what the core is made of.
-    "workbench": ("config.policy", "config.station", "core", "errors", "keys", "model"),
+    "workbench": ("config", "core", "errors", "keys", "model", "service.records"),
     "show": (),
     "demo": ("config", "errors", "keys", "model", "service", "show", "sim"),
     "cli": (
@@ -45,6 +45,7 @@ EDGES: dict[str, tuple[str, ...]] = {
 OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
+    "cattrs": ("workbench.recording",),
     "durand": ("sim",),
     "pygraphviz": ("workbench.drawing",),
     "rich": ("demo",),

@@ -76,7 +76,7 @@ class BayRunner:
         self._ending = False
         self._charger, self._battery, self._journal = charger, battery, journal
         self._snapshot = Snapshot()
-        self._recorder = SnapshotRecorder() if snapshots else None
+        self._recorder = SnapshotRecorder(bay) if snapshots else None
         self._asked: list[Asked] = []
         self._internal = ""
 
@@ -125,11 +125,15 @@ class BayRunner:
         decision, self._memory = step(now_s, snapshot, memory, self._rules)
         self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
         self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
-        if before is None or decision != before:
-            self._write_down(before, decision)
-        line = self._recorder.line(snapshot, memory, before, decision) if self._recorder else None
-        if line is not None:
+        lines = list(decision_lines(before, decision)) if before is None or decision != before else []
+        if self._recorder is not None:
+            recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
+            lines += [recorded] if recorded is not None else []
+        for line in lines:
             self._journal.put(self.name, line)
+        if before is None or before.state is not decision.state:
+            came_from = f"{before.state} → " if before else ""
+            self._journal.say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
         self._keep()
 
     def _keep(self) -> None:
@@ -139,13 +143,6 @@ class BayRunner:
         if kept != self._kept:
             self._kept = kept
             self._journal.keep(self.name, kept)
-
-    def _write_down(self, before: Decision | None, decision: Decision) -> None:
-        for line in decision_lines(before, decision):
-            self._journal.put(self.name, line)
-        if before is None or before.state is not decision.state:
-            came_from = f"{before.state} → " if before else ""
-            self._journal.say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
 
     def status(self) -> dict[str, object]:
         """The bay's part of the status document."""

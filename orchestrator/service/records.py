@@ -1,8 +1,10 @@
 """What the journal says: one decision after another, turned into lines. Pure; the writing is the journal's."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import asdict
 
+from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
 from orchestrator.model import (
     BatteryLink,
@@ -20,7 +22,7 @@ Line = tuple[str, dict[str, object]]  #: kind, fields
 
 #: States in which every step is the same until something happens.
 QUIET = frozenset({State.IDLE, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
-#: A whole snapshot, with the memory, at least this often: a reader may begin at each of them.
+#: A whole snapshot, with the memory and the bay's rules, at least this often: a reader may begin at each of them.
 WHOLE_EVERY = 250
 
 
@@ -84,24 +86,29 @@ def session_fields(session: Session) -> dict[str, object]:
 class SnapshotRecorder:
     """Turns the steps of one bay into `snapshot` lines: whole now and then, else what differs from the line before.
 
-    In a quiet state nothing is written until something happens; then a whole line begins anew.
+    In a quiet state nothing is written until something happens; then a whole line begins anew. All that a step was
+    given is there: who takes it again comes to the same decision.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, bay: Bay) -> None:
+        self._config = json.loads(json.dumps(asdict(bay), default=str))
         self._last: Snapshot | None = None
         self._since_whole = 0
 
-    def line(self, snapshot: Snapshot, memory: Memory, before: Decision | None, now: Decision) -> Line | None:
-        """The line for a step that was taken with `snapshot` and `memory`; None where nothing needs to be said."""
-        same = before is not None and _gist(before) == _gist(now) and before.faults == now.faults
-        if same and now.state in QUIET and before is not None and before.state in QUIET and snapshot.request is None:
+    def line(self, now_s: float, snapshot: Snapshot, memory: Memory, state: State, *, news: bool) -> Line | None:
+        """The line for a step that was taken at `now_s` with `snapshot` and `memory`; None where nothing is to be said.
+
+        `state` is where the step has led, `news` is whether it gave `decision_lines`.
+        """
+        if state in QUIET and not news and snapshot.request is None:
             self._last = None
             return None
+        fields: dict[str, object] = {"at_s": now_s}
         if self._last is None or self._since_whole >= WHOLE_EVERY:
-            fields: dict[str, object] = {"whole": True, **asdict(snapshot), "memory": asdict(memory)}
+            fields |= {"whole": True, **asdict(snapshot), "memory": asdict(memory), "config": self._config}
             self._since_whole = 0
         else:
-            fields = _difference(self._last, snapshot)
+            fields |= _difference(self._last, snapshot)
             self._since_whole += 1
         self._last = snapshot
         return "snapshot", fields

@@ -202,7 +202,7 @@ def check(before: Memory, now_s: float, snapshot: Snapshot, decision: Decision, 
         assert shown.precharge is wanted.precharge
 
 
-@settings(max_examples=250, deadline=None)
+@settings(max_examples=250)
 @given(data=st.data(), control=st.sampled_from(ControlMode), state=states)
 def test_whatever_comes_it_decides_soberly(data: st.DataObject, control: ControlMode, state: State) -> None:
     world = beginning(state)
@@ -257,7 +257,7 @@ def all_well(world: World) -> None:
     world.shows.clear()
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(mischief=mischief)
 def test_whatever_happened_a_person_gets_it_charging_again(mischief: list[tuple[int, int]]) -> None:
     """No dead end, no livelock: all causes gone, a reset and a start later it charges."""

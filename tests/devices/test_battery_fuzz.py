@@ -25,7 +25,7 @@ FRAMES = st.tuples(
 RANGES: dict[str, FieldMap] = {field.name: field for entry in TABOS.objects for field in entry.fields}
 
 
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=600)
 @given(st.lists(FRAMES, max_size=60))
 def test_no_frame_makes_it_raise_and_every_value_shown_is_in_range(frames: list[tuple[int, bytes, float]]) -> None:
     bench = Bench(config(heartbeat_s=0.5, tpdo_s=0.1))
@@ -45,7 +45,7 @@ def test_no_frame_makes_it_raise_and_every_value_shown_is_in_range(frames: list[
 FATES = st.lists(st.tuples(st.floats(0.0, 1.2), st.sampled_from([1, 1, 1, 0, 2])), min_size=5, max_size=80)
 
 
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=600)
 @given(FATES)
 def test_a_word_is_never_shown_with_the_time_of_another_request(fates: list[tuple[float, int]]) -> None:
     """Every answer carries the number of its request, in the volts; what is shown must have been asked for then."""

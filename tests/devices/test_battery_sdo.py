@@ -124,7 +124,7 @@ DELAY_S = st.one_of(st.just(0.005), st.floats(0.0, LATEST_S))
 FATES = st.lists(st.tuples(DELAY_S, st.sampled_from([1, 1, 1, 0, 2, 3])), min_size=1, max_size=60)
 
 
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=600)
 @given(fates=FATES, objects=st.integers(1, 5), step_s=st.sampled_from([0.01, 0.1, 0.37]))
 def test_no_value_is_accepted_for_a_request_that_it_does_not_belong_to(
     fates: list[tuple[float, int]], objects: int, step_s: float

@@ -113,10 +113,10 @@ class Battery:
 class Bench:
     """A bay, its devices, and a journal that nobody writes: its lines wait in it."""
 
-    def __init__(self, directory: Path, memory: Memory | None = None) -> None:
+    def __init__(self, directory: Path, memory: Memory | None = None, max_mb: float = 1.0) -> None:
         self.charger, self.battery = Charger(), Battery()
         self.now_s = 1000.0
-        self.journal = Journal(directory, 1.0, lambda: self.now_s, time.time)
+        self.journal = Journal(directory, max_mb, lambda: self.now_s, time.time)
         self.bay = BayRunner(the_bay(), self.charger, self.battery, self.journal, memory or Memory())
 
     def step(self, count: int = 1) -> State:

@@ -34,8 +34,9 @@ from orchestrator.model import (
     Step,
 )
 from orchestrator.service.records import QUIET, WHOLE_EVERY, SnapshotRecorder, decision_lines
-from tests.service.bench import Bench
+from tests.service.bench import Bench, the_bay
 
+BAY = the_bay()
 IDLE = Decision(State.IDLE, "no battery")
 HOT = ActiveFault("hot_trip", Effect.TRIP, "the pack has 56.0 °C", 3.0)
 
@@ -122,10 +123,12 @@ def rebuilt(lines: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
     for line in lines:
         fields = json.loads(json.dumps(line))
         if fields.pop("whole", False):
-            fields.pop("memory")
+            for name in ("memory", "config", "at_s"):
+                fields.pop(name)
             snapshots.append(fields)
         else:
             battery = {**snapshots[-1]["battery"], **fields.pop("battery", {})}
+            fields.pop("at_s")
             snapshots.append({**snapshots[-1], **fields, "battery": battery})
     return snapshots
 
@@ -149,33 +152,36 @@ snapshots = st.builds(
 
 @given(st.lists(snapshots, max_size=12))
 def test_the_lines_are_enough_to_rebuild_every_snapshot(steps: list[Snapshot]) -> None:
-    recorder, lines = SnapshotRecorder(), []
-    charging = Decision(State.CHARGING, "")
+    recorder, lines = SnapshotRecorder(BAY), []
     for snapshot in steps:
-        line = recorder.line(snapshot, Memory(), charging, charging)
+        line = recorder.line(1.0, snapshot, Memory(), State.CHARGING, news=False)
         assert line is not None
         lines.append(line[1])
     assert rebuilt(lines) == [plain(snapshot) for snapshot in steps]
 
 
 def test_a_whole_line_with_the_memory_comes_now_and_then() -> None:
-    recorder = SnapshotRecorder()
-    charging = Decision(State.CHARGING, "")
-    lines = [recorder.line(Snapshot(), Memory(), charging, charging) for _ in range(2 * WHOLE_EVERY + 4)]
+    recorder = SnapshotRecorder(BAY)
+    lines = [
+        recorder.line(float(number), Snapshot(), Memory(), State.CHARGING, news=False)
+        for number in range(2 * WHOLE_EVERY + 4)
+    ]
     whole = [number for number, line in enumerate(lines) if line is not None and line[1].get("whole")]
     assert whole == [0, WHOLE_EVERY + 1, 2 * (WHOLE_EVERY + 1)]
     assert lines[0] is not None
-    assert "state" in json.loads(json.dumps(lines[0][1]))["memory"]
+    first = json.loads(json.dumps(lines[0][1]))
+    assert "state" in first["memory"]
+    assert first["config"]["policy"]["policy"] == "li-ion-48v"
+    assert [line[1]["at_s"] for line in lines if line is not None] == list(range(2 * WHOLE_EVERY + 4))
 
 
 def test_a_quiet_bay_says_nothing_until_something_happens() -> None:
-    recorder = SnapshotRecorder()
+    recorder = SnapshotRecorder(BAY)
     for state in QUIET:
-        quiet = Decision(state, "quiet")
-        assert recorder.line(Snapshot(), Memory(), quiet, quiet) is None
-    assert recorder.line(Snapshot(request=Request.START), Memory(), IDLE, IDLE) is not None
-    assert recorder.line(Snapshot(), Memory(), IDLE, IDLE) is None
-    line = recorder.line(Snapshot(), Memory(), IDLE, replace(IDLE, faults=(HOT,)))
+        assert recorder.line(1.0, Snapshot(), Memory(), state, news=False) is None
+    assert recorder.line(1.0, Snapshot(request=Request.START), Memory(), State.IDLE, news=False) is not None
+    assert recorder.line(1.0, Snapshot(), Memory(), State.IDLE, news=False) is None
+    line = recorder.line(1.0, Snapshot(), Memory(), State.IDLE, news=True)
     assert line is not None
     assert line[1]["whole"]
 

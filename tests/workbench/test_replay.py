@@ -1,0 +1,181 @@
+"""A journal, read back and decided again: the same decisions from the same rules, and what others would have been."""
+
+import gzip
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.config.load import load_policy
+from orchestrator.core import course
+from orchestrator.errors import ConfigError
+from orchestrator.model import Request, State
+from orchestrator.service.records import WHOLE_EVERY
+from orchestrator.workbench.otherwise import Difference, compare, told
+from orchestrator.workbench.recording import read
+from orchestrator.workbench.replay import again
+from tests.service.bench import STEP_S, Bench
+
+
+@pytest.fixture(name="journal", scope="module")
+def _journal(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A charge to full, with a cold hour in it, a pause and a quiet night behind it."""
+    bench = Bench(tmp_path_factory.mktemp("journal"), max_mb=100.0)
+
+    def pass_s(seconds: float) -> None:
+        for _ in range(round(seconds / STEP_S)):
+            bench.step()
+
+    pass_s(20)
+    for temperature_c in (17.0, 14.0, 11.0, 9.0):
+        bench.battery.values["temperature_c"] = temperature_c
+        pass_s(2)
+    pass_s(WHOLE_EVERY * STEP_S)
+    bench.ask(Request.PAUSE)
+    pass_s(5)
+    bench.ask(Request.START)
+    pass_s(10)
+    bench.battery.values["soc_pct"] = 91.0
+    pass_s(20)
+    bench.battery.values["soc_pct"] = 100.0
+    pass_s(20)
+    bench.ask(Request.STOP)
+    bench.journal._write()
+    return bench.journal._directory
+
+
+def differences(journal: Path, policy: str | Path) -> list[Difference]:
+    return compare(again(read([journal])["bay-1"]), load_policy(policy))
+
+
+def changed_policy(tmp_path: Path, *changes: tuple[str, str]) -> Path:
+    text = Path(__file__).parents[2].joinpath("policies", "li-ion-48v.yaml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path = tmp_path / "changed.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_same_rules_decide_the_same_bit_for_bit(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    taken = list(again(read([journal])["bay-1"]))
+    assert [one.wrong for one in taken if one.wrong] == []
+    states = {one.decision.state for one in taken}
+    assert {State.QUALIFYING, State.CHARGING, State.STOPPING, State.SUSPENDED, State.FULL} <= states
+    assert sum(one.recorded.memory is not None for one in taken) > 3, "the record begins anew after the quiet"
+    events = [event for one in taken for event in one.recorded.events]
+    written = (journal / "events.jsonl").read_text(encoding="utf-8").splitlines()
+    assert len(events) == len(written), "every line of the journal was compared"
+    assert main(["replay", str(journal)]) == 0
+    assert capsys.readouterr().out.endswith("taken again: all as recorded\n")
+
+
+def test_a_core_that_decides_otherwise_is_seen(
+    journal: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(course, "QUALIFY_S", 2.1)
+    assert main(["replay", str(journal)]) == 1
+    assert "the journal says ['transition', {'from': 'QUALIFYING'" in capsys.readouterr().out
+
+
+def test_a_value_that_was_altered_is_seen_in_the_memory(journal: Path, tmp_path: Path) -> None:
+    """Where the sentences do not show it, the memory that it leads to does."""
+    copy = tmp_path / "copy"
+    shutil.copytree(journal, copy)
+    (path,) = (one for one in copy.glob("snapshots*.jsonl") if '"voltage_v":48.0,"current_a":2.0' in one.read_text())
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('"voltage_v":48.0,"current_a":2.0', '"voltage_v":48.1,"current_a":2.0', 1))
+    wrong = [one.wrong for one in again(read([copy])["bay-1"]) if one.wrong]
+    assert any(text.startswith("memory.session was Session(") for text in wrong)
+
+
+def test_a_gentler_policy_is_told_with_both_lines(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = differences(journal, "long-life-48v")[0]
+    assert not first.parted
+    assert first.ah < 0
+    assert main(["replay", str(journal), "--policy", "long-life-48v"]) == 0
+    out = capsys.readouterr().out
+    assert "was  CHARGING: step 4 (14.0 A): the highest step" in out
+    assert "policies/long-life-48v.yaml:" in out
+    assert "Ah less, by a lower step" in out
+
+
+def test_a_policy_that_ends_earlier_parts_from_the_record(journal: Path, tmp_path: Path) -> None:
+    earlier = changed_policy(tmp_path, ("soc_pct: 100\n", "soc_pct: 90\n"), ("soc_below_pct: 98", "soc_below_pct: 90"),
+                             ("soc_below_pct: 95", "soc_below_pct: 80"))  # fmt: skip
+    found = [one for one in differences(journal, earlier) if one.was.state is State.CHARGING and one.parted]
+    (one,) = found
+    assert one.now.state is State.STOPPING
+    assert "SOC 91 % reached 90 %" in one.now.reason
+    assert one.ended_s - one.began_s > 10
+    assert "would not have been charged" in list(told(one))[-1]
+
+
+def test_a_policy_that_stops_for_cold_earlier_is_compared_anew_from_the_next_rest(
+    journal: Path, tmp_path: Path
+) -> None:
+    colder = changed_policy(tmp_path, ("temperature_c: [0, 45]", "temperature_c: [10, 45]"),
+                            ("- {from: 0, to: 10, step: 0} ", "- {from: 9, to: 10, step: 0} "))  # fmt: skip
+    found = differences(journal, colder)
+    assert (found[0].was.state, found[0].now.state) == (State.CHARGING, State.STOPPING)
+    assert "the limit is 10 °C" in found[0].now.reason
+    assert (found[1].was.state, found[1].now.state) == (State.QUALIFYING, State.SUSPENDED)
+
+
+def test_the_same_policy_differs_in_nothing(journal: Path) -> None:
+    assert differences(journal, "li-ion-48v") == []
+
+
+def gzipped(journal: Path, to: Path) -> None:
+    for path in journal.glob("*.jsonl"):
+        (to / f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes()))
+
+
+def test_files_may_be_named_and_gzipped(journal: Path, tmp_path: Path) -> None:
+    gzipped(journal, tmp_path)
+    assert main(["replay", *map(str, tmp_path.glob("*.gz"))]) == 0
+
+
+BROKEN: dict[str, tuple[Callable[[str], str], str]] = {
+    "no JSON": (lambda text: "{oh no\n" + text, ":1:1: error: this is no JSON; a journal has one object a line"),
+    "no line of ours": (lambda text: '{"a": 1}\n' + text, ":1:1: error: this is no line of a journal"),
+    "a text for a number": (lambda text: text.replace('"at_s":', '"at_s":"x","y":', 1), "this is no snapshot"),
+    "an unknown state": (lambda text: text.replace('"state":"STARTING"', '"state":"FLYING"', 1), "this is no snapshot"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_line_that_is_none_of_ours_is_named(name: str, journal: Path, tmp_path: Path) -> None:
+    spoil, said = BROKEN[name]
+    first = max(journal.glob("snapshots*.jsonl"), key=lambda path: path.name)
+    path = tmp_path / "snapshots.jsonl"
+    path.write_text(spoil(first.read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"snapshots\.jsonl:\d+:1: error: ") as caught:
+        read([path])
+    assert said in str(caught.value)
+
+
+def test_a_line_that_a_power_failure_cut_off_is_passed_over(journal: Path, tmp_path: Path) -> None:
+    path = tmp_path / "snapshots.jsonl"
+    text = (journal / "snapshots.jsonl").read_text(encoding="utf-8")
+    path.write_text(text[:-20], encoding="utf-8")
+    assert len(read([path])["bay-1"]) == len(text.splitlines()) - 1 - _continues(text)
+
+
+def _continues(text: str) -> int:
+    """How many lines at the beginning continue a file that is not there."""
+    lines = [json.loads(line) for line in text.splitlines()]
+    return next(number for number, line in enumerate(lines) if line.get("whole"))
+
+
+def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(tmp_path)]) == 1
+    assert "there is no journal here" in capsys.readouterr().err
+    assert main(["replay", str(journal), "--bay", "bay-9"]) == 1
+    assert "nothing is recorded of bay-9 (recorded: bay-1)" in capsys.readouterr().err
+    assert main(["replay", str(tmp_path / "nowhere.jsonl")]) == 1
+    assert "nowhere.jsonl:1:1: error: cannot be read: No such file or directory" in capsys.readouterr().err
