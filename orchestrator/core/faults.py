@@ -61,6 +61,8 @@ FAULTS: tuple[Row, ...] = (
     # what the charger reports
     Row("reverse_polarity", "C1", E.TRIP, Clear.RESET, reports.reverse_polarity, ALWAYS,
         "correct the battery's polarity, then reset", clean_s=5),
+    Row("polarity_contradicts", "C2", E.TRIP, Clear.RESET, reports.polarity_contradicts, ALWAYS,
+        "measure the battery's polarity; if that is right, the charger is defective; then reset", polls=2, clean_s=5),
     Row("error_stop", "C3", E.TRIP, Clear.RESET, reports.error_stop, ALWAYS,
         "look at the charger's own display and manual, then reset"),
     Row("system_stop", "C4", E.STOP, Clear.OPERATOR, reports.system_stop, ALWAYS,

@@ -182,6 +182,8 @@ QUIET_LINE = charger(error_bits=0, error_t_s=None)
 SCENES: tuple[Scene, ...] = (
     Scene("reverse_polarity", shows(connection=Connection.REVERSED), shows_truth, ("connection 0",), S.TRIPPED),
     Scene("reverse_polarity", shows(charge_mode=ChargeMode.REVERSED), shows_truth, ("mode 6",), S.TRIPPED),
+    Scene("polarity_contradicts", shows(charge_mode=ChargeMode.REVERSED), shows_truth, ("mode 6", "connection 1"),
+          S.TRIPPED, 0.5, anywhere=False),
     Scene("error_stop", shows(charge_mode=ChargeMode.ERROR_STOP), shows_truth, ("mode 8",), S.TRIPPED),
     Scene("system_stop", shows(charge_mode=ChargeMode.SYSTEM_STOP), shows_truth, ("mode 7",), S.IDLE),
     Scene("illegal_value", shows(charge_mode=None, illegal=(ILLEGAL,)), shows_truth, (ILLEGAL,), S.SUSPENDED, 0.5),

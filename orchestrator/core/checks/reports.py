@@ -21,6 +21,14 @@ def reverse_polarity(f: Facts) -> str | None:
     return None
 
 
+def polarity_contradicts(f: Facts) -> str | None:
+    """FAULTS C2: it stops as for a battery that is reversed; whether one is, only a look at the bay can say."""
+    reading = f.reading
+    if reading is None or reading.charge_mode is not ChargeMode.REVERSED or reading.connection is not Connection.NORMAL:
+        return None
+    return "the charger contradicts itself: mode 6 (battery reversed) with connection 1 (normal)"
+
+
 def error_stop(f: Facts) -> str | None:
     """FAULTS C3."""
     stopped = f.reading is not None and f.reading.charge_mode is ChargeMode.ERROR_STOP
