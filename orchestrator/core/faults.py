@@ -37,6 +37,8 @@ AT_WORK = ENERGISED | {State.QUALIFYING}
 UNSEEN = frozenset({State.STARTING, State.OFFLINE})
 QUALIFYING = frozenset({State.QUALIFYING})
 UNSTOPPED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
+#: A heartbeat, the NMT start that answers it, and the next heartbeat, at the longest period that can be asked for.
+NMT_OBEY_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,8 @@ FAULTS: tuple[Row, ...] = (
         "check the object map against this BMU, then reset"),
     Row("sdo_aborted", "B4", E.STOP, Clear.BACKOFF, battery.sdo_aborted, ALWAYS,
         "the BMU cannot answer now; if it stays so, restart it", for_s=0.5),
+    Row("not_operational", "B8", E.STOP, Clear.BACKOFF, battery.not_operational, ENERGISED,
+        "find out who else sends NMT commands on this bus", for_s=NMT_OBEY_S),
     Row("bmu_rebooted", "B7", E.STOP, Clear.BACKOFF, battery.bmu_rebooted, ENERGISED,
         "if it happens again, check the BMU's supply"),
     Row("status_trip", "B9", E.TRIP, Clear.RESET, battery.status_trip, ALWAYS,

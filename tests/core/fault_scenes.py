@@ -68,6 +68,13 @@ def ordered_to_run() -> World:
     return world
 
 
+def with_tpdos() -> World:
+    the_bay = bay()
+    world = World(replace(the_bay, battery=replace(the_bay.battery, tpdo_s=0.1)))
+    world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=1e9, nmt_state=5)
+    return world.charging()
+
+
 def beating() -> World:
     world = World()
     world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=1e9)
@@ -252,6 +259,8 @@ SCENES: tuple[Scene, ...] = (
           ("0x6004: device state",), S.SUSPENDED, 0.75),
     Scene("heartbeat_lost", lambda world: bmu(heartbeat_t_s=world.now_s)(world), bmu(heartbeat_t_s=1e9),
           ("no heartbeat", "1.5 s"), S.SUSPENDED, 1.5, begin=beating, anywhere=False),
+    Scene("not_operational", bmu(nmt_state=0x7F), bmu(nmt_state=5), ("pre-operational",), S.SUSPENDED, 4.25,
+          begin=with_tpdos, anywhere=False),
     Scene("bmu_rebooted", World.boot, nothing, ("booted while charging",), S.OFFLINE),
     Scene("status_trip", value(status=BIT[BatteryStatus.OVER_VOLTAGE]), AS_BEFORE, ("over voltage", "0x0001"),
           S.TRIPPED),
