@@ -111,6 +111,8 @@ FAULTS: tuple[Row, ...] = (
         "check that this BMU belongs to this charger's battery", for_s=1, clean_s=1),
     Row("amps_disagree", "B16", E.TRIP, Clear.RESET, pair.amps_disagree, ENERGISED,
         "check for loads on the battery and for a wrong node id, then reset", for_s=5),
+    Row("charger_frozen", "C20", E.STOP, Clear.BACKOFF, pair.charger_frozen, ENERGISED,
+        "switch the charger off and on again; if it comes back, replace it"),
     Row("back_feed", "C12", E.TRIP, Clear.RESET, pair.back_feed, ENERGISED,
         "check charger and wiring, then reset", for_s=2),
     # the battery

@@ -19,6 +19,17 @@ class FaultMemory:
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
 
 
+@dataclass(frozen=True, slots=True)
+class Still:
+    """What the charger has measured since `t_s` without any change, and what the BMU measured then."""
+
+    t_s: float
+    volts: float
+    amps: float
+    pack_v: float
+    pack_a: float
+
+
 @dataclass  # no slots: every step makes a copy, and a dict is copied four times as fast
 class Memory:
     """`step()` changes a copy of its own, never the one it was given."""
@@ -55,6 +66,10 @@ class Memory:
     idle_a_s: float | None = None  #: since when a running charger has delivered nothing
     mode_s: float = 0.0  #: since when the charger has shown its present mode …
     mode: int = 0  #: … which is this one
+    limit: int | None = None  #: the current-limit step that the charger shows …
+    limit_before: int | None = None  #: … the one that it showed before …
+    limit_s: float = 0.0  #: … and since when it shows this one
+    still: Still | None = None  #: the charger's measurements, for as long as they do not change
 
     def copy(self) -> "Memory":
         """An independent copy."""

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 from orchestrator.core.checks.battery import WARMING_S
 from orchestrator.core.checks.obedience import NO_CURRENT_A
+from orchestrator.core.checks.pair import STILL_ABOVE_A
 from orchestrator.core.facts import CHARGER_STALE_S, Facts
 from orchestrator.core.finish import tapers
+from orchestrator.core.memory import Still
 from orchestrator.model import ENERGISED, ChargeMode, Operation, Session, State
 
 #: How far apart the kept temperatures are.
@@ -24,6 +26,9 @@ def follow(f: Facts, last_s: float | None) -> None:
     memory.ran = memory.ran or (f.energised and running)
     if reading is not None and reading.charge_mode is not None and reading.charge_mode != memory.mode:
         memory.mode, memory.mode_s = int(reading.charge_mode), f.now_s
+    if reading is not None and reading.current_limit != memory.limit:
+        memory.limit_before, memory.limit, memory.limit_s = memory.limit, reading.current_limit, f.now_s
+    _follow_still(f)
     _follow_warmth(f)
     _follow_battery(f)
     _follow_session(f, last_s)
@@ -34,6 +39,15 @@ def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  #
     if not holds:
         return None
     return now_s if since_s is None else since_s
+
+
+def _follow_still(f: Facts) -> None:
+    """Since when the charger's volts and amps are the same to the last digit, while current flows."""
+    volts, amps, pack_v, pack_a, still = f.volts, f.amps, f.pack_v, f.pack_a, f.memory.still
+    if volts is None or amps is None or pack_v is None or pack_a is None or amps <= STILL_ABOVE_A:
+        f.memory.still = None
+    elif still is None or still.volts != volts or still.amps != amps:
+        f.memory.still = Still(f.now_s, volts, amps, pack_v, pack_a)
 
 
 def _follow_warmth(f: Facts) -> None:

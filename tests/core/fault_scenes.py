@@ -146,6 +146,16 @@ def thawed(world: World) -> None:
     world.frozen.clear()
 
 
+def still(**moved: float) -> Act:
+    """The charger goes on saying what it says now, whatever moves."""
+
+    def act(world: World) -> None:
+        world.shows |= {"voltage_v": world.reading.voltage_v, "current_a": world.reading.current_a}  # type: ignore[union-attr]  # it has been read
+        world.values.update(moved)
+
+    return act
+
+
 def starts_by_itself(world: World) -> None:
     world.charger.resting, world.charger.run = False, True
 
@@ -243,6 +253,8 @@ SCENES: tuple[Scene, ...] = (
           begin=qualifying, anywhere=False),
     Scene("amps_disagree", world_has(pack_amps=12.59), world_has(pack_amps=None), ("14.00 A", "12.59 A"), S.TRIPPED,
           5.25, anywhere=False),
+    Scene("charger_frozen", still(voltage_v=48.21), lambda world: (shows_truth(world), AS_BEFORE(world)),
+          ("48.00 V and 14.00 A for 60 s", "0.21 V"), S.UNCONTROLLABLE, 60.0, anywhere=False),
     Scene("back_feed", world_has(pack_amps=-0.51), world_has(pack_amps=None), ("0.51 A",), S.TRIPPED, 2.25),
     Scene("bmu_silent", world_has(battery_answers=False), world_has(battery_answers=True), ("node 16",),
           S.OFFLINE, 1.5),
