@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from orchestrator.core.checks import battery, charge, obedience, pair, reports
+from orchestrator.core.checks import battery, charge, obedience, pair, reports, state_of_charge
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import OBEY_STOP_S
 from orchestrator.model import ENERGISED, Effect, State
@@ -154,6 +154,18 @@ FAULTS: tuple[Row, ...] = (
         "use a policy with a precharge section", for_s=1, clean_s=5),
     Row("soh_low", "B17", E.NO_START, Clear.AUTO, battery.soh_low, ALWAYS,
         "the pack is worn out: replace it", clean_s=5),
+    Row("soc_jump", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_jump, ALWAYS,
+        "the BMU may have corrected itself; if it happens often, have it calibrated", clean_s=5),
+    Row("soc_falls", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_falls, ENERGISED,
+        "look for a load on the battery, and have the BMU calibrated", clean_s=60),
+    Row("figures_disagree", "B17", E.WARN, Clear.AUTO, state_of_charge.figures_disagree, ENERGISED,
+        "check the object map against this BMU, and have the BMU calibrated", for_s=300, clean_s=60),
+    Row("soc_not_believed", "B17", E.STOP, Clear.OPERATOR, state_of_charge.soc_not_believed, ENERGISED,
+        "have the BMU calibrated, then start"),
+    Row("battery_exchanged", "B18", E.STOP, Clear.OPERATOR, state_of_charge.battery_exchanged, ALWAYS,
+        "look which battery is in the bay, then start"),
+    Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, state_of_charge.wrong_policy, ALWAYS,
+        "this policy is for another pack: give the bay the policy of this battery", for_s=1, clean_s=5),
     # the charge
     Row("precharge_no_rise", "C15", E.TRIP, Clear.RESET, charge.precharge_no_rise, ENERGISED,
         "the pack may be defective: inspect it, then reset"),

@@ -2,7 +2,10 @@
 
 import pytest
 
+from orchestrator.core.checks import state_of_charge
+from orchestrator.core.facts import Facts
 from orchestrator.model import State
+from orchestrator.sim.pack import Pack
 from tests.core.bays import charging
 from tests.core.world import TICK_S, World
 
@@ -68,3 +71,54 @@ def test_a_step_up_excuses_nothing() -> None:
     world.amps = 15.8
     world.run(2 * TICK_S)
     assert "over_current" in world.raised
+
+
+def test_a_soc_that_creeps_is_not_doubted() -> None:
+    world = charging()
+    for soc in (50.0, 54.0, 55.0, 53.5):
+        world.values["soc_pct"] = soc
+        world.run(800, dt_s=1.0)
+    assert not fault_ids(world, 0)
+
+
+def test_a_battery_that_is_seen_to_leave_may_be_followed_by_any_other() -> None:
+    world = charging()
+    world.leave()
+    world.run(40)
+    world.arrive(soc_pct=90.0)
+    begin = len(world.decisions)
+    world.until(State.CHARGING)
+    assert "battery_exchanged" not in fault_ids(world, begin)
+    assert "soc_jump" not in fault_ids(world, begin)
+
+
+def test_a_bmu_that_was_not_heard_may_have_gone_on_counting() -> None:
+    world = charging()
+    world.battery_answers = False
+    world.run(600, dt_s=1.0)
+    world.arrive(soc_pct=70.0)
+    world.until(State.CHARGING)
+    assert "battery_exchanged" not in fault_ids(world, 0)
+
+
+@pytest.mark.parametrize("soh_pct", [60.0, 100.0])
+@pytest.mark.parametrize("amps", [2.0, 14.0])
+def test_the_figures_of_a_healthy_pack_agree_all_the_way_up(amps: float, soh_pct: float) -> None:
+    pack = Pack(soh_pct=soh_pct)
+    world = charging()
+    world.amps = amps
+    for soc_pct in range(1, 99):
+        pack.set_soc(soc_pct)
+        pack.advance(0.1, amps)
+        told = pack.readout()
+        assert told.time_to_full_min is not None
+        world.volts = None
+        world.values.update(
+            soc_pct=float(round(told.soc_pct)), voltage_v=told.voltage_v, remaining_ah=told.remaining_ah,
+            available_wh=told.available_wh, time_to_full_min=float(round(told.time_to_full_min)),
+        )  # fmt: skip
+        world.tick()
+        assert (
+            state_of_charge.figures_disagree(Facts(world.now_s, world.snapshot(None, ""), world.memory, world.rules))
+            is None
+        )
