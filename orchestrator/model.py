@@ -202,6 +202,10 @@ class Snapshot:
     battery_link: BatteryLink = BatteryLink()
     request: Request | None = None
     internal: str = ""  #: an exception of our own code, caught at the boundary, in words
+    late_s: float = 0.0  #: how much later than planned this step comes
+    slept_s: float = 0.0  #: how long the whole machine was suspended since the step before
+    unkept: str = ""  #: why faults that latch now would be forgotten by a restart, "" while they would not
+    ending: str = ""  #: why the service is about to end, "" while it is not
 
 
 class State(StrEnum):

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from orchestrator.core.checks import battery, charge, obedience, pair, reports, state_of_charge
+from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import OBEY_STOP_S
 from orchestrator.model import ENERGISED, Effect, State
@@ -176,8 +176,16 @@ FAULTS: tuple[Row, ...] = (
     Row("ah_limit", "C17", E.TRIP, Clear.RESET, charge.ah_limit, ENERGISED,
         "the pack took more than it holds: inspect it, check the policy's max_ah, then reset"),
     # ourselves
-    Row("internal", "G5", E.TRIP, Clear.RESET, charge.internal, ALWAYS,
+    Row("internal", "G5", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS,
         "this is a defect of the software: report it with the journal, then reset"),
+    Row("late", "G6", E.WARN, Clear.AUTO, ourselves.late, ALWAYS,
+        "find out what keeps this machine busy", clean_s=10),
+    Row("overrun", "G6", E.STOP, Clear.BACKOFF, ourselves.overrun, AT_WORK,
+        "find out what keeps this machine busy"),
+    Row("suspended", "G7", E.STOP, Clear.BACKOFF, ourselves.suspended, AT_WORK,
+        "a gateway must not be suspended: switch that off in its operating system"),
+    Row("unkept", "G8", E.NO_START, Clear.AUTO, ourselves.unkept, ALWAYS,
+        "make space, or mend the disk of the journal's directory", clean_s=10),
 )  # fmt: skip
 
 ROW = {row.id: row for row in FAULTS}

@@ -20,6 +20,8 @@ Line = tuple[str, dict[str, object]]  #: kind, fields
 
 #: States in which every step is the same until something happens.
 QUIET = frozenset({State.IDLE, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
+#: What of a snapshot is about this service.
+OURS = ("internal", "late_s", "slept_s", "unkept", "ending")
 #: A whole snapshot, with the memory, at least this often: a reader may begin at each of them.
 WHOLE_EVERY = 250
 
@@ -120,8 +122,9 @@ def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
         fields["battery_link"] = _plain(new.battery_link)
     if new.request is not old.request:
         fields["request"] = new.request
-    if new.internal != old.internal:
-        fields["internal"] = new.internal
+    for name in OURS:
+        if getattr(new, name) != getattr(old, name):
+            fields[name] = getattr(new, name)
     return fields
 
 

@@ -9,7 +9,7 @@ import signal
 from collections.abc import Callable, Mapping
 from functools import partial
 from queue import Empty, SimpleQueue
-from time import monotonic, time
+from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
 from types import FrameType
 
 from orchestrator.config.station import Bay, Rs485, Station
@@ -21,15 +21,13 @@ from orchestrator.errors import ServiceError
 from orchestrator.link.can import CanBus, load
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
-from orchestrator.service.bay import Asked, BayRunner
+from orchestrator.service.bay import TICK_S, Asked, BayRunner
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardedLine, GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.kept import read_kept
 from orchestrator.service.status import station_status
 
-#: A bay without news is looked at this often; what has gone stale is noticed within it.
-TICK_S = 0.2
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
@@ -107,13 +105,17 @@ class Supervisor:
     def _turn(self) -> None:
         """Wait for news, then step the bays that have some, and those that have been left alone for a tick."""
         for number in self._news():
-            self._bays[number].run(monotonic())
+            self._run(self._bays[number])
         now_s = monotonic()
         for bay in self._bays:
             if now_s - bay.last_s >= TICK_S:
-                bay.run(monotonic())
+                self._run(bay)
         if now_s - self._beat_s >= BEAT_S:
             self._beat(now_s)
+
+    def _run(self, bay: BayRunner) -> None:
+        now_s = monotonic()
+        bay.run(now_s, boottime() - now_s)
 
     def _beat(self, now_s: float) -> None:
         """Let the guardian know that every loop turns; without it, end."""
@@ -135,10 +137,10 @@ class Supervisor:
     def _end(self) -> int:
         """Stop every bay, wait until each charger is verified, close everything."""
         for bay in self._bays:
-            bay.end()
+            bay.end(self._ending)
         end_s = monotonic() + STOP_S
         for bay in self._bays:
-            bay.run(monotonic())
+            self._run(bay)
         while monotonic() < end_s and not all(bay.verified for bay in self._bays):
             self._turn()
         unverified = [bay.name for bay in self._bays if not bay.verified]
@@ -181,6 +183,11 @@ class Supervisor:
         end_s = monotonic() + ANSWER_S
         late = "the control loop has not answered: look at the service's log"
         return {name: one.answer if one.done.wait(end_s - monotonic()) else late for name, one in asked.items()}
+
+
+def boottime() -> float:
+    """As `monotonic`, but it goes on while the machine is suspended."""
+    return clock_gettime(CLOCK_BOOTTIME)
 
 
 def _names(value: object) -> list[object]:

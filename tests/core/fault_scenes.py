@@ -357,4 +357,9 @@ SCENES: tuple[Scene, ...] = (
           begin=with_policy(finish(max_ah=0.5)), anywhere=False, lapse=False),
     Scene("internal", world_has(internal="KeyError('x') in step, line 9"), nothing, ("KeyError('x')", "line 9"),
           S.TRIPPED),
+    Scene("late", world_has(ours={"late_s": 0.41}), world_has(ours={}), ("0.41 s late",), S.CHARGING),
+    Scene("overrun", world_has(ours={"late_s": 1.01}), world_has(ours={}), ("for 1.0 s",), S.SUSPENDED),
+    Scene("suspended", world_has(ours={"slept_s": 2.1}), world_has(ours={}), ("suspended for 2 s",), S.SUSPENDED),
+    Scene("unkept", world_has(ours={"unkept": "kept.json: No space left"}), world_has(ours={}), ("No space left",),
+          S.CHARGING),
 )  # fmt: skip

@@ -116,6 +116,7 @@ class Bench:
     def __init__(self, directory: Path, memory: Memory | None = None) -> None:
         self.charger, self.battery = Charger(), Battery()
         self.now_s = 1000.0
+        self.asleep_s = 0.0
         self.journal = Journal(directory, 1.0, lambda: self.now_s, time.time)
         self.bay = BayRunner(the_bay(), self.charger, self.battery, self.journal, memory or Memory())
 
@@ -125,7 +126,7 @@ class Bench:
             self.charger.pass_time(self.now_s)
             self.battery.now_s = self.now_s
             self.battery.values["current_a"] = self.charger.reading.current_a
-            self.bay.run(self.now_s)
+            self.bay.run(self.now_s, self.asleep_s)
         assert self.bay.decision is not None
         return self.bay.decision.state
 

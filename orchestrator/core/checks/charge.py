@@ -50,8 +50,3 @@ def ah_limit(f: Facts) -> str | None:
         f"{session.charged_ah:.2f} Ah were charged since SOC {begun_pct:.0f} %: a whole charge may take {max_ah:g} Ah "
         f"({at}), so from there {need * max_ah:.2f} Ah"
     )
-
-
-def internal(f: Facts) -> str | None:
-    """FAULTS G5."""
-    return f.snapshot.internal or None
