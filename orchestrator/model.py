@@ -112,7 +112,7 @@ class Sent:
 class ChargerLink:
     """How the line to a charger is doing."""
 
-    online: bool = False  #: it answered one of the last three polls
+    online: bool = False  #: it answered one of the last five polls
     problem: str = ""  #: why not, for a person: port, errno text, what to do
     misses: int = 0  #: polls in a row without an answer
     sent: Sent | None = None
@@ -121,6 +121,7 @@ class ChargerLink:
     error_bits: int = 0  #: of the newest 0x1F frame
     error_t_s: float | None = None  #: when that frame came
     bad_frames: int = 0  #: frames dropped since the port was opened: checksum, length, end
+    bad_pct: float = 0.0  #: of the last minute's polls, those without a good answer or with a complaint
 
 
 # --- the battery -----------------------------------------------------------------------------------------------------

@@ -39,7 +39,7 @@ STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 #: A binary fraction, so that a limit can be hit exactly.
 TICK_S = 0.25
 #: What the devices' layer calls silence.
-MISSES_UNTIL_SILENT = 3
+MISSES_UNTIL_SILENT = 5
 BMU_SILENT_S = 1.5
 
 
