@@ -76,6 +76,7 @@ class BayRunner:
         self._memory = memory
         self._kept: Kept | None = None
         self._ending = ""
+        self._offered: Bay | None = None  # with a policy that is not in force yet
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._snapshot = Snapshot()
@@ -92,6 +93,20 @@ class BayRunner:
     def end(self, why: str) -> None:
         """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it."""
         self._ending = f"the service ends: {why}"
+
+    def offer(self, bay: Bay | None) -> str:
+        """Take another policy over at the next standby; what will come of it. From any thread.
+
+        `bay` is this bay in the station file as it is now, None if it is not in there any more.
+        """
+        mine = self._rules.bay
+        if bay is None or replace(bay, policy=mine.policy) != mine:
+            return "the station file has changed here: only a restart of the service brings that into force"
+        if bay.policy.source == mine.policy.source:
+            self._offered = None
+            return f"{_shown(bay)} is unchanged"
+        self._offered = bay
+        return f"{_shown(bay)} comes into force when the bay stands by"
 
     def ask(self, asked: Asked) -> None:
         """Hand in an operator's request; it is answered by the next step."""
@@ -123,6 +138,7 @@ class BayRunner:
         self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
+        self._take_over()
         reading, charger_link = self._charger.view
         values, battery_link = self._battery.view
         late_s = now_s - self.last_s - TICK_S if self.decision else 0.0
@@ -151,6 +167,13 @@ class BayRunner:
             self._journal.put(self.name, line)
         self._keep()
 
+    def _take_over(self) -> None:
+        bay, decision = self._offered, self.decision
+        if bay is None or decision is None or not self.verified or decision.state is State.QUALIFYING:
+            return
+        self._offered, self._rules = None, Rules.of(bay)
+        self._journal.say(f"{self.name}: {_shown(bay)} is in force")
+
     def _keep(self) -> None:
         kept = Kept.of(self._memory)
         if self._ending and self._kept is not None:  # as it was before
@@ -172,4 +195,19 @@ class BayRunner:
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
         status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
-        return {**status, "port": str(Path(self._rules.bay.charger.port).absolute())}
+        bay, offered = self._rules.bay, self._offered
+        return {
+            **status,
+            "port": str(Path(bay.charger.port).absolute()),
+            "policy": {
+                "name": bay.policy.policy,
+                "file": bay.policy.source.file,
+                "sha256": bay.policy.source.digest,
+                "waiting_sha256": offered.policy.source.digest if offered else "",
+            },
+        }
+
+
+def _shown(bay: Bay) -> str:
+    source = bay.policy.source
+    return f"policy {bay.policy.policy} ({source.file}, sha256 {source.digest})"

@@ -26,6 +26,7 @@ from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardedLine, GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.kept import read_kept
+from orchestrator.service.reload import Reload
 from orchestrator.service.status import station_status
 
 #: How often the guardian hears that every loop turns: five times before it acts.
@@ -51,7 +52,9 @@ class Supervisor:
         self._buses: list[BatteryBus] = []
         self._bays: list[BayRunner] = []
         self._build()
-        self._control = ControlSocket(station.control.socket, self._answer, monotonic)
+        self._reload = Reload(station, self._bays, self._journal.say)
+        self._reload_asked = False
+        self._control = ControlSocket(station.control.socket, self._answer, monotonic, self._journal.say)
 
     def _build(self) -> None:
         """Devices for every bay; nothing is opened yet."""
@@ -77,12 +80,13 @@ class Supervisor:
         return (*self._ports, *self._buses)
 
     def run(self) -> int:
-        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1.
+        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1. SIGHUP: `Reload`.
 
         Without its guardian it ends, too, and with 1.
         """
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
+        signal.signal(signal.SIGHUP, self._on_hangup)
         self._journal.start()
         self._control.start()
         for port in self._ports:
@@ -102,10 +106,17 @@ class Supervisor:
         self._ending = self._ending or signal.Signals(number).name
         self._wake.put(None)
 
+    def _on_hangup(self, _number: int, _frame: FrameType | None) -> None:
+        self._reload_asked = True
+        self._wake.put(None)
+
     def _turn(self) -> None:
         """Wait for news, then step the bays that have some, and those that have been left alone for a tick."""
         for number in self._news():
             self._run(self._bays[number])
+        if self._reload_asked:
+            self._reload_asked = False
+            self._reload.ask()
         now_s = monotonic()
         for bay in self._bays:
             if now_s - bay.last_s >= TICK_S:

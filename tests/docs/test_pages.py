@@ -1,12 +1,42 @@
 """Pages that are made from the code are as the code is."""
 
+import re
 from pathlib import Path
 
-from tests.docs.fault_page import page
+from orchestrator.core.faults import FAULTS
+from tests.docs.catalogue import CATALOGUE
+from tests.docs.fault_page import page, rows_of
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
 
 
 def test_the_page_of_faults_is_the_table() -> None:
     written = (DOCS / "faults.md").read_text(encoding="utf-8")
     assert written == page(), "python -m tests.docs.fault_page > docs/faults.md"
+
+
+#: The catalogue, by its numbers.
+NUMBERS = [
+    *(f"C{number}" for number in range(1, 26)),
+    *(f"B{number}" for number in range(1, 23)),
+    *(f"G{number}" for number in range(1, 11)),
+    *(f"P{number}" for number in range(1, 8)),
+]
+
+
+def test_every_number_of_the_catalogue_is_handled_somewhere() -> None:
+    assert [entry.number for entry in CATALOGUE] == NUMBERS
+    nowhere = [entry.number for entry in CATALOGUE if not rows_of(entry.number) and not entry.also]
+    assert nowhere == []
+
+
+def test_every_row_comes_from_the_catalogue() -> None:
+    assert {number for row in FAULTS for number in row.source.split(", ")} <= set(NUMBERS)
+
+
+def test_the_places_that_are_named_are_there() -> None:
+    places = {place for entry in CATALOGUE for place in re.findall(r"`([a-z/_]+/[a-z_.]*)`", entry.also)}
+    assert len(places) > 10
+    missing = [place for place in places if not ((ROOT / "orchestrator" / place).exists() or (ROOT / place).exists())]
+    assert missing == []

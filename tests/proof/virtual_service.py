@@ -209,7 +209,9 @@ class World:
             supervisor_module: {
                 "monotonic": time.clock, "boottime": time.clock, "SimpleQueue": _Queues(time),
                 "Journal": Notebook, "ControlSocket": Silence,
-                "signal": SimpleNamespace(signal=lambda *_: None, SIGTERM=15, SIGINT=2, Signals=signal.Signals),
+                "signal": SimpleNamespace(
+                    signal=lambda *_: None, SIGTERM=15, SIGINT=2, SIGHUP=1, Signals=signal.Signals
+                ),
                 "read_kept": lambda _, names: {name: _Kept(self._kept.get(name, Memory())) for name in names},
             },
             bay_module: {"Event": event},

@@ -113,12 +113,12 @@ class Battery:
 class Bench:
     """A bay, its devices, and a journal that nobody writes: its lines wait in it."""
 
-    def __init__(self, directory: Path, memory: Memory | None = None) -> None:
+    def __init__(self, directory: Path, memory: Memory | None = None, bay: Bay | None = None) -> None:
         self.charger, self.battery = Charger(), Battery()
         self.now_s = 1000.0
         self.asleep_s = 0.0
         self.journal = Journal(directory, 1.0, lambda: self.now_s, time.time)
-        self.bay = BayRunner(the_bay(), self.charger, self.battery, self.journal, memory or Memory())
+        self.bay = BayRunner(bay or the_bay(), self.charger, self.battery, self.journal, memory or Memory())
 
     def step(self, count: int = 1) -> State:
         for _ in range(count):
