@@ -381,6 +381,7 @@ def test_a_hang_up_without_a_terminal_is_passed_on_and_ends_nothing(tmp_path: Pa
         guardian.waits_for("\n")
         guardian.process.send_signal(signal.SIGHUP)  # too early: it reads everything anew anyway
         guardian.beat()
+        guardian.beat()  # the first one has been dealt with
         guardian.process.send_signal(signal.SIGHUP)
         guardian.waits_for("hung up")
         guardian.beat()
