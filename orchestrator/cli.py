@@ -10,10 +10,13 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from orchestrator import __version__
 from orchestrator.errors import ConfigError, HexError, OrchestratorError
+
+if TYPE_CHECKING:
+    from orchestrator.config.station import Station
 
 
 class UsageError(OrchestratorError):
@@ -187,11 +190,27 @@ def _request(arguments: argparse.Namespace) -> int:
 
 def _check(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import check
+    from orchestrator.devices.bus_load import slow_buses
 
     findings = check(arguments.file)
     for finding in findings:
         print(finding, file=sys.stderr)
-    return 1 if findings else 0
+    if findings:
+        return 1
+    for station in filter(None, map(_station, arguments.file)):
+        for warning in slow_buses(station):
+            print(warning, file=sys.stderr)
+    return 0
+
+
+def _station(file: str) -> "Station | None":
+    """The station in a file; None where it is a policy or an object map."""
+    from orchestrator.config.load import load_station
+
+    try:
+        return load_station(file)
+    except ConfigError:
+        return None
 
 
 def _schema(arguments: argparse.Namespace) -> int:

@@ -60,6 +60,7 @@ class Source:
 
     file: str
     lines: Mapping[str, int] = field(default_factory=dict, hash=False)
+    digest: str = ""  #: the beginning of the file's SHA-256, as `sha256sum` shows it
 
     def at(self, path: str) -> str:
         """`FILE:LINE` of the key at `path`, or of its nearest written parent."""

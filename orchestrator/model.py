@@ -112,7 +112,7 @@ class Sent:
 class ChargerLink:
     """How the line to a charger is doing."""
 
-    online: bool = False  #: it answered one of the last three polls
+    online: bool = False  #: it answered one of the last five polls
     problem: str = ""  #: why not, for a person: port, errno text, what to do
     misses: int = 0  #: polls in a row without an answer
     sent: Sent | None = None
@@ -121,6 +121,7 @@ class ChargerLink:
     error_bits: int = 0  #: of the newest 0x1F frame
     error_t_s: float | None = None  #: when that frame came
     bad_frames: int = 0  #: frames dropped since the port was opened: checksum, length, end
+    bad_pct: float = 0.0  #: of the last minute's polls, those without a good answer or with a complaint
 
 
 # --- the battery -----------------------------------------------------------------------------------------------------
@@ -202,6 +203,10 @@ class Snapshot:
     battery_link: BatteryLink = BatteryLink()
     request: Request | None = None
     internal: str = ""  #: an exception of our own code, caught at the boundary, in words
+    late_s: float = 0.0  #: how much later than planned this step comes
+    slept_s: float = 0.0  #: how long the whole machine was suspended since the step before
+    unkept: str = ""  #: why faults that latch now would be forgotten by a restart, "" while they would not
+    ending: str = ""  #: why the service is about to end, "" while it is not
 
 
 class State(StrEnum):

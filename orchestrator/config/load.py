@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable
+from hashlib import sha256
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,6 +17,8 @@ from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
 
 T = TypeVar("T")
+#: So many hexadecimal digits tell two versions of a file apart.
+DIGEST = 12
 
 
 def load_station(path: str | Path) -> Station:
@@ -73,6 +76,7 @@ class _Loader:
         self.findings: list[Finding] = []
         self._shown = {os.path.realpath(one.path): one.shown for one in named}
         self._trees: dict[str, Node | None] = {}
+        self._digests: dict[str, str] = {}
         self._loaded: dict[tuple[str, str], object] = {}
 
     def check(self, where: Place) -> None:
@@ -111,7 +115,8 @@ class _Loader:
             Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),
             ObjectMap: lambda text: self.load(MAP, find(MAP, text, base)),
         }
-        reader = Reader(self._name(where), named if kind is STATION else {})
+        digest = self._digests[os.path.realpath(where.path)]
+        reader = Reader(self._name(where), named if kind is STATION else {}, digest)
         value = reader.read(kind.record, node)
         for path, text in kind.rules(reader.values):
             reader.report(path, text)
@@ -123,11 +128,13 @@ class _Loader:
         if real not in self._trees:
             try:
                 with where.path.open("rb") as stream:
-                    node, findings = parse(self._name(where), stream.read(MAX_BYTES + 1))
+                    text = stream.read(MAX_BYTES + 1)
+                self._digests[real] = sha256(text).hexdigest()[:DIGEST]
+                node, findings = parse(self._name(where), text)
             except OSError as error:
                 near = nearest_file(where.path) if isinstance(error, FileNotFoundError) else ""
-                text = f"cannot be read: {error.strerror}{near}"
-                node, findings = None, [Finding(self._name(where), 1, 1, text)]
+                why = f"cannot be read: {error.strerror}{near}"
+                node, findings = None, [Finding(self._name(where), 1, 1, why)]
             self.findings += findings
             self._trees[real] = node
         return self._trees[real]

@@ -37,12 +37,14 @@ class Reader:
     `INVALID` when they have reported a finding elsewhere and raise `UnfitError` for one at the name itself.
     """
 
-    def __init__(self, file: str, references: Mapping[type, Callable[[str], object]] | None = None) -> None:
+    def __init__(
+        self, file: str, references: Mapping[type, Callable[[str], object]] | None = None, digest: str = ""
+    ) -> None:
         self.findings: list[Finding] = []
         self.values: dict[str, object] = {}
         self.marks: dict[str, Mark] = {}
         self._lines: dict[str, int] = {}
-        self._file = file
+        self._file, self._digest = file, digest
         self._references = references or {}
 
     def report(self, path: str, text: str) -> None:
@@ -203,7 +205,7 @@ class Reader:
         if any(field.name == "source" for field in dataclasses.fields(record)):
             prefix = f"{path}." if path else ""
             lines = {at.removeprefix(prefix): line for at, line in self._lines.items() if at.startswith(prefix)}
-            values["source"] = Source(self._file, lines)
+            values["source"] = Source(self._file, lines, self._digest)
         return record(**values)
 
 

@@ -62,6 +62,7 @@ class Facts:
         "raised",
         "reading",
         "rules",
+        "slow_from_s",
         "snapshot",
         "soc",
         "soh",
@@ -84,6 +85,7 @@ class Facts:
         battery, boot_s = snapshot.battery, self.battery.boot_t_s
         settled_s = boot_s + SETTLE_S if boot_s is not None else -inf
         fast_s, slow_s = max(now_s - FAST_STALE_S, settled_s), max(now_s - SLOW_STALE_S, settled_s)
+        self.slow_from_s = slow_s
         self.pack_v = _fresh(battery.voltage_v, now_s, fast_s)
         self.pack_a = _fresh(battery.current_a, now_s, fast_s)
         self.status = _fresh(battery.status, now_s, fast_s)
@@ -94,6 +96,10 @@ class Facts:
         self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
         #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
         self.raised = {name for name, fault in memory.faults.items() if fault.raised_s is not None}
+
+    def slow(self, measurement: Measurement | None) -> float | None:
+        """A value of the slow objects that only few rows look at, if it may be relied on."""
+        return _fresh(measurement, self.now_s, self.slow_from_s)
 
     @property
     def silent(self) -> bool:

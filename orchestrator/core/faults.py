@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from orchestrator.core.checks import battery, charge, obedience, pair, reports
+from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import OBEY_STOP_S
 from orchestrator.model import ENERGISED, Effect, State
@@ -37,6 +37,8 @@ AT_WORK = ENERGISED | {State.QUALIFYING}
 UNSEEN = frozenset({State.STARTING, State.OFFLINE})
 QUALIFYING = frozenset({State.QUALIFYING})
 UNSTOPPED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
+#: A heartbeat, the NMT start that answers it, and the next heartbeat, at the longest period that can be asked for.
+NMT_OBEY_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,8 @@ FAULTS: tuple[Row, ...] = (
     # what the charger reports
     Row("reverse_polarity", "C1", E.TRIP, Clear.RESET, reports.reverse_polarity, ALWAYS,
         "correct the battery's polarity, then reset", clean_s=5),
+    Row("polarity_contradicts", "C2", E.TRIP, Clear.RESET, reports.polarity_contradicts, ALWAYS,
+        "measure the battery's polarity; if that is right, the charger is defective; then reset", polls=2, clean_s=5),
     Row("error_stop", "C3", E.TRIP, Clear.RESET, reports.error_stop, ALWAYS,
         "look at the charger's own display and manual, then reset"),
     Row("system_stop", "C4", E.STOP, Clear.OPERATOR, reports.system_stop, ALWAYS,
@@ -107,6 +111,8 @@ FAULTS: tuple[Row, ...] = (
         "check that this BMU belongs to this charger's battery", for_s=1, clean_s=1),
     Row("amps_disagree", "B16", E.TRIP, Clear.RESET, pair.amps_disagree, ENERGISED,
         "check for loads on the battery and for a wrong node id, then reset", for_s=5),
+    Row("charger_frozen", "C20", E.STOP, Clear.BACKOFF, pair.charger_frozen, ENERGISED,
+        "switch the charger off and on again; if it comes back, replace it"),
     Row("back_feed", "C12", E.TRIP, Clear.RESET, pair.back_feed, ENERGISED,
         "check charger and wiring, then reset", for_s=2),
     # the battery
@@ -120,6 +126,8 @@ FAULTS: tuple[Row, ...] = (
         "check the object map against this BMU, then reset"),
     Row("sdo_aborted", "B4", E.STOP, Clear.BACKOFF, battery.sdo_aborted, ALWAYS,
         "the BMU cannot answer now; if it stays so, restart it", for_s=0.5),
+    Row("not_operational", "B8", E.STOP, Clear.BACKOFF, battery.not_operational, ENERGISED,
+        "find out who else sends NMT commands on this bus", for_s=NMT_OBEY_S),
     Row("bmu_rebooted", "B7", E.STOP, Clear.BACKOFF, battery.bmu_rebooted, ENERGISED,
         "if it happens again, check the BMU's supply"),
     Row("status_trip", "B9", E.TRIP, Clear.RESET, battery.status_trip, ALWAYS,
@@ -146,6 +154,18 @@ FAULTS: tuple[Row, ...] = (
         "use a policy with a precharge section", for_s=1, clean_s=5),
     Row("soh_low", "B17", E.NO_START, Clear.AUTO, battery.soh_low, ALWAYS,
         "the pack is worn out: replace it", clean_s=5),
+    Row("soc_jump", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_jump, ALWAYS,
+        "the BMU may have corrected itself; if it happens often, have it calibrated", clean_s=5),
+    Row("soc_falls", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_falls, ENERGISED,
+        "look for a load on the battery, and have the BMU calibrated", clean_s=60),
+    Row("figures_disagree", "B17", E.WARN, Clear.AUTO, state_of_charge.figures_disagree, ENERGISED,
+        "check the object map against this BMU, and have the BMU calibrated", for_s=300, clean_s=60),
+    Row("soc_not_believed", "B17", E.STOP, Clear.OPERATOR, state_of_charge.soc_not_believed, ENERGISED,
+        "have the BMU calibrated, then start"),
+    Row("battery_exchanged", "B18", E.STOP, Clear.OPERATOR, state_of_charge.battery_exchanged, ALWAYS,
+        "look which battery is in the bay, then start"),
+    Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, state_of_charge.wrong_policy, ALWAYS,
+        "this policy is for another pack: give the bay the policy of this battery", for_s=1, clean_s=5),
     # the charge
     Row("precharge_no_rise", "C15", E.TRIP, Clear.RESET, charge.precharge_no_rise, ENERGISED,
         "the pack may be defective: inspect it, then reset"),
@@ -156,8 +176,16 @@ FAULTS: tuple[Row, ...] = (
     Row("ah_limit", "C17", E.TRIP, Clear.RESET, charge.ah_limit, ENERGISED,
         "the pack took more than it holds: inspect it, check the policy's max_ah, then reset"),
     # ourselves
-    Row("internal", "G5", E.TRIP, Clear.RESET, charge.internal, ALWAYS,
+    Row("internal", "G5", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS,
         "this is a defect of the software: report it with the journal, then reset"),
+    Row("late", "G6", E.WARN, Clear.AUTO, ourselves.late, ALWAYS,
+        "find out what keeps this machine busy", clean_s=10),
+    Row("overrun", "G6", E.STOP, Clear.BACKOFF, ourselves.overrun, AT_WORK,
+        "find out what keeps this machine busy"),
+    Row("suspended", "G7", E.STOP, Clear.BACKOFF, ourselves.suspended, AT_WORK,
+        "a gateway must not be suspended: switch that off in its operating system"),
+    Row("unkept", "G8", E.NO_START, Clear.AUTO, ourselves.unkept, ALWAYS,
+        "make space, or mend the disk of the journal's directory", clean_s=10),
 )  # fmt: skip
 
 ROW = {row.id: row for row in FAULTS}

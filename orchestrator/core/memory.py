@@ -19,6 +19,17 @@ class FaultMemory:
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
 
 
+@dataclass(frozen=True, slots=True)
+class Still:
+    """What the charger has measured since `t_s` without any change, and what the BMU measured then."""
+
+    t_s: float
+    volts: float
+    amps: float
+    pack_v: float
+    pack_a: float
+
+
 @dataclass  # no slots: every step makes a copy, and a dict is copied four times as fast
 class Memory:
     """`step()` changes a copy of its own, never the one it was given."""
@@ -29,6 +40,7 @@ class Memory:
     reason: str = "the service has just started"
     faults: dict[str, FaultMemory] = field(default_factory=dict)
     stop_reason: str = ""  #: why the last charge was stopped
+    resets: tuple[tuple[float, str], ...] = ()  #: (when, fault id) of a person's resets within the last hour
     hold: str = ""  #: why a person must start before the next charge; "" is free to go
     paused: bool = False  #: the operator paused the bay
     full_pct: float | None = None  #: the SOC at which this battery was charged full here; None: it was not, or it left
@@ -50,11 +62,19 @@ class Memory:
     mark_v: float = 0.0  #: … and the pack voltage then
     sample: tuple[float, float] | None = None  #: (t_s, °C), the newest …
     sample_before: tuple[float, float] | None = None  #: … and the one before
+    charge: tuple[float, float | None] = (0.0, None)  #: (t_s, SOC), the newest; None since this battery is here
+    charge_step: tuple[float, str] | None = None  #: when the SOC took a step that no charge explains, and which
+    exchange: tuple[float, str] | None = None  #: the same over a gap in which nobody could see the BMU
+    peak: tuple[float, float] | None = None  #: (t_s, SOC) of the highest SOC of the present run of the charger
     warmth: tuple[tuple[float, float], ...] = ()  #: (t_s, °C) of the last minutes, oldest first
     runs_s: float | None = None  #: since when the charger has reported that it runs, or delivers current
     idle_a_s: float | None = None  #: since when a running charger has delivered nothing
     mode_s: float = 0.0  #: since when the charger has shown its present mode …
     mode: int = 0  #: … which is this one
+    limit: int | None = None  #: the current-limit step that the charger shows …
+    limit_before: int | None = None  #: … the one that it showed before …
+    limit_s: float = 0.0  #: … and since when it shows this one
+    still: Still | None = None  #: the charger's measurements, for as long as they do not change
 
     def copy(self) -> "Memory":
         """An independent copy."""

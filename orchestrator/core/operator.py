@@ -7,6 +7,8 @@ from orchestrator.core.memory import Memory
 from orchestrator.model import Request, State
 
 STOPPED = "stopped by the operator; start to go on"
+#: So many resets of one fault are allowed within this time.
+MAX_RESETS, RESETS_S = 3, 3600.0
 RESET = "reset by the operator; start to go on"
 
 
@@ -39,12 +41,28 @@ def _start(memory: Memory, now_s: float) -> str:
 
 def _reset(memory: Memory, now_s: float) -> str:
     before = memory.faults
-    memory.faults, reasons = latches.release(before, now_s, by_reset=True)
+    faults, reasons = latches.release(before, now_s, by_reset=True)
+    cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
+    resets = tuple(reset for reset in memory.resets if now_s - reset[0] < RESETS_S)
+    reasons = reasons or [text for name in cleared if (text := _too_often(name, resets, now_s))]
     if reasons:
         return "; ".join(reasons)
+    memory.faults, memory.resets = faults, resets + tuple((now_s, name) for name in cleared)
     if len(memory.faults) < len(before):  # in whatever state: the way on is a start, also while the stop is verified
         memory.hold = RESET
     return ""
+
+
+def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> str:
+    """FAULTS P6: what comes again after every reset is not mended by resetting it."""
+    times = [t_s for t_s, fault in resets if fault == name]
+    if len(times) < MAX_RESETS:
+        return ""
+    minutes = (times[-MAX_RESETS] + RESETS_S - now_s) / 60
+    return (
+        f"{name} was reset {len(times)} times within an hour and came again each time: remove its cause; "
+        f"it can be reset again in {minutes:.0f} min"
+    )
 
 
 VERBS: dict[Request, Callable[[Memory, float], str]] = {

@@ -4,8 +4,16 @@ from dataclasses import replace
 
 from orchestrator.core.checks.battery import WARMING_S
 from orchestrator.core.checks.obedience import NO_CURRENT_A
-from orchestrator.core.facts import CHARGER_STALE_S, Facts
+from orchestrator.core.checks.pair import STILL_ABOVE_A
+from orchestrator.core.checks.state_of_charge import (
+    SOC_DRIFT_PCT_PER_S,
+    SOC_OTHER_PCT,
+    SOC_RATE_PCT_PER_S,
+    SOC_STEP_PCT,
+)
+from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S, Facts
 from orchestrator.core.finish import tapers
+from orchestrator.core.memory import Still
 from orchestrator.model import ENERGISED, ChargeMode, Operation, Session, State
 
 #: How far apart the kept temperatures are.
@@ -24,6 +32,10 @@ def follow(f: Facts, last_s: float | None) -> None:
     memory.ran = memory.ran or (f.energised and running)
     if reading is not None and reading.charge_mode is not None and reading.charge_mode != memory.mode:
         memory.mode, memory.mode_s = int(reading.charge_mode), f.now_s
+    if reading is not None and reading.current_limit != memory.limit:
+        memory.limit_before, memory.limit, memory.limit_s = memory.limit, reading.current_limit, f.now_s
+    _follow_still(f)
+    _follow_charge(f)
     _follow_warmth(f)
     _follow_battery(f)
     _follow_session(f, last_s)
@@ -34,6 +46,45 @@ def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  #
     if not holds:
         return None
     return now_s if since_s is None else since_s
+
+
+def _follow_still(f: Facts) -> None:
+    """Since when the charger's volts and amps are the same to the last digit, while current flows."""
+    volts, amps, pack_v, pack_a, still = f.volts, f.amps, f.pack_v, f.pack_a, f.memory.still
+    if volts is None or amps is None or pack_v is None or pack_a is None or amps <= STILL_ABOVE_A:
+        f.memory.still = None
+    elif still is None or still.volts != volts or still.amps != amps:
+        f.memory.still = Still(f.now_s, volts, amps, pack_v, pack_a)
+
+
+def _follow_charge(f: Facts) -> None:
+    """Steps of the SOC, and its highest value while current flows.
+
+    A battery that was seen to leave, or whose BMU boots, is forgotten: what comes is qualified as another one.
+    """
+    memory, newest = f.memory, f.snapshot.battery.soc_pct
+    memory.peak = _peak(f)
+    if f.departed or memory.boots != f.battery.boots:
+        memory.charge = (f.now_s, None)
+    before_s, before_pct = memory.charge
+    if newest is None or f.soc is None or newest.t_s <= before_s:
+        return
+    memory.charge = (newest.t_s, f.soc)
+    if before_pct is None:
+        return
+    gap_s, step_pct = newest.t_s - before_s, abs(f.soc - before_pct)
+    text = f"the SOC went from {before_pct:.0f} to {f.soc:.0f} % in {gap_s:.0f} s"
+    if gap_s <= SLOW_STALE_S and step_pct > SOC_STEP_PCT + SOC_RATE_PCT_PER_S * gap_s:
+        memory.charge_step = (f.now_s, text)
+    elif gap_s > SLOW_STALE_S and step_pct > SOC_OTHER_PCT + SOC_DRIFT_PCT_PER_S * gap_s:
+        memory.exchange = (f.now_s, text)
+
+
+def _peak(f: Facts) -> tuple[float, float] | None:
+    if f.soc is None or f.pack_a is None or f.pack_a <= STILL_ABOVE_A or not f.energised:
+        return None
+    peak = f.memory.peak
+    return peak if peak is not None and f.soc < peak[1] else (f.now_s, f.soc)
 
 
 def _follow_warmth(f: Facts) -> None:

@@ -209,6 +209,9 @@ class BatteryNode:
         elif data[0] == NmtState.BOOT_UP:
             self._booted(now_s)
         else:
+            self._setup.heard(data[0])
+            if self._setup.start_due:
+                self.next_due_s = now_s
             self._view.set(nmt_state=data[0])
             self._view.set(heartbeat_t_s=now_s, news=False)
 

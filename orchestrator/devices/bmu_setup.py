@@ -8,7 +8,7 @@ from math import inf
 
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.sdo_client import Key
-from orchestrator.protocol.sdo import write_request
+from orchestrator.protocol.sdo import NmtState, write_request
 
 HEARTBEAT: Key = (0x1017, 0)
 _TPDO_TIMER = 0x17FF  #: + the TPDO's number: 0x1800, 0x1801, 0x1802 (§2.5 has a misprint: 0x1082)
@@ -73,6 +73,11 @@ class BmuSetup:
         self._any_tpdo |= written and write.key != HEARTBEAT
         self.start_due = self._any_tpdo and not self._left
         return write
+
+    def heard(self, nmt_state: int) -> None:
+        """A heartbeat came. A node that is to send TPDOs is started again: the first start, which nobody confirms, was
+        lost, or somebody else's NMT command has stopped it."""
+        self.start_due |= self._any_tpdo and not self._left and nmt_state != NmtState.OPERATIONAL
 
     def watch(self, now_s: float, heartbeat_t_s: float) -> None:
         """The node answers: if its heartbeats do not come, write everything again."""

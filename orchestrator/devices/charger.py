@@ -13,7 +13,8 @@ from threading import Event, Lock, Thread
 from typing import Protocol
 
 from orchestrator.config.station import ChargerConfig, Limits
-from orchestrator.devices.dialogue import SILENCE, Dialogue
+from orchestrator.devices.dialogue import SILENCE, Dialogue, Heard
+from orchestrator.devices.line_quality import LineQuality
 from orchestrator.devices.schedule import Schedule, Turn
 from orchestrator.errors import LinkError
 from orchestrator.interlock import Grant, permit
@@ -22,7 +23,11 @@ from orchestrator.protocol.charger import OPERATION_STOP_FRAME, STOP_FRAME, enco
 
 #: The wire takes 20 ms, an FTDI adapter holds the last bytes back for 16 ms; the rest is the charger's.
 REPLY_DEADLINE_S = 0.12
-MISSES_UNTIL_SILENT = 3
+#: So many polls in a row without an answer are silence: with one frame in a hundred lost, three come every seven hours,
+#: five once in two years. Five take 1.12 s of the 2.0 s that a silent device may go on for (DESIGN §6).
+MISSES_UNTIL_SILENT = 5
+#: Answers that come late are no accident: what is asked for repeats after three, and a late one would pass for fresh.
+LATE_UNTIL_SILENT = 3
 #: Without a turn for so long the loop hangs: a write may take 0.2 s, a poll 0.12 s.
 STALL_S = 0.5
 REOPEN_S = 1.0
@@ -68,6 +73,7 @@ class ChargerPort:
         self._on_change = on_change
         self._line: Line | None = None
         self._dialogue = Dialogue()
+        self._quality = LineQuality()
         self._open_at_s = 0.0
         self._turn_s = 0.0
         self._view: tuple[ChargerReading | None, ChargerLink] = (
@@ -199,17 +205,21 @@ class ChargerPort:
         dialogue, link = self._dialogue, self._view[1]
         misses = 0 if reading else link.misses + 1
         problem = "" if reading else link.problem
-        if misses >= MISSES_UNTIL_SILENT:
+        silent = misses >= (LATE_UNTIL_SILENT if dialogue.heard is Heard.LATE_REPLY else MISSES_UNTIL_SILENT)
+        complained = dialogue.error_t_s != link.error_t_s
+        self._quality.count(self._clock(), bad=reading is None or complained)
+        if silent:
             problem = f"{self._config.port}: {SILENCE[dialogue.heard]}"
         self._publish(
             reading,
-            online=reading is not None or (link.online and misses < MISSES_UNTIL_SILENT),
+            online=reading is not None or (link.online and not silent),
             misses=misses,
             problem=problem,
             refused=refused,
             error_bits=dialogue.error_bits,
             error_t_s=dialogue.error_t_s,
             bad_frames=dialogue.bad_frames,
+            bad_pct=self._quality.bad_pct,
         )
 
     def _publish(self, reading: ChargerReading | None = None, **changes: object) -> None:

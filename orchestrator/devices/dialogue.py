@@ -22,7 +22,7 @@ from orchestrator.protocol.charger import (
 from orchestrator.protocol.frame import Frame, FrameDecoder
 
 _KIND1, _KIND2 = STATUS_KINDS
-#: Requests for 8, 9 and 10 values, in turn after each miss; three misses are silence.
+#: Requests for 8, 9 and 10 values, in turn after each miss.
 REQUESTS: tuple[Kinds, ...] = (
     STATUS_KINDS,
     (_KIND1 | Kind1.TEMPERATURE_1, _KIND2),

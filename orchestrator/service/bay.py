@@ -29,6 +29,8 @@ from orchestrator.service.kept import Kept
 from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.status import bay_status
 
+#: A bay without news is looked at this often; what has gone stale is noticed within it.
+TICK_S = 0.2
 #: The states that a charger was verified for: it stands by.
 VERIFIED = frozenset({State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE})
 
@@ -73,7 +75,9 @@ class BayRunner:
         self._rules = Rules.of(bay)
         self._memory = memory
         self._kept: Kept | None = None
-        self._ending = False
+        self._ending = ""
+        self._offered: Bay | None = None  # with a policy that is not in force yet
+        self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._snapshot = Snapshot()
         self._recorder = SnapshotRecorder(bay) if snapshots else None
@@ -86,20 +90,36 @@ class BayRunner:
         decision = self.decision
         return decision is not None and decision.state in VERIFIED and decision.command is None
 
-    def end(self) -> None:
+    def end(self, why: str) -> None:
         """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it."""
-        self._ending = True
-        self.ask(Asked(Request.STOP))
+        self._ending = f"the service ends: {why}"
+
+    def offer(self, bay: Bay | None) -> str:
+        """Take another policy over at the next standby; what will come of it. From any thread.
+
+        `bay` is this bay in the station file as it is now, None if it is not in there any more.
+        """
+        mine = self._rules.bay
+        if bay is None or replace(bay, policy=mine.policy) != mine:
+            return "the station file has changed here: only a restart of the service brings that into force"
+        if bay.policy.source == mine.policy.source:
+            self._offered = None
+            return f"{_shown(bay)} is unchanged"
+        self._offered = bay
+        return f"{_shown(bay)} comes into force when the bay stands by"
 
     def ask(self, asked: Asked) -> None:
         """Hand in an operator's request; it is answered by the next step."""
         self._asked.append(asked)
 
-    def run(self, now_s: float) -> None:
-        """Take one step. An exception of our own code stops the bay and is told to the next step."""
+    def run(self, now_s: float, asleep_s: float = 0.0) -> None:
+        """Take one step. An exception of our own code stops the bay and is told to the next step.
+
+        `asleep_s` is how long the machine has been suspended since it was switched on.
+        """
         asked = self._asked.pop(0) if self._asked else None
         try:
-            self._step(now_s, asked.request if asked else None)
+            self._step(now_s, asleep_s, asked.request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
             self._charger.order(STOP)
             self._failed(error, now_s)
@@ -117,10 +137,25 @@ class BayRunner:
         self._internal, self.last_s = internal, now_s
         self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
 
-    def _step(self, now_s: float, request: Request | None) -> None:
+    def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
+        self._take_over()
         reading, charger_link = self._charger.view
         values, battery_link = self._battery.view
-        snapshot = Snapshot(reading, charger_link, values, battery_link, request, self._internal)
+        late_s = now_s - self.last_s - TICK_S if self.decision else 0.0
+        slept_s = asleep_s - self._asleep_s if self.decision else 0.0
+        snapshot = Snapshot(
+            reading,
+            charger_link,
+            values,
+            battery_link,
+            request,
+            self._internal,
+            late_s=late_s if late_s > TICK_S else 0.0,  # less is how such a machine lives
+            slept_s=slept_s if slept_s > TICK_S else 0.0,
+            unkept=self._journal.unkept,
+            ending=self._ending,
+        )
+        self._asleep_s = asleep_s
         before, memory = self.decision, self._memory
         decision, self._memory = step(now_s, snapshot, memory, self._rules)
         self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
@@ -136,9 +171,18 @@ class BayRunner:
             self._journal.say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
         self._keep()
 
+    def _take_over(self) -> None:
+        bay, decision = self._offered, self.decision
+        if bay is None or decision is None or not self.verified or decision.state is State.QUALIFYING:
+            return
+        self._offered, self._rules = None, Rules.of(bay)
+        if self._recorder is not None:
+            self._recorder.begin(bay)
+        self._journal.say(f"{self.name}: {_shown(bay)} is in force")
+
     def _keep(self) -> None:
         kept = Kept.of(self._memory)
-        if self._ending and self._kept is not None:
+        if self._ending and self._kept is not None:  # as it was before
             kept = replace(kept, hold=self._kept.hold)
         if kept != self._kept:
             self._kept = kept
@@ -150,4 +194,19 @@ class BayRunner:
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
         status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
-        return {**status, "port": str(Path(self._rules.bay.charger.port).absolute())}
+        bay, offered = self._rules.bay, self._offered
+        return {
+            **status,
+            "port": str(Path(bay.charger.port).absolute()),
+            "policy": {
+                "name": bay.policy.policy,
+                "file": bay.policy.source.file,
+                "sha256": bay.policy.source.digest,
+                "waiting_sha256": offered.policy.source.digest if offered else "",
+            },
+        }
+
+
+def _shown(bay: Bay) -> str:
+    source = bay.policy.source
+    return f"policy {bay.policy.policy} ({source.file}, sha256 {source.digest})"

@@ -12,6 +12,7 @@ import struct
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from math import inf
 from pathlib import Path
 from time import sleep
 
@@ -27,6 +28,10 @@ STALL_S = 30.0
 #: What accept() says of a listener that was closed; after anything else it is worth another try, a little later.
 CLOSED = (errno.EINVAL, errno.EBADF)
 RETRY_S = 0.1
+#: After each client, so that no number of them takes more of the processor than fifty a second can.
+PAUSE_S = 0.02
+#: Strangers are counted, and said this often at most.
+SAY_S = 60.0
 
 Answer = Mapping[str, object]
 Handler = Callable[[Mapping[str, object]], Answer]
@@ -35,8 +40,11 @@ Handler = Callable[[Mapping[str, object]], Answer]
 class ControlSocket:
     """Listens on a Unix socket and answers each request with `handler`; its OrchestratorErrors become answers, too."""
 
-    def __init__(self, path: Path, handler: Handler, clock: Callable[[], float]) -> None:
-        self._path, self._handler, self._clock = path, handler, clock
+    def __init__(
+        self, path: Path, handler: Handler, clock: Callable[[], float], say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self._path, self._handler, self._clock, self._say = path, handler, clock, say
+        self._strangers, self._said_s = 0, -inf  # turned away since that was said last
         self._client_s: float | None = None  # since when a client is being served
         self._listener = _listen(path)
         self._thread = threading.Thread(target=self._run, name="control", daemon=True)
@@ -72,16 +80,34 @@ class ControlSocket:
                 client.settimeout(CLIENT_S)
                 client.sendall(answer)
             self._client_s = None
+            sleep(PAUSE_S)
 
     def _answer(self, client: socket.socket) -> Answer:
         try:
-            _check_peer(client)
+            self._check_peer(client)
             line = _read_line(client, self._clock)
             return {"ok": True, **self._handler(parse_request(line))}
         except OrchestratorError as error:
             return {"ok": False, "error": str(error)}
         except Exception as error:  # noqa: BLE001 - a request must never end the thread that answers them
             return {"ok": False, "error": f"internal: {error!r}"}
+
+    def _check_peer(self, client: socket.socket) -> None:
+        pid, uid, _ = peer(client)
+        if uid in (0, os.getuid()):
+            return
+        self._strangers += 1
+        now_s = self._clock()
+        if now_s - self._said_s >= SAY_S:
+            self._say(f"control socket: turned user {uid} away (process {pid}; {self._strangers} since last said)")
+            self._strangers, self._said_s = 0, now_s
+        raise ServiceError("only the owner of the service may use this socket")
+
+
+def peer(client: socket.socket) -> tuple[int, int, int]:
+    """Process, user and group at the other end."""
+    pid, uid, gid = struct.unpack("3i", client.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
+    return pid, uid, gid
 
 
 def parse_request(line: bytes) -> Mapping[str, object]:
@@ -105,12 +131,6 @@ def _read_line(client: socket.socket, clock: Callable[[], float]) -> bytes:
         if len(data) > MAX_REQUEST or not part:
             raise ServiceError(f"a request is one line of at most {MAX_REQUEST} bytes")
     return data
-
-
-def _check_peer(client: socket.socket) -> None:
-    _, uid, _ = struct.unpack("3i", client.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
-    if uid not in (0, os.getuid()):
-        raise ServiceError("only the owner of the service may use this socket")
 
 
 def _listen(path: Path) -> socket.socket:

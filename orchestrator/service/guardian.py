@@ -47,7 +47,7 @@ ACTED = 70
 MESSAGE = 4096
 CONTROLLER = ("-m", "orchestrator.service.controller")
 
-#: Whoever wants us to end: systemd or `kill`, Ctrl-C, the terminal that is closed, Ctrl-\.
+#: Whoever wants us to end: systemd or `kill`, Ctrl-C, the terminal that is closed (if there is one), Ctrl-\.
 ENDS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 #: Ctrl-Z and its like would freeze guardian and controller together, with the chargers running.
 FREEZES = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
@@ -72,6 +72,8 @@ class Guardian:
         for number in ENDS:
             if signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` stays what it is
                 signal.signal(number, self._pass_on)
+        if not has_terminal() and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+            signal.signal(signal.SIGHUP, self._pass_on_reload)
         self._reason = self._watch()
         if self._done or not self._ports:
             return self._status(END_S)
@@ -87,6 +89,11 @@ class Guardian:
         self._ending = True
         self._systemd.tell("STOPPING=1")
         self._signal(signal.SIGTERM)
+
+    def _pass_on_reload(self, _number: int, _frame: FrameType | None) -> None:
+        """The policies are to be read anew; a controller that has just been started reads them anyway."""
+        if self._ready:
+            self._signal(signal.SIGHUP)
 
     def _signal(self, number: signal.Signals) -> None:
         with contextlib.suppress(ProcessLookupError):
@@ -179,6 +186,15 @@ class Guardian:
             return end.si_status, f"has ended with status {end.si_status}"
         early = self._ending and not self._ports  # before it could take SIGTERM for anything but its end
         return 0 if early else ACTED, f"was ended by {signal.Signals(end.si_status).name}"
+
+
+def has_terminal() -> bool:
+    """Whether somebody started us from a terminal: its end is ours. To a service, SIGHUP means something else."""
+    try:
+        os.close(os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY))
+    except OSError:
+        return False
+    return True
 
 
 def _receive(link: socket.socket) -> tuple[bytes, list[int]]:

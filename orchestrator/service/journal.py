@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
-from orchestrator.service.kept import Kept, write_kept
+from orchestrator.service.kept import FILE, Kept, write_kept
 from orchestrator.service.records import Line
 from orchestrator.service.rotating import RotatingFile
 
@@ -44,6 +44,7 @@ class Journal:
         self._directory = directory
         self._kept: dict[str, Kept] = {}
         self._kept_changed = False
+        self._unkept = ""
         total = int(max_mb * 1_000_000)
         self._streams: dict[bool, tuple[RotatingFile, deque[bytes]]] = {
             False: (RotatingFile(directory, "events", int(total * EVENTS_SHARE)), deque()),
@@ -75,6 +76,11 @@ class Journal:
     def say(self, text: str) -> None:
         """A line for people, on standard error."""
         self._said.append(text)
+
+    @property
+    def unkept(self) -> str:
+        """Why what is kept now would be lost with a restart, for a person; "" while it would not be."""
+        return self._unkept
 
     def problem(self, now_s: float) -> str:
         """Why nothing is being written, for a person; "" while all is well."""
@@ -124,9 +130,11 @@ class Journal:
             self._kept_changed = False  # before it is read: a change from now on is written the next time
             try:
                 write_kept(self._directory, self._kept)
-            except OSError:
+            except OSError as error:
                 self._kept_changed = True
+                self._unkept = f"a restart would forget latched faults, {self._directory / FILE}: {error.strerror}"
                 raise
+            self._unkept = ""
 
     def _settle(self, problem: str) -> None:
         if problem != self._problem:

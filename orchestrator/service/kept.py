@@ -18,6 +18,7 @@ from orchestrator.model import ENERGISED, State
 FILE = "kept.json"
 #: In these a charger may be delivering current.
 RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
+NOBODY_KNOWS = "nobody knows which faults were latched; start to go on"
 UNFINISHED = "the last run of this service ended in mid-charge and did not verify the stop"
 
 
@@ -61,9 +62,11 @@ def read_kept(directory: Path, bays: Iterable[str]) -> dict[str, Kept]:
         document = json.loads(path.read_text(encoding="utf-8"))
         return {name: _kept(document.get(name, {})) for name in bays}
     except FileNotFoundError:
-        return {name: Kept() for name in bays}
+        ran = any(directory.glob("events*"))  # what is kept is written along with the first of them
+        lost = f"{path} is lost, though this service has run here before: {NOBODY_KNOWS}" if ran else ""
+        return {name: Kept(hold=lost) for name in bays}
     except (OSError, ValueError, TypeError, AttributeError) as error:
-        lost = f"{path} cannot be read ({error}): nobody knows which faults were latched; start to go on"
+        lost = f"{path} cannot be read ({error}): {NOBODY_KNOWS}"
         return {name: Kept(hold=lost) for name in bays}
 
 

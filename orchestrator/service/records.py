@@ -22,6 +22,8 @@ Line = tuple[str, dict[str, object]]  #: kind, fields
 
 #: States in which every step is the same until something happens.
 QUIET = frozenset({State.IDLE, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
+#: What of a snapshot is about this service.
+OURS = ("internal", "late_s", "slept_s", "unkept", "ending")
 #: A whole snapshot, with the memory and the bay's rules, at least this often: a reader may begin at each of them.
 WHOLE_EVERY = 250
 
@@ -91,9 +93,13 @@ class SnapshotRecorder:
     """
 
     def __init__(self, bay: Bay) -> None:
+        self._since_whole = 0
+        self.begin(bay)
+
+    def begin(self, bay: Bay) -> None:
+        """Begin anew with a whole line, by what is in force from now on."""
         self._config = json.loads(json.dumps(asdict(bay), default=str))
         self._last: Snapshot | None = None
-        self._since_whole = 0
 
     def line(self, now_s: float, snapshot: Snapshot, memory: Memory, state: State, *, news: bool) -> Line | None:
         """The line for a step that was taken at `now_s` with `snapshot` and `memory`; None where nothing is to be said.
@@ -127,8 +133,9 @@ def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
         fields["battery_link"] = _plain(new.battery_link)
     if new.request is not old.request:
         fields["request"] = new.request
-    if new.internal != old.internal:
-        fields["internal"] = new.internal
+    for name in OURS:
+        if getattr(new, name) != getattr(old, name):
+            fields[name] = getattr(new, name)
     return fields
 
 

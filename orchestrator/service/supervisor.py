@@ -9,7 +9,7 @@ import signal
 from collections.abc import Callable, Mapping
 from functools import partial
 from queue import Empty, SimpleQueue
-from time import monotonic, time
+from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
 from types import FrameType
 
 from orchestrator.config.station import Bay, Rs485, Station
@@ -21,15 +21,14 @@ from orchestrator.errors import ServiceError
 from orchestrator.link.can import CanBus, load
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
-from orchestrator.service.bay import Asked, BayRunner
+from orchestrator.service.bay import TICK_S, Asked, BayRunner
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardedLine, GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.kept import read_kept
+from orchestrator.service.reload import Reload
 from orchestrator.service.status import station_status
 
-#: A bay without news is looked at this often; what has gone stale is noticed within it.
-TICK_S = 0.2
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
@@ -53,7 +52,9 @@ class Supervisor:
         self._buses: list[BatteryBus] = []
         self._bays: list[BayRunner] = []
         self._build()
-        self._control = ControlSocket(station.control.socket, self._answer, monotonic)
+        self._reload = Reload(station, self._bays, self._journal.say)
+        self._reload_asked = False
+        self._control = ControlSocket(station.control.socket, self._answer, monotonic, self._journal.say)
 
     def _build(self) -> None:
         """Devices for every bay; nothing is opened yet."""
@@ -79,12 +80,13 @@ class Supervisor:
         return (*self._ports, *self._buses)
 
     def run(self) -> int:
-        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1.
+        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1. SIGHUP: `Reload`.
 
         Without its guardian it ends, too, and with 1.
         """
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
+        signal.signal(signal.SIGHUP, self._on_hangup)
         self._journal.start()
         self._control.start()
         for port in self._ports:
@@ -104,16 +106,27 @@ class Supervisor:
         self._ending = self._ending or signal.Signals(number).name
         self._wake.put(None)
 
+    def _on_hangup(self, _number: int, _frame: FrameType | None) -> None:
+        self._reload_asked = True
+        self._wake.put(None)
+
     def _turn(self) -> None:
         """Wait for news, then step the bays that have some, and those that have been left alone for a tick."""
         for number in self._news():
-            self._bays[number].run(monotonic())
+            self._run(self._bays[number])
+        if self._reload_asked:
+            self._reload_asked = False
+            self._reload.ask()
         now_s = monotonic()
         for bay in self._bays:
             if now_s - bay.last_s >= TICK_S:
-                bay.run(monotonic())
+                self._run(bay)
         if now_s - self._beat_s >= BEAT_S:
             self._beat(now_s)
+
+    def _run(self, bay: BayRunner) -> None:
+        now_s = monotonic()
+        bay.run(now_s, boottime() - now_s)
 
     def _beat(self, now_s: float) -> None:
         """Let the guardian know that every loop turns; without it, end."""
@@ -135,10 +148,10 @@ class Supervisor:
     def _end(self) -> int:
         """Stop every bay, wait until each charger is verified, close everything."""
         for bay in self._bays:
-            bay.end()
+            bay.end(self._ending)
         end_s = monotonic() + STOP_S
         for bay in self._bays:
-            bay.run(monotonic())
+            self._run(bay)
         while monotonic() < end_s and not all(bay.verified for bay in self._bays):
             self._turn()
         unverified = [bay.name for bay in self._bays if not bay.verified]
@@ -181,6 +194,11 @@ class Supervisor:
         end_s = monotonic() + ANSWER_S
         late = "the control loop has not answered: look at the service's log"
         return {name: one.answer if one.done.wait(end_s - monotonic()) else late for name, one in asked.items()}
+
+
+def boottime() -> float:
+    """As `monotonic`, but it goes on while the machine is suspended."""
+    return clock_gettime(CLOCK_BOOTTIME)
 
 
 def _names(value: object) -> list[object]:

@@ -46,7 +46,9 @@ def charging() -> World:
 
 def full() -> World:
     world = charging()
-    world.values["soc_pct"] = 100.0
+    for soc in range(55, 101, 5):
+        world.values["soc_pct"] = float(soc)
+        world.tick()
     world.until(S.FULL)
     return world
 

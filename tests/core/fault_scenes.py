@@ -38,6 +38,10 @@ def warm(celsius: float) -> Callable[[], World]:
     return lambda: World(temperature_c=celsius).charging()
 
 
+def nearly_at_90() -> World:
+    return World(soc_pct=88.0).charging()
+
+
 def hot() -> World:
     """Where a pack may have 56 °C, so that the trip comes before the pause."""
     policy = replace(POLICY, pack=replace(POLICY.pack, temperature_c=Range(0, 56)))
@@ -68,6 +72,13 @@ def ordered_to_run() -> World:
     return world
 
 
+def with_tpdos() -> World:
+    the_bay = bay()
+    world = World(replace(the_bay, battery=replace(the_bay.battery, tpdo_s=0.1)))
+    world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=1e9, nmt_state=5)
+    return world.charging()
+
+
 def beating() -> World:
     world = World()
     world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=1e9)
@@ -83,6 +94,10 @@ def shows(**values: object) -> Act:
 
 def value(**values: float) -> Act:
     return lambda world: world.values.update(values)
+
+
+def world_without(*names: str) -> Act:
+    return lambda world: world.values.update(dict.fromkeys(names))
 
 
 def bmu(**changes: object) -> Act:
@@ -139,6 +154,37 @@ def thawed(world: World) -> None:
     world.frozen.clear()
 
 
+def still(**moved: float) -> Act:
+    """The charger goes on saying what it says now, whatever moves."""
+
+    def act(world: World) -> None:
+        world.shows |= {"voltage_v": world.reading.voltage_v, "current_a": world.reading.current_a}  # type: ignore[union-attr]  # it has been read
+        world.values.update(moved)
+
+    return act
+
+
+def measures_again(world: World) -> None:
+    world.shows.clear()
+    AS_BEFORE(world)
+
+
+def waits(seconds: float) -> Act:
+    return lambda world: world.run(seconds, dt_s=1.0)
+
+
+def returns_as_another(world: World) -> None:
+    """The BMU falls silent, and one that answers in its place has another SOC; the charger saw nothing of it."""
+    world.battery_answers = False
+    world.run(5)
+    world.arrive(soc_pct=80.0)
+
+
+def falls_with_odd_figures(world: World) -> None:
+    value(remaining_ah=10.0, available_wh=100.0, soc_pct=48.0)(world)
+    world.run(899.75, dt_s=0.25)
+
+
 def starts_by_itself(world: World) -> None:
     world.charger.resting, world.charger.run = False, True
 
@@ -176,12 +222,15 @@ PACK_V, SOH = POLICY.source.at("pack.voltage_v"), POLICY.source.at("pack.soh_min
 BIT = {bit: float(1 << bit) for bit in BatteryStatus}
 NO_PRECHARGE = replace(POLICY, precharge=None)
 AS_BEFORE = value(temperature_c=20.0, voltage_v=48.0, status=0.0, soc_pct=50.0, soh_pct=100.0)
+NO_FIGURES = world_without("remaining_ah", "available_wh", "time_to_full_min")
 QUIET_LINE = charger(error_bits=0, error_t_s=None)
 
 
 SCENES: tuple[Scene, ...] = (
     Scene("reverse_polarity", shows(connection=Connection.REVERSED), shows_truth, ("connection 0",), S.TRIPPED),
     Scene("reverse_polarity", shows(charge_mode=ChargeMode.REVERSED), shows_truth, ("mode 6",), S.TRIPPED),
+    Scene("polarity_contradicts", shows(charge_mode=ChargeMode.REVERSED), shows_truth, ("mode 6", "connection 1"),
+          S.TRIPPED, 0.5, anywhere=False),
     Scene("error_stop", shows(charge_mode=ChargeMode.ERROR_STOP), shows_truth, ("mode 8",), S.TRIPPED),
     Scene("system_stop", shows(charge_mode=ChargeMode.SYSTEM_STOP), shows_truth, ("mode 7",), S.IDLE),
     Scene("illegal_value", shows(charge_mode=None, illegal=(ILLEGAL,)), shows_truth, (ILLEGAL,), S.SUSPENDED, 0.5),
@@ -189,11 +238,9 @@ SCENES: tuple[Scene, ...] = (
           ("automatic mode", "says manual"), S.IDLE, 0.5),
     Scene("rejected_frame", error_frame(ErrorBit.COMMAND), QUIET_LINE, ("0x1F", "wrong command"), S.TRIPPED),
     Scene("rejected_frame", error_frame(ErrorBit.ORDER), QUIET_LINE, ("0x1F", "wrong order"), S.TRIPPED),
-    Scene("noisy_line", error_frame(ErrorBit.LENGTH), QUIET_LINE, ("0x1F", "wrong length"), S.CHARGING),
-    Scene("noisy_line", error_frame(ErrorBit.CHECKSUM | ErrorBit.COMMAND), QUIET_LINE,
-          ("0x1F", "command and checksum"), S.CHARGING),
+    Scene("noisy_line", charger(bad_pct=5.1), charger(bad_pct=5.0), ("5 % of the last minute",), S.CHARGING),
     Scene("charger_silent", world_has(charger_answers=False), world_has(charger_answers=True),
-          ("/dev/ttyX: no answer",), S.UNCONTROLLABLE, 0.75),
+          ("/dev/ttyX: no answer",), S.UNCONTROLLABLE, 1.25),
     Scene("charger_silent", world_has(port_hangs=True), world_has(port_hangs=False),
           ("/dev/ttyX has sent no status for 1.5 s",), S.UNCONTROLLABLE, 1.75),
     Scene("charger_silent", charger(online=False, problem="/dev/ttyX: Input/output error"),
@@ -209,7 +256,7 @@ SCENES: tuple[Scene, ...] = (
           anywhere=False, lapse=False),
     Scene("stopped_by_itself", stops_by_itself, nothing, ("stopped though",), S.IDLE, 0.5, lapse=False),
     Scene("setting_not_obeyed", deaf(Action.SET_LIMIT, temperature_c=16.0, soc_pct=90.0), hears,
-          ("told 'limit 2' for 5.0 s",), S.TRIPPED, 5.25, anywhere=False, lapse=False),
+          ("told 'limit 2' for 5.0 s",), S.TRIPPED, 5.25, begin=nearly_at_90, anywhere=False, lapse=False),
     Scene("setting_not_obeyed", shows(charge_mode=ChargeMode.PRECHARGE), shows_truth, ("told 'mode 4'",), S.TRIPPED,
           5.25, anywhere=False, lapse=False),
     Scene("setting_not_obeyed", shows(precharge=Precharge.OFF), shows_truth, ("told 'precharge 1'",), S.TRIPPED, 5.25,
@@ -234,6 +281,8 @@ SCENES: tuple[Scene, ...] = (
           begin=qualifying, anywhere=False),
     Scene("amps_disagree", world_has(pack_amps=12.59), world_has(pack_amps=None), ("14.00 A", "12.59 A"), S.TRIPPED,
           5.25, anywhere=False),
+    Scene("charger_frozen", still(voltage_v=48.21), measures_again,
+          ("48.00 V and 14.00 A for 60 s", "0.21 V"), S.UNCONTROLLABLE, 60.0, anywhere=False),
     Scene("back_feed", world_has(pack_amps=-0.51), world_has(pack_amps=None), ("0.51 A",), S.TRIPPED, 2.25),
     Scene("bmu_silent", world_has(battery_answers=False), world_has(battery_answers=True), ("node 16",),
           S.OFFLINE, 1.5),
@@ -250,6 +299,8 @@ SCENES: tuple[Scene, ...] = (
           ("0x6004: device state",), S.SUSPENDED, 0.75),
     Scene("heartbeat_lost", lambda world: bmu(heartbeat_t_s=world.now_s)(world), bmu(heartbeat_t_s=1e9),
           ("no heartbeat", "1.5 s"), S.SUSPENDED, 1.5, begin=beating, anywhere=False),
+    Scene("not_operational", bmu(nmt_state=0x7F), bmu(nmt_state=5), ("pre-operational",), S.SUSPENDED, 4.25,
+          begin=with_tpdos, anywhere=False),
     Scene("bmu_rebooted", World.boot, nothing, ("booted while charging",), S.OFFLINE),
     Scene("status_trip", value(status=BIT[BatteryStatus.OVER_VOLTAGE]), AS_BEFORE, ("over voltage", "0x0001"),
           S.TRIPPED),
@@ -282,14 +333,31 @@ SCENES: tuple[Scene, ...] = (
     Scene("needs_precharge", value(status=BIT[BatteryStatus.LOW_VOLTAGE]), AS_BEFORE, ("no precharge",), S.CHARGING,
           1.25, begin=with_policy(NO_PRECHARGE), anywhere=False),
     Scene("soh_low", value(soh_pct=59.0), AS_BEFORE, ("59 %", "60 %", SOH), S.CHARGING),
+    Scene("soc_jump", value(soc_pct=56.0), waits(900), ("from 50 to 56 % in 0 s",), S.CHARGING, anywhere=False),
+    Scene("soc_falls", value(soc_pct=48.0), AS_BEFORE, ("from 50 to 48 % in 15 min",), S.CHARGING, 900.0,
+          anywhere=False),
+    Scene("figures_disagree", value(remaining_ah=10.0, available_wh=100.0), NO_FIGURES,
+          ("10.00 Ah and 100.0 Wh", "10.0 V", "48.00 V"), S.CHARGING, 300.25, anywhere=False),
+    Scene("figures_disagree", value(remaining_ah=10.0, time_to_full_min=150.0), NO_FIGURES,
+          ("full in 150 min", "35.0 Ah", "10.0 Ah"), S.CHARGING, 300.25, anywhere=False),
+    Scene("soc_not_believed", falls_with_odd_figures, NO_FIGURES, ("fallen from 50 to 48 %", "10.00 Ah"), S.IDLE, 0.5,
+          anywhere=False, lapse=False),
+    Scene("battery_exchanged", returns_as_another, nothing, ("from 50 to 80 % in 5 s",), S.IDLE, anywhere=False),
+    Scene("wrong_policy", value(voltage_v=38.99, soc_pct=51.0), AS_BEFORE, ("38.99 V at SOC 51 %", "39 V", "13 cells"),
+          S.CHARGING, 1.25, anywhere=False),
     Scene("precharge_no_rise", value(voltage_v=33.29), value(voltage_v=34.0), ("0.29 V in 5.0 min", "0.3 V"),
           S.TRIPPED, 299.0, begin=pulse, anywhere=False),
     Scene("precharge_too_long", nothing, nothing, ("4.0 min", "39 V"), S.TRIPPED, 240.0, begin=short_continuous,
           anywhere=False, lapse=False),
     Scene("time_limit", nothing, nothing, ("0.10 h",), S.TRIPPED, 359.25, begin=with_policy(finish(max_hours=0.1)),
           anywhere=False, lapse=False),
-    Scene("ah_limit", nothing, nothing, ("0.50 Ah",), S.TRIPPED, 128.5, begin=with_policy(finish(max_ah=0.5)),
-          anywhere=False, lapse=False),
+    Scene("ah_limit", nothing, nothing, ("0.35 Ah", "since SOC 50 %", "0.5 Ah"), S.TRIPPED, 90.0,
+          begin=with_policy(finish(max_ah=0.5)), anywhere=False, lapse=False),
     Scene("internal", world_has(internal="KeyError('x') in step, line 9"), nothing, ("KeyError('x')", "line 9"),
           S.TRIPPED),
+    Scene("late", world_has(ours={"late_s": 0.41}), world_has(ours={}), ("0.41 s late",), S.CHARGING),
+    Scene("overrun", world_has(ours={"late_s": 1.01}), world_has(ours={}), ("for 1.0 s",), S.SUSPENDED),
+    Scene("suspended", world_has(ours={"slept_s": 2.1}), world_has(ours={}), ("suspended for 2 s",), S.SUSPENDED),
+    Scene("unkept", world_has(ours={"unkept": "kept.json: No space left"}), world_has(ours={}), ("No space left",),
+          S.CHARGING),
 )  # fmt: skip

@@ -38,7 +38,7 @@ from tests.core.world import bay
 TICK_S = 0.1
 #: An exchange with the charger, from the request's first byte to the answer.
 EXCHANGE_S = 0.03
-MISSES_UNTIL_SILENT = 3
+MISSES_UNTIL_SILENT = 5
 BMU_SILENT_S = 1.5
 PUSHES = {
     Action.SET_LIMIT: Push.CURRENT_LIMIT,

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from orchestrator.core.checks import battery, charge, obedience, pair, reports
+from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.model import ENERGISED, STOP, Effect, Request, State
@@ -48,7 +48,7 @@ def test_the_rows_are_one_each() -> None:
 
 
 def test_every_predicate_is_in_the_table_and_says_where_it_comes_from() -> None:
-    modules = (battery, charge, obedience, pair, reports)
+    modules = (battery, charge, obedience, ourselves, pair, reports, state_of_charge)
     predicates = {
         function
         for module in modules

@@ -307,3 +307,48 @@ def test_a_fault_is_followed_in_states_in_which_it_is_not_looked_for(again: Stat
     world.until(again)
     assert "charger_silent" in world.raised
     assert world.memory.faults["charger_silent"].clean_s is None
+
+
+# --- resets without a remedy ------------------------------------------------------------------------------------------
+
+
+def trip_and_reset(world: World, **trips: float) -> str:
+    """By a broken sensor, if by nothing else."""
+    world.values.update(trips)
+    world.battery_link = replace(world.battery_link, implausible={} if trips else {"temperature_c": "3276.7 °C"})
+    world.run(2)
+    world.battery_link = replace(world.battery_link, implausible={})
+    world.values["status"] = 0.0
+    world.run(8)
+    assert world.is_in(State.TRIPPED)
+    return world.ask(Request.RESET)
+
+
+def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:
+    world = charging()
+    for _ in range(3):
+        assert trip_and_reset(world) == ""
+        world.run(590, dt_s=1.0)
+    refused = trip_and_reset(world)
+    assert "temperature_invalid was reset 3 times within an hour" in refused
+    assert "reset again in 30 min" in refused
+    assert world.is_in(State.TRIPPED)
+    assert "temperature_invalid is latched" in world.ask(Request.START)
+    world.run(1795, dt_s=1.0)
+    assert world.ask(Request.RESET) != ""
+    world.run(30)
+    assert world.ask(Request.RESET) == ""
+
+
+def test_resets_are_counted_for_each_fault() -> None:
+    world = charging()
+    for _ in range(3):
+        assert trip_and_reset(world) == ""
+    assert trip_and_reset(world, status=64.0) == ""
+    assert trip_and_reset(world) != ""
+
+
+def test_a_reset_of_nothing_counts_for_nothing() -> None:
+    world = idle()
+    for _ in range(9):
+        assert world.ask(Request.RESET) == ""

@@ -196,7 +196,7 @@ def test_a_fault_that_limits_means_the_lowest_step_and_is_named() -> None:
 
 def test_a_warning_does_not_limit() -> None:
     world = charging()
-    world.charger_link = replace(world.charger_link, error_bits=8, error_t_s=world.now_s)
+    world.charger_link = replace(world.charger_link, bad_pct=9.0)
     world.run(1)
     assert set(world.raised) == {"noisy_line"}
     assert index(world) == 4

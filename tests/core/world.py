@@ -39,7 +39,7 @@ STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 #: A binary fraction, so that a limit can be hit exactly.
 TICK_S = 0.25
 #: What the devices' layer calls silence.
-MISSES_UNTIL_SILENT = 3
+MISSES_UNTIL_SILENT = 5
 BMU_SILENT_S = 1.5
 
 
@@ -124,6 +124,7 @@ class World:
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
         self.internal = ""  #: an exception of our own, for one tick
+        self.ours: dict[str, Any] = {}  #: what else the service says of itself
         self.decisions: list[Decision] = []
 
     @property
@@ -220,6 +221,7 @@ class World:
             battery_link=replace(self.battery_link, online=self.battery_link.online and not silent),
             request=request,
             internal=internal,
+            **self.ours,
         )
 
     def _line(self) -> ChargerLink:

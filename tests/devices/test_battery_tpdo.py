@@ -1,5 +1,7 @@
 """Readings by TPDO: configured, decoded, compared with SDO reads, and done without when they stay away."""
 
+import pytest
+
 from orchestrator.model import Measurement
 from tests.devices.bmu_bench import HEARTBEAT, REPLY, REQUEST, RX, TX, WORDS, Bench, Dialogue, config
 
@@ -54,6 +56,27 @@ def test_all_is_configured_again_after_a_boot() -> None:
     bench.hear(HEARTBEAT, "00")
     bench.play(SET_UP[2:])  # type: ignore[index]  # it is a list
     assert bench.next_frame() == START
+
+
+@pytest.mark.parametrize("state", ["7F", "04"])
+def test_a_node_that_is_not_operational_is_started_again_with_each_heartbeat(state: str) -> None:
+    bench = tpdo_bench()
+    bench.hear(HEARTBEAT, "05")
+    live(bench, 1.0)
+    assert bench.sent.count(START) == 1
+    for number in (2, 3):
+        bench.hear(HEARTBEAT, state)
+        live(bench, 0.5)
+        assert bench.sent.count(START) == number
+    assert bench.link.nmt_state == int(state, 16)
+
+
+def test_a_node_that_need_not_send_tpdos_is_left_in_its_state() -> None:
+    bench = Bench(config(heartbeat_s=0.5))
+    bench.answer_reads(1.0, WORDS)
+    bench.hear(HEARTBEAT, "7F")
+    bench.answer_reads(1.0, WORDS)
+    assert START not in bench.sent
 
 
 def test_a_refused_timer_leaves_the_sdo_reads_as_they_were() -> None:

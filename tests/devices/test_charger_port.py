@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.config.station import ChargerConfig, Limits
+from orchestrator.devices import line_quality
 from orchestrator.devices.charger import ChargerPort, Line
 from orchestrator.interlock import Grant
 from orchestrator.keys import Range
@@ -255,7 +256,7 @@ def test_a_standing_stop_is_repeated_until_it_is_withdrawn(bench: Bench, charger
 def test_a_silent_charger_is_told_to_stop_blindly(bench: Bench, charger: FakeCharger) -> None:
     charger.mute = True
     bench.wait_problem("no answer: check the charger's power")
-    assert bench.link.misses == 3
+    assert bench.link.misses == 5
     orders = len(charger.orders)
     bench.port.order(STOP)
     wait_until(lambda: charger.orders[orders:] == [REST_STOP, OPERATION_STOP] * 2)
@@ -346,12 +347,29 @@ def test_a_line_without_answers_is_silent_and_says_what_it_heard(tmp_path: Path)
 
 def test_a_missed_answer_is_not_yet_silence(bench: Bench, charger: FakeCharger) -> None:
     charger.mute = True
-    wait_until(lambda: bench.link.misses == 2)
+    wait_until(lambda: bench.link.misses == 4)
     assert bench.link.online
     assert bench.link.problem == ""
     charger.mute = False
     wait_until(lambda: bench.link.misses == 0)
-    assert all(link.online for _, link in bench.seen[-4:])
+    assert all(link.online for _, link in bench.seen[-6:])
+
+
+def test_answers_that_come_late_are_silence_sooner(bench: Bench, charger: FakeCharger) -> None:
+    charger.shape = delayed(0.23)
+    bench.wait_problem("it answers, but not in time")
+    assert bench.link.misses == 3
+
+
+def test_a_line_tells_how_much_of_it_goes_wrong(
+    bench: Bench, charger: FakeCharger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(line_quality, "LEAST", 4)
+    charger.shape = always(ERROR_FRAME)
+    wait_until(lambda: bench.link.misses == 3)
+    charger.shape = perfect
+    wait_until(lambda: bench.link.misses == 0)
+    assert 30 <= bench.link.bad_pct < 100
 
 
 def test_an_error_frame_is_reported_whenever_it_comes(bench: Bench, charger: FakeCharger) -> None:

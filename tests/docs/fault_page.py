@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from orchestrator.core.faults import FAULTS, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.model import Effect
+from tests.docs.catalogue import CATALOGUE
 
 HEAD = """\
 # Why did it stop?
@@ -23,6 +24,28 @@ seen, the limit, and the line of the file that sets it. This page is made from t
 | TRIP | charging stops, and the bay stays stopped until a person resets and then starts it |
 
 """
+NUMBERS = """
+## By the numbers of the catalogue
+
+The faults that were thought of before anything was built: C of the charger, B of battery and bus, G of the gateway, P
+of policies and people. The code refers to them as FAULTS C1. A row is named where one sees the fault; the last column
+says what else is done, or where it is handled.
+
+"""
+STUCK = """
+## A temperature sensor that is stuck
+
+One that says what cannot be (a value at or beyond its ends, a jump of 5 K in a second, nothing) stops every charge. One
+that goes on saying a plausible temperature is not found, because no rule would tell it from a good one:
+
+- A pack in a hall that keeps its temperature, charged gently, need not warm by the sensor's 0.1 °C for hours.
+- More current does not change that for sure. The loss in the cells' resistance warms them, but the reaction itself
+  takes up heat in part of the charge, of the same size at moderate currents: the two may cancel for an hour.
+- What the pack's resistance and heat capacity are, from which a rise could be expected, nobody tells us.
+
+A rule that stops good charges is switched off by the people who have to live with it. What is left: the BMU's own
+high-temperature bit, its own protection below all of this, and current steps that suit the pack.
+"""
 BACKOFFS = ", ".join(f"{CLEAN_S + wait_s:g}" for wait_s in BACKOFF_S)
 ENDS = {
     Clear.BACKOFF: f"by itself, {BACKOFFS} s after it has gone (first, second, third time in an hour), then by `reset`",
@@ -33,7 +56,7 @@ ENDS = {
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "\n".join(_table()) + "\n"
+    return HEAD + "\n".join(_table()) + "\n" + NUMBERS + "\n".join(_numbers()) + "\n" + STUCK
 
 
 def _table() -> Iterator[str]:
@@ -41,6 +64,19 @@ def _table() -> Iterator[str]:
     yield "| --- | --- | --- | --- |"
     for row in sorted(FAULTS, key=lambda row: (-row.effect, row.id)):
         yield f"| `{row.id}` | {Effect(row.effect).name} | {row.advice} | {_end(row)} |"
+
+
+def _numbers() -> Iterator[str]:
+    yield "| number | fault | rows | what else |"
+    yield "| --- | --- | --- | --- |"
+    for entry in CATALOGUE:
+        rows = ", ".join(f"`{row.id}`" for row in rows_of(entry.number))
+        yield f"| {entry.number} | {entry.about} | {rows or '–'} | {entry.also} |"
+
+
+def rows_of(number: str) -> list[Row]:
+    """The rows that name this number of the catalogue."""
+    return [row for row in FAULTS if number in row.source.split(", ")]
 
 
 def _end(row: Row) -> str:

@@ -1,9 +1,12 @@
 """Pages that are made from the code are as the code is."""
 
+import re
 from pathlib import Path
 
+from orchestrator.core.faults import FAULTS
 from orchestrator.workbench.diagram import diagram, mermaid
-from tests.docs.fault_page import page
+from tests.docs.catalogue import CATALOGUE
+from tests.docs.fault_page import page, rows_of
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -17,3 +20,29 @@ def test_the_page_of_faults_is_the_table() -> None:
 def test_the_picture_in_the_readme_is_the_machine() -> None:
     written = (ROOT / "README.md").read_text(encoding="utf-8")
     assert f"```mermaid\n{mermaid(diagram())}```" in written, "orchestrator diagram"
+
+
+#: The catalogue, by its numbers.
+NUMBERS = [
+    *(f"C{number}" for number in range(1, 26)),
+    *(f"B{number}" for number in range(1, 23)),
+    *(f"G{number}" for number in range(1, 11)),
+    *(f"P{number}" for number in range(1, 8)),
+]
+
+
+def test_every_number_of_the_catalogue_is_handled_somewhere() -> None:
+    assert [entry.number for entry in CATALOGUE] == NUMBERS
+    nowhere = [entry.number for entry in CATALOGUE if not rows_of(entry.number) and not entry.also]
+    assert nowhere == []
+
+
+def test_every_row_comes_from_the_catalogue() -> None:
+    assert {number for row in FAULTS for number in row.source.split(", ")} <= set(NUMBERS)
+
+
+def test_the_places_that_are_named_are_there() -> None:
+    places = {place for entry in CATALOGUE for place in re.findall(r"`([a-z/_]+/[a-z_.]*)`", entry.also)}
+    assert len(places) > 10
+    missing = [place for place in places if not ((ROOT / "orchestrator" / place).exists() or (ROOT / place).exists())]
+    assert missing == []

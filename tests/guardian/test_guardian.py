@@ -7,9 +7,11 @@ import signal
 import socket
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -34,6 +36,10 @@ WAITS = "import signal; signal.pause()"
 ENDS_WITH_3 = "import sys; sys.exit(3)"
 ENDS_WITH_4_WHEN_TOLD = (
     "import signal, sys; signal.signal(15, lambda *_: sys.exit(4)); print(flush=True); signal.pause()"
+)
+SAYS_WHEN_HUNG_UP = (
+    "import signal; signal.signal(1, lambda *_: print('hung up', flush=True)); print(flush=True)\n"
+    "while True: signal.pause()"
 )
 #: The guardian is done with whatever it has to do by then, on a busy machine, too.
 END_S = 20.0
@@ -85,6 +91,11 @@ class Watched:
         wait_until(lambda: text in self.log, what=text)
 
 
+def die_with_parent_in(terminal: int) -> None:
+    die_with_parent()
+    fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
+
+
 def children_of(pid: int) -> list[int]:
     """Those that live, or are not buried yet."""
     with suppress(FileNotFoundError, ProcessLookupError):
@@ -106,6 +117,7 @@ def watched(
     controller: str = WAITS,
     stderr: int | None = None,
     notify: str = "",
+    terminal: int | None = None,
 ) -> Iterator[Watched]:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.settimeout(END_S)
@@ -119,7 +131,8 @@ def watched(
             stderr=file if stderr is None else stderr,
             pass_fds=[theirs.fileno()],
             env={**environment, **({"NOTIFY_SOCKET": notify} if notify else {})},
-            preexec_fn=die_with_parent,
+            preexec_fn=die_with_parent if terminal is None else partial(die_with_parent_in, terminal),
+            start_new_session=True,
         )
         theirs.close()
         try:
@@ -351,7 +364,7 @@ def test_a_machine_that_stood_still_is_no_hang_once(tmp_path: Path) -> None:
 # --- signals, and who may listen -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGQUIT])
 def test_whoever_wants_it_to_end_ends_the_controller_first(tmp_path: Path, number: signal.Signals) -> None:
     with running_chargers(tmp_path) as (bench,), watched(tmp_path, controller=ENDS_WITH_4_WHEN_TOLD) as guardian:
         guardian.waits_for("\n")  # the controller is ready to be told
@@ -361,6 +374,33 @@ def test_whoever_wants_it_to_end_ends_the_controller_first(tmp_path: Path, numbe
         wait_until(lambda: state_of(guardian.controller) == "Z")
         guardian.link.close()
         assert guardian.ended() == 4
+
+
+def test_a_hang_up_without_a_terminal_is_passed_on_and_ends_nothing(tmp_path: Path) -> None:
+    with watched(tmp_path, "SILENCE_S=20", controller=SAYS_WHEN_HUNG_UP) as guardian:
+        guardian.waits_for("\n")
+        guardian.process.send_signal(signal.SIGHUP)  # too early: it reads everything anew anyway
+        guardian.beat()
+        guardian.beat()  # the first one has been dealt with
+        guardian.process.send_signal(signal.SIGHUP)
+        guardian.waits_for("hung up")
+        guardian.beat()
+        assert guardian.log.count("hung up") == 1
+        guardian.link.close()
+        guardian.ended()
+
+
+def test_a_terminal_that_is_closed_ends_what_was_started_from_it(tmp_path: Path) -> None:
+    master, slave = os.openpty()
+    with watched(tmp_path, controller=ENDS_WITH_4_WHEN_TOLD, terminal=slave) as guardian:
+        guardian.waits_for("\n")
+        guardian.send(DONE)
+        guardian.process.send_signal(signal.SIGHUP)
+        wait_until(lambda: state_of(guardian.controller) == "Z")
+        guardian.link.close()
+        assert guardian.ended() == 4
+    os.close(master)
+    os.close(slave)
 
 
 def test_an_end_before_anything_has_begun_is_a_good_one(tmp_path: Path) -> None:

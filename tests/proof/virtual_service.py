@@ -79,6 +79,10 @@ class Notebook:
     def say(self, text: str) -> None:
         self.said.append(text)
 
+    @property
+    def unkept(self) -> str:
+        return ""
+
     def put(self, bay: str, line: Any) -> None:
         if line[0] == "fault":
             self.lines.append((bay, line[1]))
@@ -188,8 +192,10 @@ class World:
         for bay in self.bays:
             take = bay._step
 
-            def watched(now_s: float, request: Request | None, bay: BayRunner = bay, take: Any = take) -> None:
-                take(now_s, request)
+            def watched(
+                now_s: float, asleep_s: float, request: Request | None, bay: BayRunner = bay, take: Any = take
+            ) -> None:
+                take(now_s, asleep_s, request)
                 self.on_step(bay)
 
             bay._step = watched  # type: ignore[method-assign]  # whoever watches sees every step
@@ -201,8 +207,11 @@ class World:
         change = self._patches.enter_context
         replaced: dict[Any, dict[str, Any]] = {
             supervisor_module: {
-                "monotonic": time.clock, "SimpleQueue": _Queues(time), "Journal": Notebook, "ControlSocket": Silence,
-                "signal": SimpleNamespace(signal=lambda *_: None, SIGTERM=15, SIGINT=2, Signals=signal.Signals),
+                "monotonic": time.clock, "boottime": time.clock, "SimpleQueue": _Queues(time),
+                "Journal": Notebook, "ControlSocket": Silence,
+                "signal": SimpleNamespace(
+                    signal=lambda *_: None, SIGTERM=15, SIGINT=2, SIGHUP=1, Signals=signal.Signals
+                ),
                 "read_kept": lambda _, names: {name: _Kept(self._kept.get(name, Memory())) for name in names},
             },
             bay_module: {"Event": event},

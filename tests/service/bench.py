@@ -113,11 +113,14 @@ class Battery:
 class Bench:
     """A bay, its devices, and a journal that nobody writes: its lines wait in it."""
 
-    def __init__(self, directory: Path, memory: Memory | None = None, max_mb: float = 1.0) -> None:
+    def __init__(
+        self, directory: Path, memory: Memory | None = None, bay: Bay | None = None, max_mb: float = 1.0
+    ) -> None:
         self.charger, self.battery = Charger(), Battery()
         self.now_s = 1000.0
+        self.asleep_s = 0.0
         self.journal = Journal(directory, max_mb, lambda: self.now_s, time.time)
-        self.bay = BayRunner(the_bay(), self.charger, self.battery, self.journal, memory or Memory())
+        self.bay = BayRunner(bay or the_bay(), self.charger, self.battery, self.journal, memory or Memory())
 
     def step(self, count: int = 1) -> State:
         for _ in range(count):
@@ -125,7 +128,7 @@ class Bench:
             self.charger.pass_time(self.now_s)
             self.battery.now_s = self.now_s
             self.battery.values["current_a"] = self.charger.reading.current_a
-            self.bay.run(self.now_s)
+            self.bay.run(self.now_s, self.asleep_s)
         assert self.bay.decision is not None
         return self.bay.decision.state
 

@@ -10,7 +10,7 @@ from orchestrator.model import STOP, Request, State
 from orchestrator.service import bay as bay_module
 from orchestrator.service.bay import Asked
 from orchestrator.service.kept import Kept
-from tests.service.bench import Bench
+from tests.service.bench import STEP_S, Bench
 
 HELD = "stopped by the operator; start to go on"
 
@@ -105,16 +105,20 @@ def test_what_must_outlive_it_is_kept_whenever_it_changes(bench: Bench) -> None:
 
 def test_the_stop_at_the_end_is_no_operators(bench: Bench) -> None:
     bench.charging()
-    bench.bay.end()
+    bench.bay.end("SIGTERM")
+    bench.step()
+    assert bench.bay.status()["reason"] == "the service ends: SIGTERM"
     bench.step(10)
     assert bench.bay.verified
     assert bench.journal._kept == {"bay-1": Kept()}
+    (session,) = [line for _, _, _, line in bench.journal._waiting if line[0] == "session" and line[1]["result"]]
+    assert session[1]["result"] == "the service ends: SIGTERM"
 
 
 def test_the_stop_at_the_end_does_not_undo_an_operators(bench: Bench) -> None:
     bench.charging()
     bench.ask(Request.STOP)
-    bench.bay.end()
+    bench.bay.end("SIGTERM")
     bench.step(10)
     assert bench.journal._kept == {"bay-1": Kept(hold=HELD)}
 
@@ -125,3 +129,45 @@ def test_it_begins_with_what_was_kept(tmp_path: Path) -> None:
     assert [fault["id"] for fault in bench.bay.status()["faults"]] == ["found_running"]  # type: ignore[attr-defined]  # a JSON document
     assert bench.ask(Request.START) == ""
     bench.until(State.CHARGING)
+
+
+# --- the machine under it ---------------------------------------------------------------------------------------------
+
+
+def faults(bench: Bench) -> dict[str, str]:
+    return {fault["id"]: fault["text"] for fault in bench.bay.status()["faults"]}  # type: ignore[attr-defined]  # a JSON document
+
+
+@pytest.mark.parametrize(("missed_s", "said"), [(0.5, set()), (0.7, {"late"}), (1.3, {"late", "overrun"})])
+def test_a_step_that_comes_late_is_said_and_a_long_gap_stops(bench: Bench, missed_s: float, said: set[str]) -> None:
+    bench.charging()
+    bench.now_s += missed_s - STEP_S
+    bench.step()
+    assert set(faults(bench)) == said
+    assert (bench.bay.status()["state"] == "STOPPING") is ("overrun" in said)
+
+
+def test_a_machine_that_was_suspended_stops_and_qualifies_anew(bench: Bench) -> None:
+    bench.asleep_s = 100.0  # before this service was started
+    bench.charging()
+    assert not faults(bench)
+    bench.asleep_s += 1.9
+    bench.step()
+    assert not faults(bench)
+    bench.asleep_s += 2.5
+    assert bench.step() is State.STOPPING
+    assert "suspended for 2 s" in faults(bench)["suspended"]
+    bench.until(State.SUSPENDED)
+    bench.until(State.QUALIFYING, 150)
+
+
+def test_nothing_begins_while_a_latched_fault_would_be_forgotten(bench: Bench) -> None:
+    bench.journal._unkept = "no space"
+    bench.step(50)
+    assert bench.bay.status()["state"] == "SUSPENDED"
+    assert faults(bench)["unkept"].startswith("no space; ")
+    bench.journal._unkept = ""
+    bench.until(State.CHARGING)
+    bench.journal._unkept = "no space"
+    bench.step(50)
+    assert bench.bay.status()["state"] == "CHARGING"

@@ -16,10 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.errors import ServiceError
+from orchestrator.service import control as control_module
 from orchestrator.service.control import (
     CLIENT_S,
     MAX_REQUEST,
+    PAUSE_S,
     RETRY_S,
+    SAY_S,
     STALL_S,
     ControlSocket,
     ask,
@@ -331,3 +334,32 @@ def taken_files() -> Iterator[None]:
         for file in files:
             os.close(file)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_stranger_is_turned_away_and_that_is_said_once_a_minute(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    now_s = [1000.0]
+    path = tmp_path / "control.sock"
+    control = ControlSocket(path, answer, lambda: now_s[0], said.append)
+    control.start()
+    try:
+        monkeypatch.setattr(control_module, "peer", lambda _: (4711, 12345, 12345))
+        for _ in range(3):
+            with pytest.raises(ServiceError):
+                ask(path, {})
+        assert said == ["control socket: turned user 12345 away (process 4711; 1 since last said)"]
+        now_s[0] += SAY_S
+        with pytest.raises(ServiceError):
+            ask(path, {})
+        assert said[1:] == ["control socket: turned user 12345 away (process 4711; 3 since last said)"]
+    finally:
+        control.close()
+
+
+def test_a_flood_is_served_at_its_pace(path: Path) -> None:
+    began_s = time.monotonic()
+    for _ in range(20):
+        ask(path, {})
+    assert time.monotonic() - began_s > 19 * PAUSE_S

@@ -244,9 +244,11 @@ def test_what_the_next_run_must_know_is_tried_again(tmp_path: Path) -> None:
     with writing(tmp_path) as journal:
         journal.keep("bay-1", Kept(running=True))
         wait_until(lambda: problem(journal), what="the problem")
+        assert f"{tmp_path / 'kept.json'}: No space left" in journal.unkept
         (tmp_path / "kept.json.new").unlink()
         wait_until(lambda: not problem(journal), what="the end of the problem")
     assert json.loads((tmp_path / "kept.json").read_text(encoding="utf-8"))["bay-1"]["running"] is True
+    assert journal.unkept == ""
 
 
 def test_times_are_utc_to_the_millisecond() -> None:

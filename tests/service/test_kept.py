@@ -90,6 +90,15 @@ def test_at_first_there_is_nothing(tmp_path: Path) -> None:
     assert read_kept(tmp_path / "none", ["bay-1"]) == {"bay-1": Kept()}
 
 
+def test_what_is_lost_is_no_first_start(tmp_path: Path) -> None:
+    (tmp_path / "events.jsonl").write_text("{}\n")
+    kept = read_kept(tmp_path, ["bay-1"])["bay-1"]
+    assert kept.hold == (
+        f"{tmp_path / FILE} is lost, though this service has run here before: "
+        "nobody knows which faults were latched; start to go on"
+    )
+
+
 def test_a_bay_that_is_new_has_nothing(tmp_path: Path) -> None:
     write_kept(tmp_path, {"bay-1": Kept(paused=True), "gone": Kept()})
     assert read_kept(tmp_path, ["bay-1", "bay-2"]) == {"bay-1": Kept(paused=True), "bay-2": Kept()}

@@ -12,6 +12,9 @@ JUMP_K = 5.0
 WARMING_S = 180.0
 #: SDO abort codes (upper half) that say: the object is not there, or not like this. The others may pass.
 REFUSALS = frozenset({0x0601, 0x0602, 0x0604, 0x0606, 0x0607, 0x0609})
+#: NMT states as a heartbeat tells them (CiA 301).
+OPERATIONAL = 0x05
+NMT_NAMES = {0x00: "boot-up", 0x04: "stopped", 0x7F: "pre-operational"}
 #: Bits that end a charge, and bits that make it gentle. Low voltage is what a deeply discharged pack reports.
 STATUS_TRIPS = (
     BatteryStatus.OVER_VOLTAGE,
@@ -53,6 +56,15 @@ def heartbeat_lost(f: Facts) -> str | None:
         return None
     age_s = f.now_s - link.heartbeat_t_s
     return f"no heartbeat of the BMU for {age_s:.1f} s" if age_s > 2.5 * link.heartbeat_s else None
+
+
+def not_operational(f: Facts) -> str | None:
+    """FAULTS B8: only heartbeats tell the state, and only TPDOs need it; SDO reads go on meanwhile."""
+    link = f.battery
+    if f.rules.bay.battery.tpdo_s is None or link.heartbeat_s is None or link.nmt_state in (None, OPERATIONAL):
+        return None
+    name = NMT_NAMES.get(link.nmt_state, f"0x{link.nmt_state:02X}")
+    return f"the BMU's NMT state is {name}, not operational: it sends no TPDOs, and does not obey an NMT start"
 
 
 def bmu_rebooted(f: Facts) -> str | None:

@@ -3,6 +3,9 @@
 from orchestrator.core.facts import Facts
 from orchestrator.model import State
 
+#: A charge that begins at this SOC or less may take all that the policy allows; from a higher one it needs less.
+SOC_ERROR_PCT = 20.0
+
 
 def precharge_no_rise(f: Facts) -> str | None:
     """FAULTS C15."""
@@ -36,11 +39,14 @@ def time_limit(f: Facts) -> str | None:
 def ah_limit(f: Facts) -> str | None:
     """FAULTS C17."""
     session, max_ah = f.memory.session, f.rules.policy.finish.max_ah
-    if session is None or session.charged_ah <= max_ah:
+    if session is None:
         return None
-    return f"{session.charged_ah:.2f} Ah were charged ({f.rules.policy.source.at('finish.max_ah')})"
-
-
-def internal(f: Facts) -> str | None:
-    """FAULTS G5."""
-    return f.snapshot.internal or None
+    begun_pct = session.soc_start_pct or 0.0
+    need = min(1.0, (100.0 - begun_pct + SOC_ERROR_PCT) / 100.0)
+    if session.charged_ah <= need * max_ah:
+        return None
+    at = f.rules.policy.source.at("finish.max_ah")
+    return (
+        f"{session.charged_ah:.2f} Ah were charged since SOC {begun_pct:.0f} %: a whole charge may take {max_ah:g} Ah "
+        f"({at}), so from there {need * max_ah:.2f} Ah"
+    )

@@ -8,6 +8,8 @@ from orchestrator.model import Action, ChargeMode, Operation
 OBEY_S = 5.0
 #: A charger's current measurement may be off by this, whatever the step.
 OVER_CURRENT_OFFSET_A = 0.3
+#: After a step down the current may be the old step's for this long. More would delay the stop beyond its budget (2 s).
+FOLLOWS_S = 1.0
 #: The charger's own modes before current flows (search) and while it wakes a pack (recovery, precharge).
 SEARCH_MAX_S = 60.0
 WAKE_MAX_S = 1800.0
@@ -89,11 +91,17 @@ def over_current(f: Facts) -> str | None:
         return None
     limit_a = rules.bay.limits.current_a
     if rules.manual and reading.current_limit is not None:
-        limit_a = min(limit_a, rules.steps_a[reading.current_limit])
+        limit_a = min(limit_a, max(rules.steps_a[step] for step in _steps_in_force(f, reading.current_limit)))
     allowed_a = limit_a * rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
     if reading.current_a <= allowed_a:
         return None
     return f"{reading.current_a:.2f} A, more than {allowed_a:.2f} A for a limit of {limit_a:g} A"
+
+
+def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
+    """The step that the charger shows, and for a moment the one before: its current follows later than its status."""
+    before = f.memory.limit_before
+    return (shown,) if before is None or f.now_s - f.memory.limit_s > FOLLOWS_S else (shown, before)
 
 
 def early_full(f: Facts) -> str | None:

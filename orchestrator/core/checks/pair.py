@@ -4,6 +4,10 @@ from orchestrator.core.facts import Facts
 
 #: A pack under charge may lose this to the vehicle that it sits in before it counts as back-feed.
 BACK_FEED_A = 0.5
+#: A charger's values that are the same for this long, at more than this current, while the BMU's have moved by twenty
+#: times the resolution or more, are not measured any more.
+STILL_S, STILL_ABOVE_A = 60.0, 1.0
+MOVED_V, MOVED_A = 0.2, 0.5
 
 
 def over_voltage(f: Facts) -> str | None:
@@ -34,6 +38,21 @@ def amps_disagree(f: Facts) -> str | None:
     if abs(f.amps - f.pack_a) <= max(limits.amps_differ_a, limits.amps_differ_pct / 100 * f.amps):
         return None
     return f"the charger reads {f.amps:.2f} A, the BMU {f.pack_a:.2f} A"
+
+
+def charger_frozen(f: Facts) -> str | None:
+    """FAULTS C20: its values stand still, and the battery's do not. Alone the one proves nothing: a good supply on a
+    flat cell may show the same digits for minutes."""
+    still = f.memory.still
+    if still is None or f.now_s - still.t_s < STILL_S or f.pack_v is None or f.pack_a is None:
+        return None
+    moved_v, moved_a = abs(f.pack_v - still.pack_v), abs(f.pack_a - still.pack_a)
+    if moved_v <= MOVED_V and moved_a <= MOVED_A:
+        return None
+    return (
+        f"the charger has said {still.volts:.2f} V and {still.amps:.2f} A for {f.now_s - still.t_s:.0f} s, "
+        f"while the BMU's values moved by {moved_v:.2f} V and {moved_a:.2f} A: its measurement is frozen"
+    )
 
 
 def back_feed(f: Facts) -> str | None:

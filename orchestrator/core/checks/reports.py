@@ -5,6 +5,8 @@ from orchestrator.model import ChargeMode, Connection, ErrorBit
 
 #: An error frame is news for this long.
 ERROR_FRAME_S = 5.0
+#: A line on which more of the exchanges go wrong is not in order, though it still works.
+NOISY_PCT = 5.0
 #: It does not know what we say, or it did not hear it well. (Here, since joining flags takes long.)
 NOT_KNOWN = ErrorBit.COMMAND | ErrorBit.ORDER
 NOT_HEARD = ErrorBit.LENGTH | ErrorBit.CHECKSUM
@@ -19,6 +21,14 @@ def reverse_polarity(f: Facts) -> str | None:
     if f.reading.charge_mode is ChargeMode.REVERSED:
         return "the charger reports mode 6: the battery is connected the wrong way round"
     return None
+
+
+def polarity_contradicts(f: Facts) -> str | None:
+    """FAULTS C2: it stops as for a battery that is reversed; whether one is, only a look at the bay can say."""
+    reading = f.reading
+    if reading is None or reading.charge_mode is not ChargeMode.REVERSED or reading.connection is not Connection.NORMAL:
+        return None
+    return "the charger contradicts itself: mode 6 (battery reversed) with connection 1 (normal)"
 
 
 def error_stop(f: Facts) -> str | None:
@@ -51,17 +61,18 @@ def mode_taken_over(f: Facts) -> str | None:
 
 def rejected_frame(f: Facts) -> str | None:
     """FAULTS C22: heard well and not known. Noise can change a command, too, but then the checksum is wrong as well."""
-    return None if f.charger.error_bits & NOT_HEARD else _error_frame(f, NOT_KNOWN)
-
-
-def noisy_line(f: Facts) -> str | None:
-    """FAULTS C21."""
-    return _error_frame(f, NOT_HEARD)
-
-
-def _error_frame(f: Facts, bits: ErrorBit) -> str | None:
     link = f.charger
-    if link.error_t_s is None or f.now_s - link.error_t_s > ERROR_FRAME_S or not link.error_bits & bits:
+    if link.error_t_s is None or f.now_s - link.error_t_s > ERROR_FRAME_S:
+        return None
+    if link.error_bits & NOT_HEARD or not link.error_bits & NOT_KNOWN:
         return None
     names = " and ".join(bit.name.lower() for bit in ErrorBit if bit & link.error_bits and bit.name)
     return f"the charger answered with an error frame (0x1F): wrong {names} in what it received"
+
+
+def noisy_line(f: Facts) -> str | None:
+    """FAULTS C21: what was not heard well is asked or ordered again; only where that is usual is it worth a word."""
+    bad_pct = f.charger.bad_pct
+    if bad_pct <= NOISY_PCT:
+        return None
+    return f"{bad_pct:.0f} % of the last minute's exchanges with the charger went wrong, more than {NOISY_PCT:g} %"

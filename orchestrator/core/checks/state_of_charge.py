@@ -1,0 +1,92 @@
+"""Faults of what the BMU works out, not measures: SOC, remaining capacity and energy, times to full and to empty.
+
+Each of them alone may be a BMU that has corrected itself, so it only warns; two together are believed.
+"""
+
+from orchestrator.core.facts import Facts
+
+#: From one reading to the next the SOC may take a step of this much, and what a tiny pack takes in each second.
+SOC_STEP_PCT, SOC_RATE_PCT_PER_S = 5.0, 1.0
+#: After a gap too long to be watched it may have been corrected by this much, and have gone on by 2 % a minute.
+SOC_OTHER_PCT, SOC_DRIFT_PCT_PER_S = 10.0, 2.0 / 60
+#: A step is news for as long as a second doubt may take to show; an exchange until it can be answered.
+STEP_NEWS_S, EXCHANGE_NEWS_S = 900.0, 5.0
+#: Under charge a SOC that has been so much below its highest value for so long is falling.
+FALLING_S, FALLING_PCT = 900.0, 2.0
+#: Energy is capacity times voltage, and what is missing is current times time to full, up to these factors. The BMU
+#: smooths its current over minutes and knows what the last cells take.
+ENERGY_FACTOR, CAPACITY_FACTOR = 1.5, 3.0
+#: Below this nothing is compared: the figures are too coarse.
+LEAST_AH, LEAST_SOC_PCT, LEAST_A = 1.0, 10.0, 1.0
+#: No pack that is more than half full is deeply discharged, however wrong its SOC.
+HALF_FULL_PCT = 50.0
+#: What is doubtful alone.
+DOUBTS = ("soc_jump", "soc_falls", "figures_disagree")
+
+
+def soc_jump(f: Facts) -> str | None:
+    """FAULTS B17."""
+    step = f.memory.charge_step
+    return step[1] if step is not None and f.now_s - step[0] < STEP_NEWS_S else None
+
+
+def soc_falls(f: Facts) -> str | None:
+    """FAULTS B17."""
+    peak = f.memory.peak
+    if peak is None or f.soc is None or f.now_s - peak[0] < FALLING_S or peak[1] - f.soc < FALLING_PCT:
+        return None
+    return f"the SOC has fallen from {peak[1]:.0f} to {f.soc:.0f} % in {(f.now_s - peak[0]) / 60:.0f} min under charge"
+
+
+def figures_disagree(f: Facts) -> str | None:
+    """FAULTS B17: remaining capacity, available energy, SOC and time to full of one pack, which hang together."""
+    battery = f.snapshot.battery
+    if battery.remaining_ah is None or f.soc is None or f.pack_v is None or f.pack_a is None:
+        return None
+    ah = f.slow(battery.remaining_ah)
+    if ah is None or ah < LEAST_AH:
+        return None
+    wh = f.slow(battery.available_wh)
+    if wh is not None and not 1 / ENERGY_FACTOR <= wh / (ah * f.pack_v) <= ENERGY_FACTOR:
+        return (
+            f"the BMU has {ah:.2f} Ah and {wh:.1f} Wh available: that is {wh / ah:.1f} V, the pack has {f.pack_v:.2f} V"
+        )
+    minutes = f.slow(battery.time_to_full_min)
+    if minutes is None or f.soc < LEAST_SOC_PCT or f.pack_a < LEAST_A:
+        return None
+    missing_ah, takes_ah = ah * (100 - f.soc) / f.soc, f.pack_a * minutes / 60
+    if min(missing_ah, takes_ah) < LEAST_AH or 1 / CAPACITY_FACTOR <= takes_ah / missing_ah <= CAPACITY_FACTOR:
+        return None
+    return (
+        f"the BMU says full in {minutes:.0f} min: that is {takes_ah:.1f} Ah, "
+        f"by {ah:.2f} Ah at {f.soc:.0f} % it is {missing_ah:.1f} Ah"
+    )
+
+
+def soc_not_believed(f: Facts) -> str | None:
+    """FAULTS B17: two doubts at once."""
+    doubts = [name for name in DOUBTS if name in f.raised]
+    if len(doubts) < 2:
+        return None
+    return "; ".join(f.memory.faults[name].text for name in doubts)
+
+
+def battery_exchanged(f: Facts) -> str | None:
+    """FAULTS B18: the charger never saw the battery leave, and the BMU that answers again tells of another one."""
+    exchange = f.memory.exchange
+    if exchange is None or f.now_s - exchange[0] >= EXCHANGE_NEWS_S:
+        return None
+    return f"{exchange[1]}, in which the BMU was not heard: this may be another battery"
+
+
+def wrong_policy(f: Facts) -> str | None:
+    """FAULTS P3: by its voltage this pack is deeply discharged, by its SOC it is not: it has fewer cells."""
+    policy = f.rules.policy
+    if policy.precharge is None or f.soc is None or f.pack_v is None:
+        return None
+    if f.soc <= HALF_FULL_PCT or f.pack_v >= policy.precharge.below_v:
+        return None
+    return (
+        f"the pack has {f.pack_v:.2f} V at SOC {f.soc:.0f} %: below {policy.precharge.below_v:g} V "
+        f"({policy.source.at('precharge.below_v')}) a pack of {policy.pack.cells_in_series} cells is empty"
+    )

@@ -1,0 +1,141 @@
+"""A policy that is changed while a bay charges: read anew when asked, in force at the next standby, never half."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.config.load import load_station
+from orchestrator.config.shipped import shipped_dir
+from orchestrator.model import Request, State
+from orchestrator.service.reload import Reload
+from tests.service.bench import Bench
+
+STATION = """\
+station: test
+can: {can0: {interface: virtual}}
+bays:
+  - name: bay-1
+    charger: {port: /dev/ttyX, control: manual, steps_a: [2.0, 5.0, 8.0, 11.0, 14.0]}
+    battery: {can: can0, node_id: 0x10, map: tabos}
+    limits: {voltage_v: 58.4, current_a: 15.0, temperature_c: [0, 45]}
+    policy: mine.yaml
+control: {socket: run/socket}
+journal: {directory: run/journal}
+"""
+
+
+class Site:
+    """A station file with a policy beside it, and its bay."""
+
+    def __init__(self, directory: Path) -> None:
+        self.station_file, self.policy_file = directory / "station.yaml", directory / "mine.yaml"
+        self.policy_file.write_text((shipped_dir() / "policies/li-ion-48v.yaml").read_text())
+        self.station_file.write_text(STATION)
+        station = load_station(self.station_file)
+        self.bench = Bench(directory, bay=station.bays[0])
+        self.said: list[str] = []
+        self.reload = Reload(station, [self.bench.bay], self.said.append)
+
+    def edit(self, file: Path, old: str, new: str) -> None:
+        text = file.read_text()
+        assert old in text
+        file.write_text(text.replace(old, new))
+        self.said.clear()
+        self.reload.read()
+
+    def edit_finish(self) -> None:
+        self.edit(self.policy_file, "soc_pct: 100\n", "soc_pct: 99\n")
+
+    @property
+    def policy(self) -> dict[str, str]:
+        return self.bench.bay.status()["policy"]  # type: ignore[return-value]  # a JSON document
+
+
+@pytest.fixture(name="site")
+def _site(tmp_path: Path) -> Site:
+    return Site(tmp_path)
+
+
+def test_a_charge_goes_on_by_the_policy_that_it_began_with(site: Site) -> None:
+    site.bench.charging()
+    before = site.policy
+    site.edit_finish()
+    (said,) = site.said
+    assert said.startswith("bay-1: reload: policy li-ion-48v (")
+    assert said.endswith("comes into force when the bay stands by")
+    site.bench.step(50)
+    assert site.bench.bay.status()["state"] == "CHARGING"
+    waiting = site.policy["waiting_sha256"]
+    assert waiting not in ("", before["sha256"])
+    assert site.policy == before | {"waiting_sha256": waiting}
+    site.bench.ask(Request.PAUSE)
+    site.bench.until(State.SUSPENDED)
+    site.bench.step(2)
+    assert site.policy == before | {"sha256": waiting}
+    site.bench.ask(Request.START)
+    site.bench.charging()
+    site.bench.battery.values["soc_pct"] = 99.0
+    site.bench.until(State.FULL)
+
+
+def test_what_stands_by_takes_it_over_at_once(site: Site) -> None:
+    site.bench.battery.values["soc_pct"] = 99.0
+    site.bench.until(State.IDLE)
+    before = site.policy["sha256"]
+    site.edit_finish()
+    site.bench.step()
+    assert site.policy["sha256"] != before
+    assert any("is in force" in line for line in site.bench.journal._said)
+
+
+def test_a_comment_changes_the_lines_that_reasons_name(site: Site) -> None:
+    site.bench.battery.values["soc_pct"] = 99.0
+    site.bench.until(State.IDLE)
+    site.edit(site.policy_file, "policy: li-ion-48v", "# one more line\npolicy: li-ion-48v")
+    site.bench.step(2)
+    line = (
+        site.policy_file.read_text()
+        .splitlines()
+        .index("  soc_below_pct: 98                    # with less than this; a fuller one is left alone")
+        + 1
+    )
+    assert f"mine.yaml:{line}" in str(site.bench.bay.status()["reason"])
+
+
+def test_a_file_with_an_error_changes_nothing(site: Site) -> None:
+    site.bench.step()
+    before = site.policy
+    site.edit(site.policy_file, "soc_pct: 100\n", "soc_pct: 101\n")
+    (said,) = site.said
+    first, *_, last = said.splitlines()
+    assert first.startswith(f"{site.policy_file}:") or "mine.yaml:" in first
+    assert ": error: " in first
+    assert last.endswith("reload refused, every policy stays as it is")
+    site.bench.step(20)
+    assert site.policy == before
+
+
+def test_what_is_as_it_was_is_left_alone(site: Site) -> None:
+    site.bench.step()
+    site.reload.read()
+    (said,) = site.said
+    assert said.endswith("is unchanged")
+
+
+@pytest.mark.parametrize(("old", "new"), [("current_a: 15.0", "current_a: 8.0"), ("name: bay-1", "name: bay-2")])
+def test_hard_limits_and_wiring_are_for_a_restart(site: Site, old: str, new: str) -> None:
+    before = site.policy
+    site.edit(site.station_file, old, new)
+    assert site.said == [
+        "bay-1: reload: the station file has changed here: only a restart of the service brings that into force"
+    ]
+    site.bench.step(20)
+    assert site.policy == before
+
+
+def test_what_is_taken_back_before_it_came_into_force_never_does(site: Site) -> None:
+    site.bench.charging()
+    before = site.policy
+    site.edit_finish()
+    site.edit(site.policy_file, "soc_pct: 99\n", "soc_pct: 100\n")
+    assert site.policy == before
