@@ -1,0 +1,64 @@
+"""The nouns that travel through the system, all frozen: readings in, a decision out.
+
+Units are in the names. Times called `t_s` are monotonic seconds and say when the value was *asked for*, so that an age
+computed from them is never too young. Unknown is `None`, never a number.
+"""
+
+from orchestrator.model.battery import BatteryLink, BatteryReading, BatteryStatus, Measurement
+from orchestrator.model.charger import (
+    STOP,
+    Action,
+    ChargeMode,
+    ChargerLink,
+    ChargerReading,
+    Command,
+    Connection,
+    ControlMode,
+    ErrorBit,
+    Operation,
+    Precharge,
+    Sent,
+)
+from orchestrator.model.decision import (
+    ENERGISED,
+    STANDBY,
+    ActiveFault,
+    Decision,
+    Effect,
+    Request,
+    Session,
+    Setpoint,
+    Snapshot,
+    State,
+    Step,
+)
+
+__all__ = [
+    "ENERGISED",
+    "STANDBY",
+    "STOP",
+    "Action",
+    "ActiveFault",
+    "BatteryLink",
+    "BatteryReading",
+    "BatteryStatus",
+    "ChargeMode",
+    "ChargerLink",
+    "ChargerReading",
+    "Command",
+    "Connection",
+    "ControlMode",
+    "Decision",
+    "Effect",
+    "ErrorBit",
+    "Measurement",
+    "Operation",
+    "Precharge",
+    "Request",
+    "Sent",
+    "Session",
+    "Setpoint",
+    "Snapshot",
+    "State",
+    "Step",
+]

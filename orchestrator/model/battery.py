@@ -1,0 +1,59 @@
+"""The battery, as its BMU tells of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A decoded value, in range, and when it was asked for."""
+
+    value: float
+    t_s: float
+
+
+class BatteryStatus(IntEnum):
+    """Bits of the BMU's status word (inferred, see the object map)."""
+
+    OVER_VOLTAGE = 0
+    LOW_VOLTAGE = 1
+    CHARGE_OVER_CURRENT = 2
+    DISCHARGE_OVER_CURRENT = 3
+    HIGH_TEMPERATURE = 4
+    LOW_TEMPERATURE = 5
+    BMU_ERROR = 6
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryReading:
+    """The newest valid value of each field; None until one came. Field names are those an object map may use."""
+
+    voltage_v: Measurement | None = None
+    current_a: Measurement | None = None  #: positive while charging
+    status: Measurement | None = None  #: bits, `BatteryStatus`
+    temperature_c: Measurement | None = None
+    soc_pct: Measurement | None = None
+    soh_pct: Measurement | None = None
+    time_to_full_min: Measurement | None = None
+    time_to_empty_min: Measurement | None = None
+    remaining_ah: Measurement | None = None
+    available_wh: Measurement | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BatteryLink:
+    """How the line to a BMU is doing. Silence and refusal are two different faults."""
+
+    online: bool = False  #: it answered within the stale limit
+    problem: str = ""  #: why not, for a person: bus, node, what to do
+    boots: int = 0  #: boot-up frames seen
+    boot_t_s: float | None = None  #: when the newest came
+    heartbeat_s: float | None = None  #: period that the BMU accepted, None while there is none
+    heartbeat_t_s: float | None = None  #: newest heartbeat, or when it was armed
+    nmt_state: int | None = None
+    abort: str = ""  #: a read that the BMU refuses: object, code and meaning; "" once it answers again
+    abort_code: int = 0
+    implausible: Mapping[str, str] = field(default_factory=dict)  #: field → why its newest value was thrown away
+    emergency: str = ""  #: newest EMCY that is not "error reset"
+    bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers

@@ -1,0 +1,126 @@
+"""What the core is given and what it says: a snapshot in, a decision out."""
+
+from dataclasses import dataclass
+from enum import IntEnum, StrEnum
+
+from orchestrator.model.battery import BatteryLink, BatteryReading
+from orchestrator.model.charger import ChargeMode, ChargerLink, ChargerReading, Command, Precharge
+
+
+class Request(StrEnum):
+    """What an operator can ask of a bay."""
+
+    START = "start"
+    PAUSE = "pause"
+    STOP = "stop"
+    RESET = "reset"
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All that is known of one bay at one moment; together with the memory, all that a decision may depend on."""
+
+    charger: ChargerReading | None = None
+    charger_link: ChargerLink = ChargerLink()
+    battery: BatteryReading = BatteryReading()
+    battery_link: BatteryLink = BatteryLink()
+    request: Request | None = None
+    internal: str = ""  #: an exception of our own code, caught at the boundary, in words
+    late_s: float = 0.0  #: how much later than planned this step comes
+    slept_s: float = 0.0  #: how long the whole machine was suspended since the step before
+    unkept: str = ""  #: why faults that latch now would be forgotten by a restart, "" while they would not
+    ending: str = ""  #: why the service is about to end, "" while it is not
+
+
+class State(StrEnum):
+    """The states of a bay (theory of operation: `core/machine.py`)."""
+
+    STARTING = "STARTING"
+    OFFLINE = "OFFLINE"
+    IDLE = "IDLE"
+    QUALIFYING = "QUALIFYING"
+    PRECHARGE_PULSE = "PRECHARGE_PULSE"
+    PRECHARGE_CONTINUOUS = "PRECHARGE_CONTINUOUS"
+    CHARGING = "CHARGING"
+    FULL = "FULL"
+    SUSPENDED = "SUSPENDED"
+    STOPPING = "STOPPING"
+    TRIPPED = "TRIPPED"
+    UNCONTROLLABLE = "UNCONTROLLABLE"
+
+
+#: The states in which the charger is commanded to run.
+ENERGISED = frozenset({State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS, State.CHARGING})
+
+
+class Effect(IntEnum):
+    """What a fault does, mildest first; of all that are active the highest wins."""
+
+    WARN = 1  #: said, nothing else
+    LIMIT = 2  #: charge on the lowest step only
+    NO_START = 3  #: a charge that runs goes on, none begins
+    PAUSE = 4  #: stop, go on by itself once clear
+    STOP = 5  #: stop; may go on after a backoff or when an operator starts
+    TRIP = 6  #: stop and latch until a person resets
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveFault:
+    """One fault as status and journal show it."""
+
+    id: str
+    effect: Effect
+    text: str  #: what, with its evidence, for the operator
+    since_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """What the charger shall be doing; None where this is left to it (automatic mode, standby)."""
+
+    run: bool = False
+    current_limit: int | None = None
+    charge_mode: ChargeMode | None = None
+    precharge: Precharge | None = None
+
+
+STANDBY = Setpoint()
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The current-limit step in force, and the rule that bound it."""
+
+    index: int  #: 0 (lowest) … 4
+    current_a: float
+    rule: str  #: "temperature 8.4 °C is in 0 … 10 °C, policies/li-ion-48v.yaml:31"
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """One charge of one battery, from its first stage to its end; a pause does not end it."""
+
+    started_s: float
+    elapsed_s: float = 0.0
+    energised_s: float = 0.0  #: the part of it with the charger commanded to run
+    charged_ah: float = 0.0  #: integral of the charger's current
+    charged_wh: float = 0.0
+    soc_start_pct: float | None = None
+    soc_pct: float | None = None
+    step_changes: int = 0
+    result: str = ""  #: why it ended; "" while it goes on
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What one `step()` says. The service carries out `command` and shows the rest."""
+
+    state: State
+    reason: str  #: why the bay is in this state, for the operator
+    command: Command | None = None  #: standing order for the charger's port; None: only poll
+    setpoint: Setpoint = STANDBY
+    step: Step | None = None  #: while energised
+    faults: tuple[ActiveFault, ...] = ()  #: worst first
+    alarm: bool = False  #: the interlock output is to be open
+    session: Session | None = None  #: running, or just ended (`result` set, in this one decision)
+    answer: str = ""  #: what became of the operator's request: "" is yes, else why not
