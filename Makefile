@@ -3,7 +3,7 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format bench lock clean
+.PHONY: help demo test check format campaign soak bench lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
@@ -30,6 +30,12 @@ format: .venv/dev.stamp  ## rewrite the files as `make check` wants them
 
 bench: .venv/demo.stamp  ## measure reaction times, memory and CPU beside a naive controller
 	$(BIN)/python -m benchmarks $(ARGS)
+
+campaign: .venv/dev.stamp  ## the proofs at full length, in minutes: every state × fault, random faults, every failing call
+	$(BIN)/python -m tests.proof.campaigns $(ARGS)
+
+soak: .venv/dev.stamp  ## 30 simulated days and a real hour on lines that lose frames; ARGS='--days 2 --minutes 5' less
+	$(BIN)/python -m tests.proof.soak $(ARGS)
 
 lock:  ## choose the dependencies' versions anew: requirements/*.txt
 	PYTHON='$(PYTHON)' sh requirements/lock.sh
