@@ -46,10 +46,18 @@ class Stage:
         self.log = self.directory / "service.log"
         can = f'{{"interface": "udp_multicast", "channel": "239.74.163.2", "port": {port}, "hop_limit": 0}}'
         self.plant = PlantProcess(self.directory, "--pack", "demo", "--soc", "-100", "--can", can, *plant)
-        with self.log.open("wb") as log:
-            self.service = subprocess.Popen(  # noqa: S603 - our own program, by our own interpreter
+        self.service = self._start()
+
+    def _start(self) -> "subprocess.Popen[bytes]":
+        with self.log.open("ab") as log:
+            return subprocess.Popen(  # noqa: S603 - our own program, by our own interpreter
                 [sys.executable, "-m", "orchestrator", "run", self.station.name], stderr=log, cwd=self.directory
             )
+
+    def restart(self) -> None:
+        """After the service has ended, as systemd would."""
+        self.service.wait()
+        self.service = self._start()
 
     def bay(self) -> dict[str, object] | None:
         """The bay's status; None while the service is not there yet. OrchestratorError when it has ended."""

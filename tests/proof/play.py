@@ -62,6 +62,8 @@ class Played:
     violations: list[str] = field(default_factory=list)
     injected: list[Injected] = field(default_factory=list)
     status: int = 0  #: the service's exit status
+    changes: set[tuple[State, State]] = field(default_factory=set)  #: of the bays' states
+    rows: set[str] = field(default_factory=set)  #: of the fault table, that were raised
 
 
 @dataclass(slots=True)
@@ -206,6 +208,7 @@ class Player:
 
     def _changed(self, number: int, before: State, after: State) -> None:
         watch = self.watches[number]
+        self.played.changes.add((before, after))
         if after is State.QUALIFYING:
             watch.qualifying_s = self.time.now_s
         elif before is State.QUALIFYING and after in ENERGISED:
@@ -214,6 +217,7 @@ class Player:
                 self._wrong(number, "resumed", "QUALIFYING took less than 2 s")
 
     def _follow_injected(self, watch: Watch, decision: Decision, snapshot: Snapshot) -> None:
+        self.played.rows |= {fault.id for fault in decision.faults}
         for injected in watch.open:
             news = [fault.id for fault in decision.faults if fault.since_s >= injected.t_s]
             injected.fault = injected.fault or (news[0] if news else "")

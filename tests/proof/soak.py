@@ -80,6 +80,7 @@ def told_of_real(real: Real, minutes: float) -> Iterator[str]:
     yield from _listed("missed stops", real.missed)
     yield from _listed("false latches", real.false_latches)
     yield from _listed("false stops", real.false_stops)
+    yield from _listed("restarts by the guardian", real.restarts)
     yield from _listed("other oddities", real.odd)
     for name, samples in real.samples.items():
         yield f"{name:10} {_flatness(samples)}"
