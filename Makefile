@@ -31,8 +31,8 @@ format: .venv/dev.stamp  ## rewrite the files as `make check` wants them
 bench: .venv/demo.stamp  ## measure reaction times, memory and CPU beside a naive controller
 	$(BIN)/python -m benchmarks $(ARGS)
 
-campaign: .venv/dev.stamp  ## the proofs at full length, in minutes: every state × fault, random faults, every failing call
-	$(BIN)/python -m tests.proof.campaigns $(ARGS)
+campaign: .venv/dev.stamp  ## every proof in its long form, in minutes: state × fault, random faults, failing calls
+	$(BIN)/python -m tests.proof $(ARGS)
 
 soak: .venv/dev.stamp  ## 30 simulated days and a real hour on lines that lose frames; ARGS='--days 2 --minutes 5' less
 	$(BIN)/python -m tests.proof.soak $(ARGS)

@@ -51,6 +51,7 @@ class Injected:
     fault: str = ""  #: the id of the first fault that was raised
     verified: bool = False  #: the bay came to verified standby afterwards
     named: bool = False  #: it said that the charger is out of control
+    lasted_s: float | None = None  #: until it was taken away, an operator asked for something, or the end
     alone: bool = True  #: no other fault had been injected before it, or all were taken away again
 
 
@@ -118,7 +119,7 @@ class Player:
     def _happen(self, one: Happening) -> None:
         rig, watch = self.world.rigs[one.bay], self.watches[one.bay]
         if one.name in (*MENDS, *Request):
-            watch.open.clear()  # what follows may be due to this
+            self._close(watch)  # what follows may be due to this
         if one.name in set(Request):
             asked = self.world.ask(Request(one.name), one.bay)
             self.time.call_later(ANSWERED_S, self._answered, one, asked)
@@ -142,8 +143,13 @@ class Player:
 
     def _end(self) -> None:
         for watch in self.watches:
-            watch.open.clear()
+            self._close(watch)
         self.world.end()
+
+    def _close(self, watch: Watch) -> None:
+        for injected in watch.open:
+            injected.lasted_s = self.time.now_s - injected.t_s
+        watch.open.clear()
 
     def _stall(self, one: Happening) -> None:
         self.world.rigs[one.bay].tty.stalled = True
