@@ -3,7 +3,7 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format bench lock clean
+.PHONY: help demo test check format campaign soak bench lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
@@ -30,6 +30,12 @@ format: .venv/dev.stamp  ## rewrite the files as `make check` wants them
 
 bench: .venv/demo.stamp  ## measure reaction times, memory and CPU beside a naive controller
 	$(BIN)/python -m benchmarks $(ARGS)
+
+campaign: .venv/dev.stamp  ## every proof in its long form, in minutes: state × fault, random faults, failing calls
+	$(BIN)/python -m tests.proof $(ARGS)
+
+soak: .venv/dev.stamp  ## 30 simulated days and a real hour on lines that lose frames; ARGS='--days 2 --minutes 5' less
+	$(BIN)/python -m tests.proof.soak $(ARGS)
 
 lock:  ## choose the dependencies' versions anew: requirements/*.txt
 	PYTHON='$(PYTHON)' sh requirements/lock.sh

@@ -31,9 +31,12 @@ END_S = 8.0
 
 
 class Stage:
-    """`with Stage() as stage`: both processes run; afterwards both have ended."""
+    """`with Stage() as stage`: both processes run; afterwards both have ended.
 
-    def __init__(self) -> None:
+    `plant` are further arguments of the emulated station, `orchestrator.sim.plant`.
+    """
+
+    def __init__(self, *plant: str) -> None:
         self.directory = Path(tempfile.mkdtemp(prefix="orchestrator-demo-"))
         port = random.randint(43200, 60000)  # noqa: S311 - so that two demos do not meet
         self.station = self.directory / "station.yaml"
@@ -42,11 +45,19 @@ class Stage:
         (self.directory / "policy.yaml").write_text(policy, encoding="utf-8")
         self.log = self.directory / "service.log"
         can = f'{{"interface": "udp_multicast", "channel": "239.74.163.2", "port": {port}, "hop_limit": 0}}'
-        self.plant = PlantProcess(self.directory, "--pack", "demo", "--soc", "-100", "--can", can)
-        with self.log.open("wb") as log:
-            self.service = subprocess.Popen(  # noqa: S603 - our own program, by our own interpreter
+        self.plant = PlantProcess(self.directory, "--pack", "demo", "--soc", "-100", "--can", can, *plant)
+        self.service = self._start()
+
+    def _start(self) -> "subprocess.Popen[bytes]":
+        with self.log.open("ab") as log:
+            return subprocess.Popen(  # noqa: S603 - our own program, by our own interpreter
                 [sys.executable, "-m", "orchestrator", "run", self.station.name], stderr=log, cwd=self.directory
             )
+
+    def restart(self) -> None:
+        """After the service has ended, as systemd would."""
+        self.service.wait()
+        self.service = self._start()
 
     def bay(self) -> dict[str, object] | None:
         """The bay's status; None while the service is not there yet. OrchestratorError when it has ended."""

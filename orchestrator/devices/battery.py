@@ -116,7 +116,10 @@ class BatteryNode:
     # --- the schedule -------------------------------------------------------------------------------------------------
 
     def _watch(self, now_s: float) -> None:
+        asked = self._client.pending
         expired = self._client.expire(now_s)
+        if expired and asked is not None:
+            self._plan.unanswered(asked, now_s)
         link = self._view.link
         if link.online:
             if now_s - self._answer_s >= ANSWER_LIMIT_S:

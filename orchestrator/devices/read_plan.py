@@ -6,6 +6,7 @@ from orchestrator.devices.polled import Polled
 from orchestrator.devices.sdo_client import Key, SdoClient
 from orchestrator.protocol.objects import Sweep
 
+AGAIN_S = 0.2  #: a lost frame costs a value that is read once a second no more than this and its time-out
 TPDO_PERIODS = 3  #: an object that no TPDO brought for so many periods is read every sweep again
 
 
@@ -45,6 +46,12 @@ class ReadPlan:
             return client.quiet_s
         client.clear()
         return due
+
+    def unanswered(self, key: Key, now_s: float) -> None:
+        """It was asked for in vain: it is asked again soon, whatever its period. Only one that is read has any."""
+        if key in self._by_key:
+            polled = self._by_key[key]
+            polled.due_s = min(polled.due_s, now_s + AGAIN_S)
 
     def asked(self, polled: Polled, now_s: float) -> None:
         """It is read now; when is it due again?"""

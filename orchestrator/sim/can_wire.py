@@ -7,12 +7,15 @@ from dataclasses import dataclass, field
 
 import can
 
+from orchestrator.sim.can_noise import Bus, BusNoise
+
 Handler = Callable[[int, bytes], None]
 
 #: The length of every SDO frame.
 SDO_BYTES = 8
 #: How often the thread of a bus without a file descriptor looks whether it is to end.
 LOOK_S = 0.02
+PERFECT = Bus()
 #: A bus that cannot be read is left alone for this long.
 DOWN_S = 0.2
 
@@ -20,9 +23,10 @@ DOWN_S = 0.2
 class CanWire:
     """Hands the frames of one bus to those who subscribed to their COB-ID. Belongs to the loop's thread."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, bus: can.BusABC) -> None:
+    def __init__(self, loop: asyncio.AbstractEventLoop, bus: can.BusABC, kind: Bus = PERFECT) -> None:
         self.frames = 0  #: received, our own echo included where the bus gives one
         self._loop = loop
+        self._noise = BusNoise(kind)
         self._bus = bus
         self._subscribers: dict[int, dict[object, Handler]] = {}
         self._closing = False
@@ -55,8 +59,11 @@ class CanWire:
 
     def send(self, cob_id: int, data: bytes) -> None:
         """Put one frame on the bus; a bus that does not take it loses it, as a node without a listener does."""
+        message = self._noise.spoil(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        if message is None:
+            return
         try:
-            self._bus.send(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+            self._bus.send(message)
         except can.CanError:
             return
 
@@ -81,9 +88,10 @@ class CanWire:
             if message is not None:
                 self._loop.call_soon_threadsafe(self._deliver, message)
 
-    def _deliver(self, message: can.Message) -> None:
+    def _deliver(self, heard: can.Message) -> None:
         self.frames += 1
-        if message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+        message = self._noise.spoil(heard)
+        if message is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
             return
         handlers = self._subscribers.get(message.arbitration_id)
         if handlers:

@@ -15,6 +15,8 @@ class Line:
     answer_s: float = 0.002  #: how long the charger thinks before it answers
     bytewise: bool = False  #: answers come byte by byte, not frame by frame
     loss: float = 0.0  #: the share of frames, either way, that lose one byte
+    lost: float = 0.0  #: the share of frames, either way, that are lost whole
+    wrong: float = 0.0  #: the share of frames, either way, in which one byte is another one
     garbage: float = 0.0  #: the share of frames, either way, that have rubbish before them
     echo: bool = False  #: an RS-485 adapter that returns what it sends
     seed: int = 1
@@ -29,6 +31,7 @@ LINES = {
     "lossy": Line(loss=0.05),
     "garbage": Line(garbage=0.5),
     "echo": Line(echo=True),
+    "poor": Line(byte_s=BYTE_S, lost=0.01, wrong=0.001),
 }
 
 
@@ -40,8 +43,13 @@ class Noise:
         self._random = random.Random(line.seed)  # noqa: S311 - noise, no secret
 
     def spoil(self, frame: bytes) -> bytes:
-        """The frame as it arrives."""
+        """The frame as it arrives; b"" if it does not."""
         line, dice = self._line, self._random
+        if line.lost and dice.random() < line.lost:
+            return b""
+        if line.wrong and dice.random() < line.wrong:
+            at = dice.randrange(len(frame))
+            frame = frame[:at] + bytes((frame[at] ^ dice.randint(1, 0xFF),)) + frame[at + 1 :]
         if line.loss and dice.random() < line.loss:
             gap = dice.randrange(len(frame))
             frame = frame[:gap] + frame[gap + 1 :]

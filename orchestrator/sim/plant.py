@@ -28,6 +28,7 @@ import can
 from orchestrator.model import ControlMode
 from orchestrator.sim.bay import Bay
 from orchestrator.sim.bmu import Layout
+from orchestrator.sim.can_noise import BUSES
 from orchestrator.sim.can_wire import CanWire
 from orchestrator.sim.charger import Charger
 from orchestrator.sim.faults import FAULTS
@@ -51,7 +52,7 @@ class Plant:
         self._loop = loop
         self._args = args
         self._buses = [can.Bus(**json.loads(text)) for text in args.can or [CAN]]
-        self._wires = [CanWire(loop, bus) for bus in self._buses]
+        self._wires = [CanWire(loop, bus, BUSES[args.bus]) for bus in self._buses]
         self._per_bus = -(-args.bays // len(self._buses))
         self.rigs = [self._build(number) for number in range(args.bays)]
         self._tick()
@@ -206,6 +207,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--soc", type=float, help="state of charge at first, %%; -100 … 0 is deep discharge")
     parser.add_argument("--temperature", type=float, help="of the packs and their surroundings, °C")
     parser.add_argument("--line", choices=LINES, default="real", help="what the serial lines do to bytes")
+    parser.add_argument("--bus", choices=BUSES, default="perfect", help="what the CAN buses do to frames")
     parser.add_argument("--layout", choices=LAYOUTS, default="first-high", help="of the BMUs' words")
     parser.add_argument("--automatic", action="store_true", help="the chargers' rotary switches are on 5, not on 1")
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real time the batteries live")

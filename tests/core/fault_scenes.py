@@ -298,7 +298,7 @@ SCENES: tuple[Scene, ...] = (
     Scene("sdo_aborted", bmu(abort="0x6004: device state", abort_code=0x08000022), bmu(abort="", abort_code=0),
           ("0x6004: device state",), S.SUSPENDED, 0.75),
     Scene("heartbeat_lost", lambda world: bmu(heartbeat_t_s=world.now_s)(world), bmu(heartbeat_t_s=1e9),
-          ("no heartbeat", "1.5 s"), S.SUSPENDED, 1.5, begin=beating, anywhere=False),
+          ("no heartbeat", "2.5 s"), S.SUSPENDED, 2.5, begin=beating, anywhere=False),
     Scene("not_operational", bmu(nmt_state=0x7F), bmu(nmt_state=5), ("pre-operational",), S.SUSPENDED, 4.25,
           begin=with_tpdos, anywhere=False),
     Scene("bmu_rebooted", World.boot, nothing, ("booted while charging",), S.OFFLINE),

@@ -680,8 +680,18 @@ def test_automatic_mode_ends_when_the_charger_is_full() -> None:
 def test_a_node_that_falls_silent_is_not_said_to_withhold_a_temperature() -> None:
     """Where heartbeat and values go stale in the same step, the one that says more is the reason."""
     world = charging()
-    world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=world.now_s + 0.25)
+    world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=world.now_s - 0.75)
     world.frozen.update(("temperature_c", "status"))
     reason = world.until(S.STOPPING, 3).reason
     assert {"heartbeat_lost", "stale_reading"} == set(world.raised)
-    assert reason.startswith("no heartbeat of the BMU for 1.5 s")
+    assert reason.startswith("no heartbeat of the BMU for 2.5 s")
+
+
+def test_a_node_that_answers_may_lose_three_heartbeats_and_a_silent_one_two() -> None:
+    for values, lost_s in ({}, 2.5), ({"voltage_v", "temperature_c", "status"}, 1.5):
+        world = charging()
+        world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=world.now_s)
+        world.frozen.update(values)
+        world.run(lost_s - 0.25)
+        assert not world.raised
+        assert [fault.id for fault in world.tick().faults] == ["heartbeat_lost"]

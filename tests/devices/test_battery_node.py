@@ -76,6 +76,19 @@ def test_fast_objects_each_sweep_slow_ones_each_second() -> None:
     ]  # fmt: skip
 
 
+def test_what_was_not_answered_is_asked_again_before_its_next_turn() -> None:
+    bench = online()
+    asked_s: list[float] = []
+    while len(asked_s) < 2:
+        _, data = bench.next_frame()
+        if data[1] == 2:
+            asked_s.append(bench.now_s)
+        else:
+            bench.now_s += 0.001
+            bench.hear(REPLY, f"43 {data[1:4].hex()} F8 FF 00 00")
+    assert asked_s[1] - asked_s[0] == pytest.approx(0.5, abs=0.05)
+
+
 def test_only_one_request_is_in_flight() -> None:
     bench = Bench()
     bench.next_frame()

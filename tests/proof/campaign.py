@@ -17,10 +17,27 @@ from pathlib import Path
 
 from tests.proof.play import Injected, Played, play
 from tests.proof.report import say
-from tests.proof.script import Script, shrink
+from tests.proof.script import SEE_S, Script, shrink
 
 #: A failure is made smaller with at most this many plays.
 SHRINK_PLAYS = 400
+#: What was there for less than this, or until somebody stopped the bay, need not have shown itself.
+SHOWN_S = SEE_S - 0.5
+#: Nobody has to notice these: they are harmless until something else happens, or look like a healthy bay.
+WHY_UNSEEN = {
+    "frozen_temperature": "a temperature that stays is what a healthy pack shows",
+    "ignore_stop": "shows when a stop is due",
+    "rogue_run": "shows when it stands still",
+    "precharge_no_rise": "is harmless outside of a precharge: the charge is limited in Ah and hours",
+    "stale_reading": "answers within the SDO time-out are good",
+    "status_bits": "bits that only make the charge gentler",
+    "command_ignored": "the lowest step was in use",
+    "over_current": "the pack's voltage limits the current",
+    "volts_disagree": "the offset is within the tolerance",
+    "amps_disagree": "the offset is within the tolerance",
+    "over_temperature": "the strength stays below the limit",
+    "under_temperature": "the strength stays above the limit",
+}
 
 
 def play_seed(seed: int) -> Played:
@@ -53,20 +70,31 @@ def table(injected: Iterable[Injected]) -> list[str]:
     for one in injected:
         by_name[one.name].append(one)
         by_name["all"].append(one)
-    head = f"{'injected':22} {'times':>5} {'detected':>8} {'verified':>8} {'named':>5}"
+    head = f"{'injected':22} {'times':>5} {'detected':>8} {'too short':>9} {'unseen':>6} {'verified':>8} {'named':>5}"
     names = (*sorted(set(by_name) - {"all"}), "all")
     return [f"{head}   stop after, s: median   p99    max", *(_row(name, by_name[name]) for name in names)]
 
 
+def seen(one: Injected) -> bool:
+    return bool(one.fault) or one.named
+
+
+def unseen(one: Injected) -> bool:
+    """It was there for long enough, and nobody noticed."""
+    return not seen(one) and (one.lasted_s or 0.0) >= SHOWN_S
+
+
 def _row(name: str, rows: list[Injected]) -> str:
-    detected = sum(bool(one.fault) or one.named for one in rows)
+    detected, missed = sum(map(seen, rows)), sum(map(unseen, rows))
     verified, named = sum(one.verified for one in rows), sum(one.named for one in rows)
     times_s = sorted(one.stop_s for one in rows if one.stop_s is not None and one.alone and one.fault)
     latency = "–"
     if times_s:
         p99_s = times_s[min(len(times_s) - 1, int(0.99 * len(times_s)))]
         latency = f"{statistics.median(times_s):6.3f} {p99_s:6.3f} {times_s[-1]:6.3f}"
-    return f"{name:22} {len(rows):5} {detected:8} {verified:8} {named:5}   {latency:>37}"
+    short = len(rows) - detected - missed
+    row = f"{name:22} {len(rows):5} {detected:8} {short:9} {missed:6} {verified:8} {named:5}   {latency:>37}"
+    return f"{row}   {WHY_UNSEEN.get(name, '')}" if missed else row
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -97,6 +125,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         f"{len(all_played)} scripts, {virtual_s / 3600:.1f} h of bays in {time.monotonic() - began_s:.0f} s; "
         f"{len(injected)} faults while a charger ran; {len(failed)} scripts failed"
     )
+    for played in all_played:
+        for one in filter(unseen, played.injected):
+            if one.name not in WHY_UNSEEN:
+                say(f"seed {played.script.seed}: UNSEEN: {one}")
     for played in failed[:5]:
         say(f"\nseed {played.script.seed}:\n  " + "\n  ".join(played.violations))
         small = smallest(played.script)

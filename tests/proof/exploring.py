@@ -30,8 +30,8 @@ SMALL_BATTERIES = (
     "healthy", "full", "absent", "silent", "takes nothing", "old temperature", "implausible SOC",
     "voltage_v just below", "temperature_c at 45", "temperature_c at 55",
 )  # fmt: skip
-#: The table leads there, and nothing can: a service that has just started knows of no battery that it has charged full.
-NEVER = {(State.STARTING, State.FULL)}
+#: The table leads there, and nothing can.
+NEVER = {(State.STARTING, State.FULL): "a service that has just started knows of no battery that it has charged full"}
 
 
 def rules(policy: str = "li-ion-48v", control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> Rules:

@@ -87,6 +87,8 @@ SITUATIONS: dict[State, Situation] = {
 
 #: These may be over before a row has lasted for long enough.
 PASSING = frozenset({S.STARTING, S.STOPPING, S.QUALIFYING})
+#: By whether the row is looked for in the state.
+NOT_RAISED = {True: "state left before it lasted", False: "not looked for there"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,13 +111,23 @@ class Used:
     changes: set[tuple[State, State]] = field(default_factory=set)
 
 
+@dataclass(slots=True)
+class Ended:
+    """How a cell ended."""
+
+    word: str = ""
+    stop_s: float | None = None  #: from the step that ordered a stop to its first byte, where none was ordered before
+    wrong: list[str] = field(default_factory=list)
+
+
 class Run:
     """One cell, played."""
 
     def __init__(self, cell: Cell, on: World, used: Used) -> None:
         self.cell, self.world, self.time, self.used = cell, on, on.time, used
         self.rig = on.rigs[0]
-        self.wrong: list[str] = []
+        self.ended = Ended()
+        self.wrong = self.ended.wrong
         self.forced = ""
         self._acts = list(SITUATIONS[cell.state].acts)
         self._armed = self._injected = self._standing = False
@@ -128,7 +140,7 @@ class Run:
         self.rig.wire.on_bytes = self._asked
         self.rig.tty.on_delivered = self._answered
 
-    def run(self) -> list[str]:
+    def run(self) -> Ended:
         self.time.call_later(REACH_S, self._too_late)
         status = self.world.run()
         if status:
@@ -138,7 +150,7 @@ class Run:
         self.wrong += [line for line in self.world.journal.said if "internal error" in line]
         if self.world.guardian.unwell:
             self.wrong.append("a thread of the service ended or hung")
-        return self.wrong
+        return self.ended
 
     def rows(self) -> tuple[Row, ...]:
         """The fault table, with the cell's row under control."""
@@ -147,7 +159,7 @@ class Run:
         def forced(f: Any) -> str | None:
             return self.forced or check(f)
 
-        return tuple(replace(row, check=forced) if other is row else other for other in FAULTS)
+        return tuple(replace(row, check=forced) if other.id == row.id else other for other in FAULTS)
 
     # --- on the way to the state --------------------------------------------------------------------------------------
 
@@ -229,10 +241,12 @@ class Run:
         at_once = cell.row.for_s == 0 and cell.row.polls == 1
         if cell.state in cell.row.where and not raised and (at_once or cell.state not in PASSING):
             self.wrong.append(f"{cell.row.id} was not raised")
+        self.ended.word = "said, and went on" if raised else NOT_RAISED[cell.state in cell.row.where]
         if raised and cell.row.effect >= Effect.PAUSE:
             uncontrolled = (
                 decision.state is State.UNCONTROLLABLE and decision.alarm and self.rig.bay.charger.ignores_stop
             )
+            self.ended.word = "out of control, and said so" if uncontrolled else "stopped, verified"
             if not (uncontrolled or (decision.state in VERIFIED and not self.rig.bay.charger.running)):
                 self.wrong.append(f"{decision.state}: {decision.reason}")
         if raised and cell.row.effect >= Effect.STOP:
@@ -249,7 +263,7 @@ class Run:
             self.wrong.append("no stop was written")
             return
         at_once = self.cell.row.for_s == 0 and self.cell.row.polls == 1  # else it is raised whenever it has lasted
-        took_s = self._stopped_s - self._raised_s
+        took_s = self.ended.stop_s = self._stopped_s - self._raised_s
         allowed_s = STOP_WITHIN_S[self.cell.phase if at_once else Phase.IN_FLIGHT]
         if took_s > allowed_s:
             self.wrong.append(
@@ -271,8 +285,8 @@ def cells(phases: Callable[[int], tuple[Phase, ...]]) -> Iterator[Cell]:
             number += 1
 
 
-def play(cell: Cell, used: Used) -> list[str]:
-    """What is wrong with this cell."""
+def play(cell: Cell, used: Used) -> Ended:
+    """From the beginning to the operator's stop."""
     situation = SITUATIONS[cell.state]
     small = situation.soc_pct is None or situation.speed > 1
     the_station = station([ControlMode.MANUAL], [POLICIES["demo" if small else "48v"]], sweep_s=0.3)

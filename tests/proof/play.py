@@ -7,6 +7,7 @@ thread dies, hangs or meets an exception; and at the end, every fault taken away
 
 import traceback
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -16,11 +17,13 @@ from orchestrator.core.memory import Memory
 from orchestrator.model import ENERGISED, ChargeMode, ControlMode, Decision, Request, Snapshot, State
 from orchestrator.protocol.charger import STOP_FRAME
 from orchestrator.service.bay import VERIFIED, Asked
+from orchestrator.sim.can_noise import Bus
+from orchestrator.sim.can_wire import PERFECT
 from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.presets import PACKS
 from orchestrator.workbench.explore import Move, Taken
 from orchestrator.workbench.properties import PROPERTIES
-from tests.proof.script import Happening, Script
+from tests.proof.script import ARRIVES, MENDS, Happening, Script
 from tests.proof.truth import CONDITIONS, MARGIN_S, VERIFY_S, Bay, Heard, named
 from tests.proof.virtual_rig import ANSWER_S, Nature
 from tests.proof.virtual_service import FIRST_NODE, World, station, world
@@ -48,6 +51,7 @@ class Injected:
     fault: str = ""  #: the id of the first fault that was raised
     verified: bool = False  #: the bay came to verified standby afterwards
     named: bool = False  #: it said that the charger is out of control
+    lasted_s: float | None = None  #: until it was taken away, an operator asked for something, or the end
     alone: bool = True  #: no other fault had been injected before it, or all were taken away again
 
 
@@ -59,6 +63,8 @@ class Played:
     violations: list[str] = field(default_factory=list)
     injected: list[Injected] = field(default_factory=list)
     status: int = 0  #: the service's exit status
+    changes: set[tuple[State, State]] = field(default_factory=set)  #: of the bays' states
+    rows: set[str] = field(default_factory=set)  #: of the fault table, that were raised
 
 
 @dataclass(slots=True)
@@ -79,8 +85,9 @@ class Watch:
 class Player:
     """One script on one world."""
 
-    def __init__(self, script: Script, on: World) -> None:
+    def __init__(self, script: Script, on: World, look_s: float = LOOK_S) -> None:
         self.script, self.world, self.time = script, on, on.time
+        self._look_s = look_s
         self.played = Played(script)
         self.began_s = self.time.now_s
         self.out_of_reach: Callable[[], bool] = lambda: False  #: what is written does not get out
@@ -98,7 +105,7 @@ class Player:
             for bay in range(len(self.watches)):
                 self.time.call_at(self.began_s + self.script.heal_s, self._happen, Happening(0, bay, "heal"))
         self.time.call_at(self.began_s + self.script.end_s, self._end)
-        self.time.call_later(LOOK_S, self._look)
+        self.time.call_later(self._look_s, self._look)
         try:
             self.played.status = self.world.run()
         except BaseException as error:  # noqa: BLE001 - a world that breaks is the worst of all findings
@@ -111,29 +118,38 @@ class Player:
 
     def _happen(self, one: Happening) -> None:
         rig, watch = self.world.rigs[one.bay], self.watches[one.bay]
-        if one.name == "heal" or one.name in set(Request):
-            watch.open.clear()  # what follows may be due to this
+        if one.name in (*MENDS, *Request):
+            self._close(watch)  # what follows may be due to this
         if one.name in set(Request):
             asked = self.world.ask(Request(one.name), one.bay)
             self.time.call_later(ANSWERED_S, self._answered, one, asked)
             return
         runs = rig.bay.charger.running
+        name = "heal" if one.name in MENDS else one.name
         {"port_stalled": self._stall, "bus_down": self._bus_down, "bus_lost": self._bus_lost}.get(
-            one.name, lambda _: rig.inject(lambda rig: FAULTS[one.name].happen(rig, one.value))
+            name, lambda _: rig.inject(lambda rig: FAULTS[name].happen(rig, one.value))
         )(one)
-        if one.name == "heal":
+        if one.name == ARRIVES:
+            rig.bay.pack.set_soc(one.value or 0.0)
+            rig.bmu.reboot()
+        if one.name in MENDS:
             rig.bmu.port.faults.delay_s = ANSWER_S
             rig.tty.stalled = self.world.bus.down = self.world.bus.lost = False
         elif runs:
             rig.wire.counters.mark()
             watch.open.append(Injected(one.name, self.time.now_s, alone=not watch.faulty))
             self.played.injected.append(watch.open[-1])
-        watch.faulty = one.name != "heal"
+        watch.faulty = one.name not in MENDS
 
     def _end(self) -> None:
         for watch in self.watches:
-            watch.open.clear()
+            self._close(watch)
         self.world.end()
+
+    def _close(self, watch: Watch) -> None:
+        for injected in watch.open:
+            injected.lasted_s = self.time.now_s - injected.t_s
+        watch.open.clear()
 
     def _stall(self, one: Happening) -> None:
         self.world.rigs[one.bay].tty.stalled = True
@@ -198,6 +214,7 @@ class Player:
 
     def _changed(self, number: int, before: State, after: State) -> None:
         watch = self.watches[number]
+        self.played.changes.add((before, after))
         if after is State.QUALIFYING:
             watch.qualifying_s = self.time.now_s
         elif before is State.QUALIFYING and after in ENERGISED:
@@ -206,6 +223,7 @@ class Player:
                 self._wrong(number, "resumed", "QUALIFYING took less than 2 s")
 
     def _follow_injected(self, watch: Watch, decision: Decision, snapshot: Snapshot) -> None:
+        self.played.rows |= {fault.id for fault in decision.faults}
         for injected in watch.open:
             news = [fault.id for fault in decision.faults if fault.since_s >= injected.t_s]
             injected.fault = injected.fault or (news[0] if news else "")
@@ -216,7 +234,7 @@ class Player:
     # --- what must be -------------------------------------------------------------------------------------------------
 
     def _look(self) -> None:
-        self.time.call_later(LOOK_S, self._look)
+        self.time.call_later(self._look_s, self._look)
         for number, rig in enumerate(self.world.rigs):
             rig.catch_up()
             runner = self.world.bays[number]
@@ -285,6 +303,12 @@ class Player:
 
 def play(script: Script) -> Played:
     """Play it from the beginning to its end."""
+    with stage(script) as made:
+        return Player(script, made).run()
+
+
+def stage(script: Script, bus: Bus = PERFECT) -> AbstractContextManager[World]:
+    """The world that a script is about."""
     controls = [ControlMode.AUTOMATIC if bay.automatic else ControlMode.MANUAL for bay in script.bays]
     policies = [POLICIES[bay.pack] for bay in script.bays]
     the_station = station(controls, policies, script.limit_a, sweep_s=script.sweep_s, tpdo_s=script.tpdo_s)
@@ -295,5 +319,4 @@ def play(script: Script) -> Played:
             pack.set_soc(bay.soc_pct)
         pack.temperature_c = pack.ambient_c = bay.temperature_c
         natures.append(Nature(pack, control, bay.line, bay.seed, running=bay.running))
-    with world(the_station, natures, end_s=script.end_s + 60.0) as made:
-        return Player(script, made).run()
+    return world(the_station, natures, end_s=script.end_s + 60.0, bus=bus)

@@ -14,6 +14,9 @@ from orchestrator.sim.line import LINES
 
 #: Faults of the station's lines, beside those of `sim.faults`.
 LINE_FAULTS = ("port_stalled", "bus_down", "bus_lost")
+#: A battery comes, of which `value` is the SOC. It takes every fault away, as `heal` does.
+ARRIVES = "arrives"
+MENDS = ("heal", ARRIVES)
 REQUESTS = tuple(str(request) for request in Request)
 #: Everything that can befall a bay; `heal` takes all faults away again.
 INJECTIONS = (*(name for name in FAULTS if name != "heal"), *LINE_FAULTS)
@@ -109,7 +112,7 @@ def _bay(dice: Random) -> BaySetup:
         soc_pct=None if pack == "demo" else dice.choice((None, 5.0, 30.0, 89.5, 99.0)),
         temperature_c=dice.choices((20.0, 8.0, 43.5, -3.0), (6, 1, 1, 1))[0],
         automatic=dice.random() < 0.15,
-        line=dice.choices(tuple(LINES), (3, 6, 1, 1, 3, 1, 1))[0],
+        line=dice.choices(tuple(LINES), (3, 6, 1, 1, 3, 1, 1, 1))[0],
         running=dice.random() < 0.1,
         seed=dice.randrange(1 << 30),
     )

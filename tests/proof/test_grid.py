@@ -4,13 +4,14 @@ import pytest
 
 from orchestrator.core.faults import FAULTS
 from orchestrator.devices.schedule import Due, Schedule, Turn
-from orchestrator.interlock import ALLOWED
-from orchestrator.model import Action, ControlMode, State
-from tests.proof.grid import Cell, Phase, Used, cells, orders, play
+from orchestrator.model import State
+from tests.proof.exploring import changes_of_table
+from tests.proof.grid import Cell, Phase, Used, cells, play
+from tests.proof.paths import NEVER_MADE, PATHS
+from tests.proof.play import play as play_script
+from tests.proof.whole_grid import NEVER_ORDERED, orders_allowed, orders_let_out
 
 PHASES = tuple(Phase)
-#: The charger takes this order, and no policy has a use for it: a charge ends by a stop.
-NEVER_ORDERED = {(Action.SET_MODE, 5)}
 
 
 @pytest.fixture(name="used", scope="module")
@@ -22,7 +23,7 @@ def _used() -> Used:
 def test_every_fault_ends_well(state: State, used: Used) -> None:
     for number, cell in enumerate(cells(lambda number: (PHASES[number % 3],))):
         if cell.state is state:
-            wrong = play(cell, used)
+            wrong = play(cell, used).wrong
             assert not wrong, f"{number}: {cell}: {wrong}"
 
 
@@ -30,14 +31,18 @@ def test_every_row_of_the_fault_table_was_raised(used: Used) -> None:
     assert {row.id for row in FAULTS} - used.rows == set()
 
 
+def test_every_change_of_the_table_was_made(used: Used) -> None:
+    for script in PATHS.values():
+        played = play_script(script)
+        assert not played.violations
+        used.changes |= played.changes
+    assert changes_of_table() - used.changes == set(NEVER_MADE)
+    assert used.changes <= changes_of_table()
+
+
 def test_every_order_that_the_interlock_allows_is_used() -> None:
-    let_out = orders(15.0, None)
-    for limit_a in (2.0, 5.0, 8.0, 11.0, 14.0):
-        let_out |= orders(limit_a, 50.0)
-    allowed = {
-        (action, value) for action, values in ALLOWED[ControlMode.MANUAL].items() for value in values
-    }  # fmt: skip
-    assert let_out - {(Action.STOP, 0)} == allowed - NEVER_ORDERED
+    assert orders_allowed() - orders_let_out() == set(NEVER_ORDERED)
+    assert orders_let_out() <= orders_allowed()
 
 
 def test_a_stop_that_waits_for_its_slot_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -49,5 +54,5 @@ def test_a_stop_that_waits_for_its_slot_is_seen(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(Schedule, "next", waits)
     hot = next(row for row in FAULTS if row.id == "hot_trip")
-    wrong = play(Cell(State.CHARGING, hot, Phase.IDLE), Used())
+    wrong = play(Cell(State.CHARGING, hot, Phase.IDLE), Used()).wrong
     assert any("the stop was written" in line for line in wrong)

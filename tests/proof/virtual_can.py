@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 import can
 
-from orchestrator.sim.can_wire import Handler
+from orchestrator.sim.can_noise import Bus, BusNoise
+from orchestrator.sim.can_wire import PERFECT, Handler
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
 from tests.proof.virtual_tty import Calls
@@ -21,7 +22,7 @@ FRAME_S = 0.0005
 class BusWire:
     """The wire and the emulated nodes on it; what `sim.can_wire.CanWire` is to them."""
 
-    def __init__(self, time: Time, calls: Calls) -> None:
+    def __init__(self, time: Time, calls: Calls, kind: Bus = PERFECT) -> None:
         self.calls = calls
         self.down = False  #: the interface: every call fails with ENETDOWN, and what was open stays deaf
         self.lost = False  #: nobody hears anybody
@@ -31,6 +32,7 @@ class BusWire:
         self._time = time
         self._free_s = 0.0
         self._subscribers: dict[int, dict[object, Handler]] = {}
+        self._noise = BusNoise(kind)
 
     def subscribe(self, cob_id: int, owner: object, handler: Handler) -> None:
         self._subscribers.setdefault(cob_id, {})[owner] = handler
@@ -40,26 +42,32 @@ class BusWire:
 
     def send(self, cob_id: int, data: bytes) -> None:
         """A node says something."""
-        self._time.call_at(self._slot(), self._to_drivers, cob_id, bytes(data))
+        self._put(self._to_drivers, cob_id, data)
 
     def from_driver(self, cob_id: int, data: bytes) -> None:
-        self._time.call_at(self._slot(), self._to_nodes, cob_id, bytes(data))
+        self._put(self._to_nodes, cob_id, data)
+
+    def _put(self, hear: Callable[[can.Message], None], cob_id: int, data: bytes) -> None:
+        at_s = self._slot()
+        message = self._noise.spoil(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        if message is not None:
+            self._time.call_at(at_s, hear, message)
 
     def _slot(self) -> float:
         self._free_s = max(self._free_s, self._time.now_s) + FRAME_S
         return self._free_s
 
-    def _to_drivers(self, cob_id: int, data: bytes) -> None:
+    def _to_drivers(self, message: can.Message) -> None:
         if not (self.down or self.lost):
-            if self.drivers:
-                self.on_frame(cob_id, data)
+            if self.drivers and not message.is_error_frame:
+                self.on_frame(message.arbitration_id, bytes(message.data))
             for driver in self.drivers:
-                driver.deliver(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+                driver.deliver(message)
 
-    def _to_nodes(self, cob_id: int, data: bytes) -> None:
-        if not (self.down or self.lost):
-            for handler in tuple(self._subscribers.get(cob_id, {}).values()):
-                handler(cob_id, data)
+    def _to_nodes(self, message: can.Message) -> None:
+        if not (self.down or self.lost or message.is_error_frame):
+            for handler in tuple(self._subscribers.get(message.arbitration_id, {}).values()):
+                handler(message.arbitration_id, bytes(message.data))
 
     def go_down(self) -> None:
         self.down = True

@@ -31,6 +31,8 @@ from orchestrator.service import supervisor as supervisor_module
 from orchestrator.service.bay import Asked, BayRunner
 from orchestrator.service.kept import Kept
 from orchestrator.service.supervisor import Supervisor
+from orchestrator.sim.can_noise import Bus
+from orchestrator.sim.can_wire import PERFECT
 from tests.proof.virtual_can import BusWire, Driver
 from tests.proof.virtual_rig import Nature, VirtualRig
 from tests.proof.virtual_threads import Event, SimpleQueue, Thread
@@ -133,10 +135,12 @@ def station(
 class World:
     """A station, its emulated bays, and the service on it. Make it by `world()`."""
 
-    def __init__(self, time: Time, the_station: Station, natures: Sequence[Nature], kept: Mapping[str, Memory]) -> None:
+    def __init__(
+        self, time: Time, the_station: Station, natures: Sequence[Nature], kept: Mapping[str, Memory], bus: Bus
+    ) -> None:
         self.time = time
         self.kernel = Kernel(time)
-        self.bus = BusWire(time, self.kernel.calls)
+        self.bus = BusWire(time, self.kernel.calls, bus)
         self.rigs = [
             VirtualRig(time, self.bus, self.kernel.add(bay.charger.port), bay.battery.node_id, nature)
             for bay, nature in zip(the_station.bays, natures, strict=True)
@@ -255,10 +259,15 @@ class _Kept:
 
 @contextmanager
 def world(
-    the_station: Station, natures: Sequence[Nature], *, end_s: float = 600.0, kept: Mapping[str, Memory] | None = None
+    the_station: Station,
+    natures: Sequence[Nature],
+    *,
+    end_s: float = 600.0,
+    kept: Mapping[str, Memory] | None = None,
+    bus: Bus = PERFECT,
 ) -> Iterator[World]:
     """A world that is taken down whole, however it ends; `end_s` is its last moment if nobody ends it before."""
-    made = World(Time(end_s), the_station, natures, kept or {})
+    made = World(Time(end_s), the_station, natures, kept or {}, bus)
     try:
         yield made
     finally:

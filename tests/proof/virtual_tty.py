@@ -1,6 +1,6 @@
 """Serial ports in memory, below the unchanged pyserial: what the kernel would do, in virtual time, call by call.
 
-Every call that touches a port goes past `Calls`, which can make any one of them fail as kernels do.
+Every call that touches a port goes past `Calls`, so that any one of them can be made to fail as kernels do.
 """
 
 import errno
@@ -23,15 +23,13 @@ ROOM = 4096
 
 
 class Calls:
-    """Counts every call by its name; `fail` may raise or return what this one shall return instead."""
+    """Every call passes here; `on_call` may raise or return what this one shall return instead."""
 
     def __init__(self) -> None:
-        self.made: list[str] = []
-        self.fail: Callable[[str, int], Any] | None = None  #: (name, number) → None: go on
+        self.on_call: Callable[[str], Any] | None = None  #: its name → None: go on
 
     def __call__(self, name: str) -> Any:
-        self.made.append(name)
-        return None if self.fail is None else self.fail(name, len(self.made) - 1)
+        return None if self.on_call is None else self.on_call(name)
 
 
 @dataclass(slots=True)

@@ -32,3 +32,12 @@ def test_the_same_seed_spoils_the_same_frames() -> None:
     line = Line(loss=0.5, garbage=0.5, seed=7)
     first, second = Noise(line), Noise(line)
     assert [first.spoil(FRAME) for _ in range(50)] == [second.spoil(FRAME) for _ in range(50)]
+
+
+def test_the_poor_line_loses_one_frame_in_a_hundred_and_changes_a_byte_in_one_of_a_thousand() -> None:
+    noise = Noise(LINES["poor"])
+    heard = [noise.spoil(FRAME) for _ in range(20_000)]
+    assert 150 <= heard.count(b"") <= 250
+    changed = [frame for frame in heard if frame not in (FRAME, b"")]
+    assert 10 <= len(changed) <= 30
+    assert all(sum(a != b for a, b in zip(frame, FRAME, strict=True)) == 1 for frame in changed)

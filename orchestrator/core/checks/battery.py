@@ -10,6 +10,8 @@ COLD_HYSTERESIS_K = 3.0
 JUMP_K = 5.0
 #: The rate of warming is judged over this long.
 WARMING_S = 180.0
+#: Heartbeats are missed after so many of their periods: of a node that answers nothing else, and of one that does.
+SILENT_PERIODS, ANSWERING_PERIODS = 2.5, 4.5
 #: SDO abort codes (upper half) that say: the object is not there, or not like this. The others may pass.
 REFUSALS = frozenset({0x0601, 0x0602, 0x0604, 0x0606, 0x0607, 0x0609})
 #: NMT states as a heartbeat tells them (CiA 301).
@@ -50,12 +52,15 @@ def sdo_aborted(f: Facts) -> str | None:
 
 
 def heartbeat_lost(f: Facts) -> str | None:
-    """FAULTS B6."""
-    link = f.battery
+    """FAULTS B6. A node that answers is alive, and a poor bus loses two heartbeats in a row several times a day."""
+    link, volts = f.battery, f.snapshot.battery.voltage_v
     if link.heartbeat_s is None or link.heartbeat_t_s is None:
         return None
     age_s = f.now_s - link.heartbeat_t_s
-    return f"no heartbeat of the BMU for {age_s:.1f} s" if age_s > 2.5 * link.heartbeat_s else None
+    answered_s = volts.t_s if volts is not None else link.heartbeat_t_s
+    silent = f.now_s - answered_s > SILENT_PERIODS * link.heartbeat_s
+    allowed = SILENT_PERIODS if silent else ANSWERING_PERIODS
+    return f"no heartbeat of the BMU for {age_s:.1f} s" if age_s > allowed * link.heartbeat_s else None
 
 
 def not_operational(f: Facts) -> str | None:

@@ -1,0 +1,48 @@
+"""The campaign: every proof on the whole service in virtual time, in its long form, one after the other.
+
+    python -m tests.proof                 all of them
+    python -m tests.proof grid calls      only these two
+
+Each has a main of its own, with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`, `exploring`.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+from tests.proof import campaign, exploring, nth_call, whole_grid
+from tests.proof.report import say
+
+PARTS: Mapping[str, tuple[str, Callable[[Sequence[str]], int]]] = {
+    "grid": ("every state × every row of the fault table × what the line is just doing", whole_grid.main),
+    "scripts": ("random fault scripts", campaign.main),
+    "calls": ("every call of a charge made to fail in turn, with each of its errors, once and lasting", nth_call.main),
+    "core": ("everything that the core can come to", exploring.main),
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Those parts, in this order; 1 if any of them found something."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
+    chosen = parser.parse_args(argv).parts or list(PARTS)
+    if unknown := set(chosen) - set(PARTS):
+        parser.error(f"no part {', '.join(sorted(unknown))}: there are {', '.join(PARTS)}")
+    began_s = time.monotonic()
+    found = []
+    for name in PARTS:
+        if name in chosen:
+            about, run = PARTS[name]
+            say(f"\n--- {name}: {about}\n")
+            if run([]):
+                found.append(name)
+    say(
+        f"\n{time.monotonic() - began_s:.0f} s; "
+        + (f"FOUND SOMETHING: {', '.join(found)}" if found else "nothing found")
+    )
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
