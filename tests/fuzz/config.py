@@ -1,0 +1,100 @@
+"""Files that a person wrote: whatever is in them, the answer is a finding that can be printed, or a good record."""
+
+import re
+import tempfile
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from zlib import crc32
+
+from orchestrator.config import load, ports
+from orchestrator.config.reader import MAX_FINDINGS
+from orchestrator.config.yamltree import MAX_FINDINGS as MAX_YAML_FINDINGS
+from orchestrator.config.station import Station
+from orchestrator.errors import ConfigError, Finding
+from tests.fuzz.target import Target
+
+TESTS = Path(__file__).resolve().parent.parent / "config"
+MAX_TEXT = 6000  #: characters of a finding: room for a path of 4096 bytes, and all keys of a record
+#: A token of our files: a comment, a text in quotes, a word or number, one character, an indented line's beginning.
+TOKEN = re.compile(rb"\n *(?:- )?|#[^\n]*|\"[^\"\n]*\"|'[^'\n]*'|[\w./-]+|.", re.DOTALL)
+
+#: The same bytes are parsed once, whoever reads them.
+load.parse = ports.parse = lru_cache(maxsize=16)(load.parse)
+
+
+def _plain(path: Path) -> bytes:
+    """A shipped file without its comments, which make it long and slow."""
+    text = re.sub(rb"(^|\s)#[^\n]*", b"", path.read_bytes())
+    return re.sub(rb"\n(\s*\n)+", b"\n", text).lstrip()
+
+
+DIRECTORY = Path(tempfile.mkdtemp(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+FILE = DIRECTORY / "file.yaml"
+LOADERS: tuple[Callable[[Path], object], ...] = (load.load_policy, load.load_map, load.load_station)
+for name in ("policy.yaml", "map.yaml"):
+    (DIRECTORY / name).write_bytes((TESTS / "good" / name).read_bytes())
+
+
+def one(data: bytes) -> None:
+    """`check`, each `load_…` and the emergency stop's own reading of one file."""
+    FILE.write_bytes(data)
+    findings = load.check([FILE])
+    lines = data.split(b"\n")
+    assert len(findings) <= MAX_FINDINGS + 2 * MAX_YAML_FINDINGS
+    for finding in findings:
+        _is_shown_well(finding, lines)
+    loaders = LOADERS if not findings else LOADERS[crc32(data) % 3 :][:1]
+    loaded = [record for loader in loaders if (record := _loaded(loader, lines)) is not None]
+    assert len(loaded) == (0 if findings else 1), "`check` and loading say different things"
+    found = ports.wiring(FILE)
+    for record in loaded:
+        assert not isinstance(record, Station) or len(found.ports) == len(record.bays)
+
+
+def _loaded(loader: Callable[[Path], object], lines: list[bytes]) -> object:
+    try:
+        return loader(FILE)
+    except ConfigError as error:
+        assert error.findings
+        for finding in error.findings:
+            _is_shown_well(finding, lines)
+        return None
+
+
+def _is_shown_well(finding: Finding, lines: list[bytes]) -> None:
+    """FILE:LINE:COLUMN: error: one line that any terminal takes, at a place that is there."""
+    shown = str(finding)
+    assert re.match(re.escape(finding.file) + r":[1-9]\d*:[1-9]\d*: error: .", shown), shown
+    assert "\n" not in shown and shown.isprintable(), ascii(shown)
+    assert len(finding.text) <= MAX_TEXT, f"{len(finding.text)} characters"
+    if finding.file == str(FILE):
+        assert finding.line <= len(lines) + 1, shown
+        assert finding.column <= max(map(len, lines)) + 1, shown
+
+
+_GOOD = [_plain(path) for path in sorted((TESTS / "good").glob("*.yaml"))]
+_BROKEN = [path.read_bytes() for path in sorted((TESTS / "broken").glob("*.yaml"))]
+_STATION = _GOOD[-1].replace(b"li-ion-48v", b"policy.yaml").replace(b"tabos", b"map.yaml")
+
+TARGET = Target(
+    one,
+    TOKEN.findall,
+    [_STATION, *_GOOD, *(broken for broken in _BROKEN if len(broken) <= 1200)],
+    [
+        *(b"\n" + b" " * spaces for spaces in (0, 2, 4, 6)), b"\n  - ", b"\n- ", b"\n---\n", b"\n...\n", b"%YAML 1.1\n",
+        b"%YAML 1." + b"1" * 600 + b"\n", b"%TAG ! tag:x,2000:\n", b": ", b"? ", b"- ", b"{", b"}", b"[", b"]", b", ",
+        b"&a ", b"*a", b"!!str ", b"!x ", b"<<: ", b"| \n  x", b">-\n  x", b"|9", b"'", b'"', b"''", b'""', b"# x", b"\t",
+        b'"\\0"', b'"\\ud800/"', b'"\\U00110000"', b'"\\UFFFFFFFF"', b'"\\x41"', b'"\\q"', b'"a\\nb/c"', b'"a\\0/b"',
+        b"null", b"~", b"true", b"yes", b"on", b"0", b"-0", b"1", b"-1", b"0x10", b"0o17", b"017", b"1e3", b"1_000",
+        b".nan", b"-.inf", b"1:30", b"2,5", b"5 V", b"0.1", b"9" * 39, b"9" * 400, b"0." + b"1" * 37, b"100", b"127",
+        b"policy", b"map", b"station", b"policy.yaml", b"map.yaml", b"file.yaml", b"../x.yaml", b"/dev/null", b"/", b".",
+        b"x" * 200, b"/" + b"x" * 300, b"li-ion-48v", b"tabos", b"tabos-lsb", b"manual", b"automatic", b"kernel",
+        b"objects", b"fields", b"tpdos", b"bays", b"charger", b"battery", b"limits", b"can", b"can0", b"control",
+        b"interface: virtual", b"bitrate: 250000", b"\xff", b"\xc2\x85", b"\xc2\xa0", b"\xe2\x80\xa8", b"\xef\xbb\xbf",
+        b"\xf0\x9f\x94\x8b", b"\xed\xa0\x80", b"\r\n", b"\r", b"\0",
+    ],
+    ["orchestrator/config/*"],
+    max_bytes=1200,
+    limit_s=2.0,
+)  # fmt: skip
