@@ -6,6 +6,7 @@ An input is bytes, whatever the target makes of them, so that a crash is a file.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from random import Random
 
 Cut = Callable[[bytes], list[bytes]]
@@ -55,7 +56,7 @@ def changed(target: Target, data: bytes, random: Random) -> bytes:
 def _change(target: Target, pieces: list[bytes], random: Random) -> None:
     at = random.randrange(len(pieces) + 1)
     end = min(len(pieces), at + random.choice((1, 1, 1, 2, 5)))
-    other = target.cut(random.choice(target.seeds))
+    other = _cut(target.cut, random.choice(target.seeds))
     begin = random.randrange(len(other) + 1)
     word = random.choice(target.words)
     pieces[at:end] = random.choice((
@@ -67,6 +68,11 @@ def _change(target: Target, pieces: list[bytes], random: Random) -> None:
         other[begin : begin + random.choice((1, 1, 3, 8))],
         [*pieces[at:end], *random.sample(pieces, min(3, len(pieces)))],
     ))  # fmt: skip
+
+
+@cache
+def _cut(cut: Cut, seed: bytes) -> list[bytes]:
+    return cut(seed)
 
 
 def _damaged(piece: bytes, random: Random) -> bytes:
