@@ -79,7 +79,7 @@ def one(data: bytes) -> None:
     assert len(findings) <= MAX_FINDINGS + 2 * MAX_YAML_FINDINGS
     for finding in findings:
         _is_shown_well(finding, lines)
-    loaders = LOADERS if not findings else LOADERS[crc32(data) % 3 :][:1]
+    loaders = LOADERS if not findings else LOADERS[crc32(data) % 8 :][:1]
     loaded = [record for loader in loaders if (record := _loaded(loader, lines)) is not None]
     assert len(loaded) == (0 if findings else 1), "`check` and loading say different things"
     found = ports.wiring(FILE)
@@ -111,9 +111,15 @@ def _is_shown_well(finding: Finding, lines: list[bytes]) -> None:
 SHORT = 250  #: bytes of a broken file that is quick
 BROKEN = [path.read_bytes() for path in sorted((TESTS / "broken").glob("*.yaml"))]
 
+def kind(token: bytes) -> object:
+    """Words and texts are alike, blanks are alike, and each other character is like itself."""
+    return b"w" if re.match(rb"[\w\"'./+-]", token) else b" " if token.isspace() else token[:1]
+
+
 TARGET = Target(
     one,
     TOKEN.findall,
+    kind,
     [STATION, POLICY, MAP, *(broken for broken in BROKEN if len(broken) <= SHORT)],
     [
         *OPTIONAL,
@@ -130,6 +136,7 @@ TARGET = Target(
         b"\xf0\x9f\x94\x8b", b"\xed\xa0\x80", b"\r\n", b"\r", b"\0",
     ],
     ["orchestrator/config/*"],
-    max_bytes=1000,
+    max_bytes=640,
     limit_s=2.0,
+    blind=0.1,  # most of these are no YAML at all
 )  # fmt: skip
