@@ -59,10 +59,11 @@ def read_kept(directory: Path, bays: Iterable[str]) -> dict[str, Kept]:
     path = directory / FILE
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
+        json.dumps(document, ensure_ascii=False).encode()  # half a character can be neither shown nor written again
         return {name: _kept(document.get(name, {})) for name in bays}
     except FileNotFoundError:
         return {name: Kept() for name in bays}
-    except (OSError, ValueError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
         lost = f"{path} cannot be read ({error}): nobody knows which faults were latched; start to go on"
         return {name: Kept(hold=lost) for name in bays}
 

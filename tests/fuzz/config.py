@@ -1,5 +1,6 @@
 """Files that a person wrote: whatever is in them, the answer is a finding that can be printed, or a good record."""
 
+import os
 import re
 import tempfile
 from collections.abc import Callable
@@ -83,6 +84,7 @@ def one(data: bytes) -> None:
     loaded = [record for loader in loaders if (record := _loaded(loader, lines)) is not None]
     assert len(loaded) == (0 if findings else 1), "`check` and loading say different things"
     found = ports.wiring(FILE)
+    assert b"\0" not in os.fsencode("".join(found.ports) + found.socket), "no system call takes that"
     for record in loaded:
         assert not isinstance(record, Station) or len(found.ports) == len(record.bays)
 
