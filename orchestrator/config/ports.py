@@ -37,8 +37,14 @@ def wiring(path: Path) -> Wiring:
     if not socket and (found := _SOCKET.search(bare)):
         socket = found[1].decode(errors="surrogateescape")
     return Wiring(
-        {str(path.parent / port): name for port, name in ports.items()}, str(path.parent / socket) if socket else ""
+        {_shown(path.parent / port): name for port, name in ports.items()},
+        _shown(path.parent / socket) if socket else "",
     )
+
+
+def _shown(path: Path) -> str:
+    """The path, with a backslash for a 0: no file can have that, and asking for it would end a stop with an error."""
+    return str(path).replace("\0", "\\0")
 
 
 def _ports(node: Node) -> dict[str, str]:
@@ -52,7 +58,8 @@ def _ports(node: Node) -> dict[str, str]:
 
 
 def _text(node: Node | None) -> str:
-    return node.text if isinstance(node, Scalar) else ""
+    # Half a character, which YAML can write as an escape, is in no file's name: it is shown as what was written.
+    return node.text.encode(errors="backslashreplace").decode() if isinstance(node, Scalar) else ""
 
 
 def _get(node: Node | None, key: str) -> Node | None:

@@ -99,7 +99,7 @@ class Reader:
             if scalars.is_null(node) and hint is not object:
                 raise UnfitError(f"cannot be null: {key.about}")
             if hint in self._references:
-                return self._references[hint](node.text)
+                return self._references[hint](scalars.read_path(node, key))
             if hint is Path or key.is_path:
                 return hint(Path(self._file).parent / scalars.read_path(node, key))
             if isinstance(hint, type) and issubclass(hint, Enum):

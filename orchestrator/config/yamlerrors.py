@@ -31,6 +31,12 @@ _EXPLANATIONS: tuple[tuple[str, str, bool, str], ...] = (
         False,
         "\\{what} means nothing in double quotes: use single quotes",
     ),
+    (
+        "invalid Unicode character escape code",
+        "",
+        False,
+        "no character has this number: write the character itself, or put the text in single quotes",
+    ),
     ("could not find expected ':'", "simple key", True, "a key needs ': ' (colon and space) behind it"),
     (
         r"expected ',' or '\]'",

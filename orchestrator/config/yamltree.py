@@ -111,6 +111,8 @@ def _compose(file: str, text: str) -> tuple[Node | None, list[Finding]]:
         except yaml.MarkedYAMLError as error:
             line, column, problem = explain(error)
             failed = [*composer.findings, Finding(file, line, column, problem)]
+        except (ValueError, OverflowError):  # the pure parser's own, of an escape or a %YAML beyond all numbers
+            failed = failed or [Finding(file, 1, 1, "an escape, or the number behind %YAML, is beyond all bounds")]
         except _TooMuchError:
             return None, composer.findings
         else:

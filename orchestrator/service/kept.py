@@ -60,12 +60,13 @@ def read_kept(directory: Path, bays: Iterable[str]) -> dict[str, Kept]:
     path = directory / FILE
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
+        json.dumps(document, ensure_ascii=False).encode()  # half a character can be neither shown nor written again
         return {name: _kept(document.get(name, {})) for name in bays}
     except FileNotFoundError:
         ran = any(directory.glob("events*"))  # what is kept is written along with the first of them
         lost = f"{path} is lost, though this service has run here before: {NOBODY_KNOWS}" if ran else ""
         return {name: Kept(hold=lost) for name in bays}
-    except (OSError, ValueError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError) as error:
         lost = f"{path} cannot be read ({error}): {NOBODY_KNOWS}"
         return {name: Kept(hold=lost) for name in bays}
 

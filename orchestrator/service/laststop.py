@@ -159,7 +159,10 @@ def open_port(name: str, *, leave_held: bool) -> int:
 
     `leave_held`: only if no service holds it, by the lock that a service puts on it; then it is held. OSError says why.
     """
-    fd = os.open(name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        fd = os.open(name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except ValueError:  # a 0, or half a character: a dying controller may say anything
+        raise OSError(errno.EINVAL, "not the name of a port") from None
     try:
         if not os.isatty(fd):
             raise OSError(errno.ENOTTY, "not a serial port")

@@ -169,21 +169,21 @@ class Supervisor:
     def _answer(self, request: Mapping[str, object]) -> dict[str, object]:
         verb = request.get("verb")
         if verb == "status":
-            bays = [bay.status() for bay in self._named(request.get("bay"))]
-            return station_status(self._station, bays, self._journal.problem(monotonic()))
+            name = request.get("bay")
+            bays = self._bays if name is None else [self._named(name)]
+            return station_status(self._station, [bay.status() for bay in bays], self._journal.problem(monotonic()))
         if isinstance(verb, str) and verb in set(Request):
-            bays_named = request.get("bays")
-            chosen = self._bays if bays_named is None else [b for name in _names(bays_named) for b in self._named(name)]
-            return {"results": self._ask(chosen, Request(verb))}
+            names = request.get("bays")
+            bays = self._bays if names is None else [self._named(name) for name in _names(names)]
+            # Once each: a request that waits behind itself would make a stop that comes after it wait, too.
+            return {"results": self._ask(list(dict.fromkeys(bays)), Request(verb))}
         raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
 
-    def _named(self, name: object) -> list[BayRunner]:
-        if name is None:
-            return self._bays
-        found = [bay for bay in self._bays if bay.name == name]
-        if not found:
-            raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
-        return found
+    def _named(self, name: object) -> BayRunner:
+        for bay in self._bays:
+            if bay.name == name:
+                return bay
+        raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
 
     def _ask(self, bays: list[BayRunner], request: Request) -> dict[str, str]:
         """Hand the request to each bay and gather what they say; "" is yes."""

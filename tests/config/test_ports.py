@@ -59,6 +59,15 @@ def test_a_port_under_a_misspelt_key_is_not_forgotten(tmp_path: Path) -> None:
     assert dict(wiring(file).ports) == {"/dev/ttyS2": "bay-2", "/dev/ttyS1": ""}
 
 
+def test_a_port_whose_name_no_file_can_have_is_shown_as_written(tmp_path: Path) -> None:
+    """Asking the system for it would end the emergency stop in mid-work."""
+    file = tmp_path / "x.yaml"
+    file.write_text(GOOD.replace("/dev/ttyS1", r'"/dev/\0\ud800"') + 'x:\n  port: "/dev/\0"\n')
+    assert set(wiring(file).ports) == {"/dev/ttyS2", r"/dev/\0", r"/dev/\0\ud800"}
+    file.write_text(GOOD.replace("run/orchestrator.sock", r'"a\0b\ud800"'))
+    assert wiring(file).socket == str(tmp_path / r"a\0b\ud800")
+
+
 def test_a_file_without_ports_has_none(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text("bays: 7\n")

@@ -61,6 +61,17 @@ def test_without_libyaml_the_findings_are_the_same(path: Path, monkeypatch: pyte
     assert check([path]) == expected
 
 
+@pytest.mark.parametrize("text", [r'a: "\U00110000"', r'a: "\UFFFFFFFF"', f"%YAML 1.{'1' * 5000}\n---\na: 1\n"])
+@pytest.mark.parametrize("loaders", [yamltree._LOADERS, (yaml.SafeLoader,)], ids=["both", "pure"])
+def test_a_number_beyond_all_bounds_is_one_finding(
+    text: str, loaders: tuple[type], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(yamltree, "_LOADERS", loaders)
+    node, findings = parse("f", text.encode())
+    assert node is None
+    assert len(findings) == 1
+
+
 def test_a_byte_order_mark_and_windows_line_ends_are_fine() -> None:
     node, findings = parse("f", b"\xef\xbb\xbfa: 1\r\nb: 2\r\n")
     assert findings == []

@@ -40,6 +40,15 @@ def test_a_port_is_opened_by_its_name(tmp_path: Path) -> None:
         assert not bench.runs
 
 
+def test_a_name_that_no_file_can_have_keeps_no_other_charger_running(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        nameless = "not the name of a port"
+        assert stop_all({"a\0b": None, bench.name: None, "\ud800": None}, 1.0) == {
+            "a\0b": nameless, bench.name: "", "\ud800": nameless,
+        }  # fmt: skip
+        assert not bench.runs
+
+
 @pytest.mark.parametrize("line", ["echo", "garbage", "delayed", "bytewise", "lossy"])
 def test_on_every_kind_of_line(tmp_path: Path, line: str) -> None:
     with running_chargers(tmp_path, line=line) as (bench,):

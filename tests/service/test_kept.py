@@ -119,6 +119,10 @@ def test_a_bay_that_is_new_has_nothing(tmp_path: Path) -> None:
         '{"bay-1": {"hold": null}}',
         '{"bay-1": {"faults": []}}',
         '{"bay-1": {"faults": {"emergency": 5}}}',
+        '{"bay-1": {"hold": "\\ud800"}}',
+        '{"bay-1": {"faults": {"emergency": "\\udcff"}}}',
+        '{"bay-1": {"\\ud800": 1}}',
+        "[" * 5000,
         "\udcff",
     ],
 )
@@ -128,6 +132,7 @@ def test_what_cannot_be_read_holds_every_bay(tmp_path: Path, text: str) -> None:
         if name == "bay-1" or not text.startswith('{"bay-1'):
             assert kept.hold.startswith(f"{tmp_path / FILE} cannot be read (")
             assert kept.memory(NOW_S).hold == kept.hold
+            assert kept.hold.encode(), "it can be shown and written"
 
 
 def test_a_directory_in_its_place_holds_every_bay(tmp_path: Path) -> None:

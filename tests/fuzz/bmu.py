@@ -1,0 +1,137 @@
+"""The CAN bus: any frames with a BMU's ids, at any time, between what the node asks for."""
+
+from orchestrator.config.load import load_map
+from orchestrator.model import BatteryReading, Measurement
+from orchestrator.protocol.pages import parse_page
+from orchestrator.protocol.sdo import NMT_COB_ID, SdoMalformed, parse_reply
+from orchestrator.protocol.words import decode_word
+from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, NODE_ID, REPLY, REQUEST, Bench, config
+from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
+from tests.protocol.vectors import BMU
+
+#: What an event is: a frame on one of four ids, an answer to the newest request, time, trouble with the bus, and bytes
+#: for the parsers that are not the node's.
+SDO, HEART, EMCY, TPDO, ANSWER, PAUSE, TROUBLE, PARSE = range(8)
+TPDO_COB_IDS = (0x190, 0x290, 0x390)
+COMMANDS = (0x43, 0x43, 0x4B, 0x4F, 0x60, 0x80, 0x41, 0xFF)
+MAPS = (load_map("tabos"), load_map("tabos-lsb"))
+#: By the first byte of an input: heartbeat and TPDO periods, and the map.
+CONFIGS = tuple(
+    config(heartbeat_s=heartbeat_s, tpdo_s=tpdo_s, object_map=object_map)
+    for heartbeat_s in (None, 0.5)
+    for tpdo_s in (None, 0.1)
+    for object_map in MAPS
+)
+MAX_EVENTS = 16
+MAX_TEXT = 300  #: characters of anything that is said of a battery
+
+
+class Session:
+    """A node on a bench and the time; each event may be hostile."""
+
+    def __init__(self, choice: int) -> None:
+        settings = CONFIGS[choice % len(CONFIGS)]
+        self.bench = Bench(settings)
+        self._objects = settings.map.objects
+        self._ranges = {field.name: field.range for entry in self._objects for field in entry.fields}
+        self._shown: object = None
+        self._keys = len(self._objects) + 1 + len(settings.map.tpdos)  # all that can be asked for
+
+    def event(self, kind: int, content: bytes) -> None:
+        """Whatever happens next on the bus."""
+        bench = self.bench
+        if kind == PAUSE:
+            bench.run(content[0] / 100 if content else 0.02)
+        elif kind == TROUBLE:
+            bench.node.trouble = "the bus is in trouble" if content else ""
+            bench.node.fail("the bus failed", bench.now_s)
+        elif kind == PARSE:
+            self._parse(content)
+        elif kind == ANSWER:
+            self._answer(content)
+        else:
+            ids = {SDO: REPLY, HEART: HEARTBEAT, EMCY: EMERGENCY}
+            self._frame(ids.get(kind) or TPDO_COB_IDS[content[0] % 3 if content else 0], content[kind == TPDO :])
+        self._is_honest()
+
+    def _answer(self, content: bytes) -> None:
+        """To the newest request, or to the next one: right by its form, but for what the content makes of it."""
+        self.bench.step(self.bench.now_s + 0.6)
+        asked = [data for cob_id, data in self.bench.sent[-1:] if cob_id == REQUEST]
+        command = COMMANDS[content[0] % len(COMMANDS)] if content else 0x43
+        for data in asked:
+            if data[0] != 0x40 and not content:
+                command = 0x60
+            self._frame(REPLY, bytes((command,)) + data[1:4] + content[1:5].ljust(4, b"\0"))
+
+    def _frame(self, cob_id: int, data: bytes) -> None:
+        if cob_id in self.bench.node.cob_ids:  # the bus hands on no other
+            self.bench.node.on_frame(cob_id, data, self.bench.now_s)
+
+    def _parse(self, content: bytes) -> None:
+        reply = parse_reply(content)
+        assert not isinstance(reply, SdoMalformed) or len(reply.reason) <= MAX_TEXT
+        for value in parse_page(NODE_ID, content).values():
+            assert value is None or isinstance(value, (Measurement, str))
+        for entry in self._objects:
+            for name, value in decode_word(entry, int.from_bytes(content, "little"), len(content), 0.0).items():
+                assert not isinstance(value, Measurement) or value.value in self._ranges[name]
+
+    def _is_honest(self) -> None:
+        """What is shown is in range and of the past; nothing grows; nothing is sent but to this node."""
+        bench, link = self.bench, self.bench.link
+        assert len(bench.node._client._answered) <= self._keys
+        assert all(cob_id in (NMT_COB_ID, REQUEST) and len(data) <= 8 for cob_id, data in bench.sent)
+        del bench.sent[:-1]
+        if bench.node.view is self._shown:
+            return
+        self._shown = bench.node.view
+        for name in BatteryReading.__slots__:
+            value = getattr(bench.reading, name)
+            assert value is None or (value.value in self._ranges[name] and value.t_s <= bench.now_s), name
+        assert link.online == (link.problem == "")
+        assert set(link.implausible) <= set(self._ranges)
+        for text in (link.problem, link.abort, link.emergency, *link.implausible.values()):
+            assert len(text) <= MAX_TEXT and text.isprintable(), text
+
+
+def one(data: bytes) -> None:
+    """Some seconds with one BMU."""
+    session = Session(data[0] if data else 0)
+    for number, (kind, content) in enumerate(records(data[1:])):
+        session.event(kind, content)
+        if number == MAX_EVENTS:
+            break
+
+
+def _cut(data: bytes) -> list[bytes]:
+    return [data[:1], *cut_records(data[1:])]
+
+
+_HEALTHY = b"".join(record(ANSWER) + record(PAUSE, b"\x02") for _ in range(6))
+
+TARGET = Target(
+    one,
+    _cut,
+    kind_of_record,
+    [
+        *(bytes((choice,)) + _HEALTHY for choice in range(len(CONFIGS))),
+        *(bytes((7,)) + record(PAUSE) + record(SDO, exchange.reply) for exchange in BMU),
+    ],
+    [
+        record(ANSWER), record(ANSWER, b"\0\x09\x40\xff\xf8"), record(ANSWER, b"\0\xff\xff\xff\xff"), record(ANSWER, b"\5\0\0\2\6"),
+        record(ANSWER, b"\5\x22\0\0\x08"), record(ANSWER, b"\2\1"), record(ANSWER, b"\4"), record(ANSWER, b"\7"), _HEALTHY,
+        record(SDO, bytes.fromhex("8000600000000206")), record(SDO, bytes.fromhex("4300600000000000")), record(SDO, bytes(7)),
+        record(SDO, bytes.fromhex("6017100000000000")), record(HEART, b"\0"), record(HEART, b"\5"), record(HEART, b"\4"),
+        record(HEART, b"\x7f"), record(HEART), record(EMCY, bytes(8)), record(EMCY, b"\x10\x42\0\0\0\0\0\0"), record(EMCY, b"\1"),
+        *(record(TPDO, bytes((number,)) + content) for number in range(3) for content in (bytes(8), b"\xff" * 8, b"\1")),
+        record(PAUSE, b"\x02"), record(PAUSE, b"\x32"), record(PAUSE, b"\xc8"), record(TROUBLE), record(TROUBLE, b"\1"),
+        record(PARSE, b"\x70\1" + bytes(6)), record(PARSE, b"\x70\2" + b"\xff" * 6), record(PARSE, b"\x70\3" + bytes(6)),
+    ],
+    ["orchestrator/protocol/sdo.py", "orchestrator/protocol/words.py", "orchestrator/protocol/pages.py",
+     "orchestrator/devices/battery.py", "orchestrator/devices/battery_view.py", "orchestrator/devices/bmu_setup.py",
+     "orchestrator/devices/emergency.py", "orchestrator/devices/node_health.py", "orchestrator/devices/polled.py",
+     "orchestrator/devices/read_plan.py", "orchestrator/devices/sdo_client.py"],
+    max_bytes=100,
+    limit_s=1.0,
+)  # fmt: skip

@@ -1,0 +1,124 @@
+"""The control socket: any bytes from a client, to the service's own handler, with the answer as it goes back."""
+
+import json
+import re
+import socket
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from orchestrator.config.load import load_station
+from orchestrator.model import Request
+from orchestrator.service import control
+from orchestrator.service.guarded import GuardianLink
+from orchestrator.service.supervisor import Supervisor
+from tests.fuzz.target import Target
+
+#: Of an answer: two bays' status, or an error with a name of as many bytes as a request may have, escaped.
+MAX_ANSWER = 32 * 1024
+BAYS = ("bay-1", "bay-2")
+STATION = """
+station: s
+can: {can0: {interface: virtual, channel: fuzz}}
+bays:
+  - &
+control: {socket: control.sock}
+journal: {directory: journal}
+"""
+BAY = (
+    "{name: %s, charger: {port: /nowhere/%s, control: manual, steps_a: [2, 5, 8, 11, 14]}, "
+    "battery: {can: can0, node_id: %d, map: tabos}, limits: {voltage_v: 58.4, current_a: 15, temperature_c: [0, 45]}, "
+    "policy: li-ion-48v}"
+)
+
+
+class Loop:
+    """The control loop and its queue: within one turn a bay takes one step, however often it has news."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self._supervisor = supervisor
+        self.stepped: set[int] = set()
+
+    def put(self, number: int) -> None:
+        if number not in self.stepped:
+            self.stepped.add(number)
+            self._supervisor._bays[number].run(monotonic())
+
+
+def _service() -> tuple[Supervisor, Loop]:
+    """A service whose threads do not run: its devices are silent, and its answers are its own."""
+    directory = Path(tempfile.mkdtemp(prefix="fuzz-"))
+    bays = "\n  - ".join(BAY % (name, name, 16 + number) for number, name in enumerate(BAYS))
+    (directory / "station.yaml").write_text(STATION.replace("&", bays), encoding="utf-8")
+    ours, _theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    supervisor = Supervisor(load_station(directory / "station.yaml"), GuardianLink(ours.detach()))
+    loop = Loop(supervisor)
+    supervisor._wake = loop  # type: ignore[assignment]  # no more is needed of a queue
+    return supervisor, loop
+
+
+SUPERVISOR, LOOP = _service()
+
+
+def one(data: bytes) -> None:
+    """A client that sends this, and closes."""
+    LOOP.stepped.clear()
+    for bay in SUPERVISOR._bays:
+        bay._asked.clear()
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        theirs.sendall(data)
+        theirs.shutdown(socket.SHUT_WR)
+        answer = SUPERVISOR._control._answer(ours)
+        line = control._line(answer)
+    assert len(line) <= MAX_ANSWER and line.count(b"\n") == 1
+    said: dict[str, Any] = json.loads(line)
+    assert said["ok"] in (True, False)
+    if said["ok"]:
+        _is_what_was_asked(control.parse_request(data), said)
+    else:
+        assert said["error"] and not said["error"].startswith("internal"), said["error"]
+    for bay in SUPERVISOR._bays:
+        assert not bay._asked, "requests wait that somebody believes answered"
+        assert not bay._internal, bay._internal
+
+
+def _is_what_was_asked(request: Mapping[str, object], said: dict[str, Any]) -> None:
+    if request["verb"] == "status":
+        assert [bay["name"] for bay in said["bays"]] == ([request["bay"]] if request.get("bay") is not None else list(BAYS))
+        return
+    assert request["verb"] in set(Request)
+    bays: Any = request.get("bays")
+    assert list(said["results"]) == list(BAYS if bays is None else dict.fromkeys(bays))
+    assert all(isinstance(answer, str) for answer in said["results"].values())
+
+
+TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|[\w.+-]+|\s+|.', re.DOTALL)
+VERBS = ("status", *Request)
+
+def kind(token: bytes) -> object:
+    """Words and texts are alike, blanks are alike, and each other character is like itself."""
+    return b"w" if re.match(rb"[\w\"'./+-]", token) else b" " if token.isspace() else token[:1]
+
+
+TARGET = Target(
+    one,
+    TOKEN.findall,
+    kind,
+    [
+        *(json.dumps({"verb": verb, "bays": ["bay-1"]}).encode() + b"\n" for verb in VERBS),
+        *(json.dumps({"verb": verb, "bay": "bay-2"}).encode() + b"\n" for verb in VERBS),
+        b'{"verb": "stop"}\n', b"{}\n", b"[]\n", b'{"verb": "status", "bay": null}\n{"verb": "stop"}\n',
+    ],
+    [
+        *(f'"{word}"'.encode() for word in ("verb", "bay", "bays", *BAYS, *VERBS)), b"null", b"true", b"NaN", b"-Infinity",
+        b"1e999", b"-0", b"9" * 300, b'"\\ud800"', b'"\\u0000"', b'"\\n"', b'"\xf0\x9f\x94\x8b"', b'""', b"\n", b", ", b": ",
+        b"{", b"}", b"[", b"]", b"[" * 1200, b"]" * 1200, b'{"a":' * 300, b"\xff", b"\xef\xbb\xbf", b"\0", b" " * 4096, b'"bay-1", ',
+        b'"' + b"\\u0001" * 600 + b'"', b"\\", b'"',
+    ],
+    ["orchestrator/service/control.py", "orchestrator/service/supervisor.py", "orchestrator/service/status.py"],
+    max_bytes=control.MAX_REQUEST + 64,
+    limit_s=1.0,
+)  # fmt: skip

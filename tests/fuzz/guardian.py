@@ -1,0 +1,70 @@
+"""The guardian's messages, from a controller that is dying and says anything, and the ports that it is left with."""
+
+import os
+import socket
+import tempfile
+from array import array
+from pathlib import Path
+
+from orchestrator.service.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
+from orchestrator.service.laststop import first_stop
+from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
+
+#: What an event is: any message without and with a descriptor, a port's name with one, with three and without, a port
+#: that is given up, a heartbeat, the end.
+RAW, RAW_FD, HOLD, HOLD_3, NAME, GIVE_UP, LIVE, END = range(8)
+BEGINS = {HOLD: PORT, HOLD_3: PORT, NAME: PORT, GIVE_UP: DROP, LIVE: BEAT, END: DONE, RAW: b"", RAW_FD: b""}
+DESCRIPTORS = {RAW_FD: 1, HOLD: 1, HOLD_3: 3}
+#: Names are taken for files of this directory, and none is there.
+DIRECTORY = tempfile.mkdtemp(prefix="fuzz-").encode() + b"/"
+NULL = os.open(os.devnull, os.O_RDWR)
+
+
+def one(data: bytes) -> None:
+    """One controller's last words."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    before = _descriptors()
+    watched = Guardian(os.getpid(), ours)
+    with ours, theirs:
+        for kind, content in records(data):
+            _send(theirs, kind, content)
+            assert watched._message() or (kind in (RAW, RAW_FD) and not content)
+        theirs.close()
+        assert not watched._message() or not watched._message(), "the end, behind one word of answers left unread"
+        for name, fd in watched._ports.items():
+            assert len(name) <= MESSAGE
+            if fd is not None:
+                os.close(fd)
+            else:
+                assert first_stop(name, leave_held=True) is None
+        os.close(watched._child)
+    assert _descriptors() <= before, "a descriptor is left open"
+
+
+def _send(theirs: socket.socket, kind: int, content: bytes) -> None:
+    name = DIRECTORY + content.replace(b"/", b"_") if kind in (HOLD, HOLD_3, NAME, GIVE_UP) else content
+    rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array("i", [NULL] * DESCRIPTORS.get(kind, 0)))]
+    theirs.sendmsg([BEGINS[kind] + name], rights if kind in DESCRIPTORS else [])
+
+
+def _descriptors() -> int:
+    return len(os.listdir("/proc/self/fd"))
+
+
+TARGET = Target(
+    one,
+    cut_records,
+    kind_of_record,
+    [
+        record(HOLD, b"ttyS1") + record(LIVE) + record(GIVE_UP, b"ttyS1") + record(HOLD, b"ttyS1") + record(END),
+        record(NAME, b"ttyS2") + record(LIVE) * 3,
+    ],
+    [
+        record(LIVE), record(END), record(HOLD, b"ttyS1"), record(HOLD_3, b"ttyS1"), record(NAME, b"a\0b"), record(HOLD),
+        record(NAME, b"\xff\xfe"), record(GIVE_UP, b"ttyS1"), record(RAW), record(RAW, b"?"), record(RAW_FD), record(RAW_FD, b"B"),
+        record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"), record(NAME, b"x" * 31),
+    ],
+    ["orchestrator/service/guardian.py", "orchestrator/service/laststop.py"],
+    max_bytes=128,
+    limit_s=1.0,
+)  # fmt: skip

@@ -1,0 +1,104 @@
+"""What a fuzz target is, and how its inputs are made: from good ones, changed piece by piece.
+
+An input is bytes, whatever the target makes of them, so that a crash is a file. The same inputs come from hypothesis in
+`make test` and from atheris, which looks at the coverage, in `make fuzz`.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from random import Random
+
+#: Of all changes, the share that puts one piece in the place of another of its kind: what is changed stays well-formed.
+ALIKE = 0.6
+
+Cut = Callable[[bytes], list[bytes]]
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """One door through which foreign bytes come in."""
+
+    one: Callable[[bytes], None]  #: deals with one input; raises whatever must not happen
+    cut: Cut  #: an input into pieces that mean something each
+    kind: Callable[[bytes], object]  #: of a piece; another of its kind may stand in its place
+    seeds: Sequence[bytes]  #: good inputs to begin with
+    words: Sequence[bytes]  #: pieces that lead somewhere
+    modules: Sequence[str]  #: whose coverage is reported
+    max_bytes: int  #: of an input
+    limit_s: float  #: CPU time that an input may take at most, on a slow machine
+    blind: float = 0.3  #: share of inputs that the fuzzer changes without knowing the pieces
+
+
+def records(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """A story, for what is not one message: a kind (0 … 7) and up to 31 bytes for each event."""
+    at = 0
+    while at < len(data):
+        end = at + 1 + (data[at] & 0x1F)
+        yield data[at] >> 5, data[at + 1 : end]
+        at = end
+
+
+def record(kind: int, content: bytes = b"") -> bytes:
+    """The bytes of one event."""
+    assert len(content) < 32
+    return bytes((kind << 5 | len(content),)) + content
+
+
+def cut_records(data: bytes) -> list[bytes]:
+    """Pieces are events."""
+    return [record(kind, content) for kind, content in records(data)]
+
+
+def kind_of_record(piece: bytes) -> object:
+    """Events of one kind are alike."""
+    return piece[:1] and piece[0] >> 5
+
+
+def changed(target: Target, data: bytes, random: Random) -> bytes:
+    """The input with some of its pieces changed."""
+    pieces = target.cut(data) or [b""]
+    for _ in range(random.choice((1, 1, 1, 2, 4))):
+        _change(target, pieces, random)
+    return b"".join(pieces)[: target.max_bytes]
+
+
+def _change(target: Target, pieces: list[bytes], random: Random) -> None:
+    at = random.randrange(len(pieces))
+    alike = _by_kind(target).get(target.kind(pieces[at]))
+    if alike and random.random() < ALIKE:
+        pieces[at] = random.choice(alike)
+        return
+    end = min(len(pieces), at + random.choice((1, 1, 1, 2, 5)))
+    other = _cut(target.cut, random.choice(target.seeds))
+    begin = random.randrange(len(other) + 1)
+    pieces[at:end] = random.choice((
+        [],
+        [random.choice(target.words)],
+        [random.choice(target.words), *pieces[at:end]],
+        [_damaged(piece, random) for piece in pieces[at:end]],
+        pieces[at:end] * random.choice((2, 2, 3, 50)),
+        other[begin : begin + random.choice((1, 1, 3, 8))],
+        [*pieces[at:end], *random.sample(pieces, min(3, len(pieces)))],
+    )) or [b""]  # fmt: skip
+
+
+@cache
+def _cut(cut: Cut, seed: bytes) -> list[bytes]:
+    return cut(seed)
+
+
+@cache
+def _by_kind(target: Target) -> dict[object, list[bytes]]:
+    """Every different piece of its seeds and words, by its kind."""
+    found: dict[object, list[bytes]] = {}
+    for piece in dict.fromkeys(piece for source in (*target.seeds, *target.words) for piece in target.cut(source)):
+        found.setdefault(target.kind(piece), []).append(piece)
+    return found
+
+
+def _damaged(piece: bytes, random: Random) -> bytes:
+    """One byte changed, added or taken away."""
+    at = random.randrange(len(piece) + 1)
+    byte = bytes((random.choice((0, 0xFF, 0x7F, 0x80, random.randrange(256))),))
+    return piece[:at] + random.choice((byte, b"", byte + piece[at : at + 1])) + piece[at + 1 :]
