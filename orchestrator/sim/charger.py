@@ -167,14 +167,21 @@ class Charger:
         if self.control_mode is ControlMode.AUTOMATIC:
             self._next_stage(pack)
         self._start_by_itself(dt_s)
-        demand_a = self._demand_a() * self.gain
-        room_a = max(self.cv_v - pack.ocv_v, 0.0) / (pack.resistance_ohm + self.lead_ohm)
+        demand_a, room_a = self.demand_a, self.room_a(pack)
         self.current_a = min(demand_a, room_a, self.current_a + SOFT_START_A_PER_S * dt_s)
-        self.voltage_v = pack.ocv_v + self.current_a * (pack.resistance_ohm + self.lead_ohm)
+        self.voltage_v = pack.ocv_v + self.current_a * (pack.series_ohm + self.lead_ohm)
         self._watch_taper(dt_s, tapering=demand_a > room_a)
 
-    def _demand_a(self) -> float:
+    def room_a(self, pack: Pack) -> float:
+        """What the constant voltage leaves room for."""
+        return max(self.cv_v - pack.ocv_v, 0.0) / (pack.series_ohm + self.lead_ohm)
+
+    @property
+    def demand_a(self) -> float:
         """What the output is set to before the voltage limits it."""
+        return self._set_a() * self.gain
+
+    def _set_a(self) -> float:
         if not self.running:
             return 0.0
         if self.mode is ChargeMode.CHARGE:
