@@ -1,14 +1,15 @@
-"""From file names to a `Station`, a `Policy` or an `ObjectMap`; or to every finding in them, at once."""
+"""From file names to a `Station`, a `Policy`, an `ObjectMap` or a `Scenario`; or to every finding in them, at once."""
 
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
-from orchestrator.config.files import KINDS, MAP, POLICY, STATION, Kind, Place, find, nearest_file, place
+from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.policy import Policy
 from orchestrator.config.reader import Reader
 from orchestrator.config.scalars import UnfitError, nearest
+from orchestrator.config.scenario import Scenario
 from orchestrator.config.schema import INVALID
 from orchestrator.config.station import Station
 from orchestrator.config.yamltree import MAX_BYTES, Entries, Node, Refused, parse
@@ -33,10 +34,15 @@ def load_map(name_or_path: str | Path, relative_to: Path | None = None) -> Objec
     return _load(MAP, _find(MAP, name_or_path, relative_to), ObjectMap)
 
 
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """A scenario by a shipped name or a path. Raises `ConfigError`."""
+    return _load(SCENARIO, _find(SCENARIO, name_or_path, None), Scenario)
+
+
 def check(paths: Iterable[str | Path]) -> list[Finding]:
     """Everything that is wrong in these files and in those that they name, sorted; an empty list is a yes.
 
-    What a file is, is told by its key `policy`, `station` or `map`. A file named twice is reported once.
+    What a file is, is told by its key `policy`, `station`, `map` or `scenario`. A file named twice is reported once.
     """
     places = [place(path) for path in paths]
     loader = _Loader(places)
@@ -85,7 +91,7 @@ class _Loader:
             return
         keys = [name.text for name, _ in node.entries] if isinstance(node, Entries) else []
         near = next((f" ({key!r}: did you mean {found}?)" for key in keys if (found := _kind_near(key))), "")
-        text = f"this is no file of ours: it has none of the keys policy, station, map{near}"
+        text = f"this is no file of ours: it has none of the keys policy, station, map, scenario{near}"
         self.findings.append(Finding(self._name(where), node.mark.line, node.mark.column, text))
 
     def load(self, kind: Kind, where: Place) -> object:
