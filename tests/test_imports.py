@@ -31,7 +31,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
     # What it checks and tries is the core itself, on the models of the emulators, without any line between them.
-    "workbench": ("config", "core", "errors", "keys", "model", "protocol.objects", "sim.charger", "sim.chemistry", "sim.pack"),
+    "workbench": (
+        "config", "core", "errors", "keys", "model", "protocol.objects", "sim.charger", "sim.chemistry", "sim.pack",
+    ),
     "show": (),
     "demo": ("config", "errors", "keys", "model", "service", "show", "sim"),
     "cli": (

@@ -173,13 +173,14 @@ class Charger:
         if self.control_mode is ControlMode.AUTOMATIC:
             self._next_stage(pack)
         self._start_by_itself(dt_s)
-        self.current_a = self.output_a(dt_s, pack)
+        demand_a, room_a = self.demand_a, self.room_a(pack)
+        self.current_a = self.output_a(dt_s, demand_a, room_a)
         self.voltage_v = pack.ocv_v + self.current_a * (pack.series_ohm + self.lead_ohm)
-        self._watch_taper(dt_s, tapering=self.demand_a > self.room_a(pack))
+        self._watch_taper(dt_s, tapering=demand_a > room_a)
 
-    def output_a(self, dt_s: float, pack: Pack) -> float:
-        """What it delivers `dt_s` after what it delivers now, into the pack as it is given here."""
-        return min(self.demand_a, self.room_a(pack), self.current_a + SOFT_START_A_PER_S * dt_s)
+    def output_a(self, dt_s: float, demand_a: float, room_a: float) -> float:
+        """What it delivers `dt_s` after what it delivers now."""
+        return min(demand_a, room_a, self.current_a + SOFT_START_A_PER_S * dt_s)
 
     def room_a(self, pack: Pack) -> float:
         """What the constant voltage leaves room for."""

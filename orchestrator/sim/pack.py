@@ -105,21 +105,28 @@ class Pack:
         if not self.leaky:
             self.charge_ah += current_a * dt_s / 3600
         self.current_a = current_a
-        if self.polarisation_ohm:
-            settled_v = current_a * self.polarisation_ohm
-            self.polarisation_v += (settled_v - self.polarisation_v) * -math.expm1(-dt_s / self.polarisation_s)
+        polarisation_w = self._polarise(dt_s)
         if self.driven_c is None:
-            self._warm(dt_s)
+            self._warm(dt_s, polarisation_w)
         else:
             self._drive(dt_s, self.driven_c)
 
-    def _warm(self, dt_s: float) -> None:
-        loss_w = self.current_a * self.current_a * self.series_ohm
-        if self.polarisation_ohm:
-            loss_w += self.polarisation_v * self.polarisation_v / self.polarisation_ohm
-        settled_c = self.ambient_c + loss_w / self.cooling_w_per_k
-        share = -math.expm1(-dt_s * self.cooling_w_per_k / self.heat_j_per_k)
-        self.temperature_c += (settled_c - self.temperature_c) * share
+    def _polarise(self, dt_s: float) -> float:
+        """The mean heat of the polarisation meanwhile."""
+        if not self.polarisation_ohm:
+            return 0.0
+        before_v, settled_v = self.polarisation_v, self.current_a * self.polarisation_ohm
+        self.polarisation_v += (settled_v - before_v) * -math.expm1(-dt_s / self.polarisation_s)
+        return (before_v * before_v + self.polarisation_v * self.polarisation_v) / 2 / self.polarisation_ohm
+
+    def _warm(self, dt_s: float, polarisation_w: float) -> None:
+        series_w = self.current_a * self.current_a * self.series_ohm
+        # The warmer it gets, the less resistance has a pack: as if it were cooled the better by that.
+        kelvin = self.temperature_c - ZERO_C
+        cooling_w_per_k = self.cooling_w_per_k + series_w * self.arrhenius_k / (kelvin * kelvin)
+        surplus_w = series_w + polarisation_w - self.cooling_w_per_k * (self.temperature_c - self.ambient_c)
+        share = -math.expm1(-dt_s * cooling_w_per_k / self.heat_j_per_k)
+        self.temperature_c += surplus_w / cooling_w_per_k * share
 
     def _drive(self, dt_s: float, target_c: float) -> None:
         step_k = DRIVEN_K_PER_S * dt_s

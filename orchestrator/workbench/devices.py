@@ -4,9 +4,9 @@ One turn of the charger's line is one tick: it hears the standing order in the m
 BMU answers everything in every tick. Lost frames and delays are for the tests of the service, not for the workbench.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
-from orchestrator.config.scenario import Defect, Sensor, SensorFault
+from orchestrator.config.scenario import Defect, SensorFault
 from orchestrator.model import (
     Action,
     BatteryLink,
@@ -70,7 +70,7 @@ class Devices:
     def snapshot(self, plant: Plant, now_s: float, request: Request | None = None) -> Snapshot:
         """Everything that is known at the end of a tick."""
         if plant.pack is not None:
-            self._told = {**self._told, **dict(self._measured(plant.pack, now_s))}
+            self._told = {**self._told, **self._measured(plant.pack, now_s)}
         told = self._told
         spoke_s = max((told[name].t_s for name in ("voltage_v", "status") if name in told), default=-SILENT_S)
         return Snapshot(
@@ -85,9 +85,12 @@ class Devices:
         """The temperature that the BMU tells at `now_s`, None if it tells none."""
         if pack is None:
             return None
-        return next((told.value for name, told in self._measured(pack, now_s) if name == "temperature_c"), None)
+        truth = {"temperature_c": pack.temperature_c}
+        self._falsify(truth, now_s)
+        told_c = truth.get("temperature_c")
+        return None if told_c is None else round(told_c, DECIMALS["temperature_c"])
 
-    def _measured(self, pack: Pack, now_s: float) -> Iterator[tuple[str, Measurement]]:
+    def _measured(self, pack: Pack, now_s: float) -> dict[str, Measurement]:
         truth = {
             "voltage_v": pack.voltage_v,
             "current_a": pack.current_a,
@@ -96,22 +99,23 @@ class Devices:
             "soc_pct": min(max(pack.soc * 100, 0.0), 100.0),
             "soh_pct": pack.soh_pct,
         }
-        for fault in self.faults:
-            self._falsify(truth, fault, now_s)
-        for name, value in truth.items():
-            yield name, Measurement(round(value, DECIMALS[name]), now_s)
+        self._falsify(truth, now_s)
+        return {name: Measurement(round(value, DECIMALS[name]), now_s) for name, value in truth.items()}
 
-    def _falsify(self, truth: dict[str, float], fault: SensorFault, now_s: float) -> None:
-        name: Sensor = fault.sensor
-        match fault.defect:
-            case Defect.SILENT:
-                del truth[name]
-            case Defect.STUCK:
-                truth[name] = self._told[name].value if name in self._told else truth[name]
-            case Defect.OFFSET:
-                truth[name] += fault.by
-            case Defect.DRIFT:
-                truth[name] += fault.by * (now_s / 3600 - fault.from_h)
+    def _falsify(self, truth: dict[str, float], now_s: float) -> None:
+        for fault in self.faults:
+            name: str = fault.sensor
+            if name not in truth:
+                continue
+            match fault.defect:
+                case Defect.SILENT:
+                    del truth[name]
+                case Defect.STUCK:
+                    truth[name] = self._told[name].value if name in self._told else truth[name]
+                case Defect.OFFSET:
+                    truth[name] += fault.by
+                case Defect.DRIFT:
+                    truth[name] += fault.by * (now_s / 3600 - fault.from_h)
 
 
 #: Digits after the point, as both object maps have them.

@@ -6,11 +6,10 @@ piece is as long as the current allows, and where the constant voltage lets it f
 """
 
 from copy import copy
-from itertools import pairwise
 
 from orchestrator.config.scenario import BatteryModel, Cell, Scenario, Visit
 from orchestrator.sim.charger import Charger
-from orchestrator.sim.chemistry import LFP, NMC, Chemistry
+from orchestrator.sim.chemistry import LFP, NMC, Chemistry, interpolate
 from orchestrator.sim.pack import Pack
 
 CHEMISTRIES: dict[Cell, Chemistry] = {Cell.NMC: NMC, Cell.LFP: LFP}
@@ -54,7 +53,7 @@ class Plant:
         self.t_s = 0.0
         self.charged_ah = 0.0  #: into all batteries so far
         self.charged_wh = 0.0
-        self._weather = [(row.at_h * 3600, row.ambient_c) for row in scenario.weather]
+        self._weather = tuple((row.at_h * 3600, row.ambient_c) for row in scenario.weather)
         self._packs = {name: pack_of(model) for name, model in scenario.batteries.items()}
 
     def copy(self) -> "Plant":
@@ -67,11 +66,10 @@ class Plant:
     @property
     def ambient_c(self) -> float:
         """The temperature around the bay, now."""
-        weather = self._weather
-        for (from_s, from_c), (to_s, to_c) in pairwise(weather):
-            if self.t_s < to_s:
-                return from_c + (to_c - from_c) * (self.t_s - from_s) / (to_s - from_s)
-        return weather[-1][1]
+        return self._ambient_c(self.t_s)
+
+    def _ambient_c(self, t_s: float) -> float:
+        return interpolate(self._weather, t_s)
 
     def arrive(self, visit: Visit) -> None:
         """Somebody puts a battery in."""
@@ -94,38 +92,33 @@ class Plant:
     def advance(self, dt_s: float) -> None:
         """Let `dt_s` pass."""
         while dt_s > 0:
-            piece_s = min(dt_s, self._piece_s())
-            self._pass(piece_s)
+            tapers = self.pack is not None and self._tapers(self.charger, self.pack)
+            piece_s = min(dt_s, TAPERING_S if tapers else STEADY_S)
+            self.t_s += piece_s
+            if self.pack is None:
+                self.charger.advance(piece_s, None)
+            else:
+                self._charge(piece_s, self.charger, self.pack, midpoint=tapers)
             dt_s -= piece_s
 
-    def _piece_s(self) -> float:
-        charger, pack = self.charger, self.pack
+    def _tapers(self, charger: Charger, pack: Pack) -> bool:
         demand_a = charger.demand_a
-        tapers = pack is not None and demand_a > 0 and charger.room_a(pack) < demand_a * NEARLY_TAPERING
-        return TAPERING_S if tapers else STEADY_S
+        return demand_a > 0 and charger.room_a(pack) < demand_a * NEARLY_TAPERING
 
-    def _pass(self, dt_s: float) -> None:
-        charger, pack = self.charger, self.pack
-        self.t_s += dt_s
-        if pack is None:
-            charger.advance(dt_s, None)
-            return
-        pack.ambient_c = self.ambient_c
-        current_a = self._middle_a(dt_s, charger, pack)
-        before_v = pack.ocv_v
+    def _charge(self, dt_s: float, charger: Charger, pack: Pack, *, midpoint: bool) -> None:
+        pack.ambient_c = self._ambient_c(self.t_s - dt_s / 2)
+        current_a = self._middle_a(dt_s / 2, charger, pack) if midpoint else charger.current_a
         pack.advance(dt_s, current_a)
         charger.advance(dt_s, pack)
         pack.current_a = charger.current_a  # charger and BMU are measured on one cable
         ah = current_a * dt_s / 3600
         self.charged_ah += ah
-        self.charged_wh += ah * ((before_v + pack.ocv_v) / 2 + current_a * pack.series_ohm)
+        self.charged_wh += ah * charger.voltage_v
 
-    def _middle_a(self, dt_s: float, charger: Charger, pack: Pack) -> float:
-        """The current in the middle of the piece."""
-        if charger.current_a == charger.demand_a and charger.room_a(pack) > charger.demand_a * NEARLY_TAPERING:
-            return charger.current_a
+    def _middle_a(self, half_s: float, charger: Charger, pack: Pack) -> float:
+        """The current in the middle of a piece; the pack is left as it was."""
         before = pack.charge_ah, pack.polarisation_v, pack.temperature_c
-        pack.advance(dt_s / 2, charger.current_a)
-        middle_a = charger.output_a(dt_s / 2, pack)
+        pack.advance(half_s, charger.current_a)
+        middle_a = charger.output_a(half_s, charger.demand_a, charger.room_a(pack))
         pack.charge_ah, pack.polarisation_v, pack.temperature_c = before
         return middle_a
