@@ -1,7 +1,8 @@
 """What a simulation leaves behind: measured values over time, and which rule bound the bay in each stretch of it."""
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from orchestrator.model import Decision, State
@@ -36,6 +37,32 @@ class Span:
     why: str  #: the rule that bound it, with its line in the policy; else why the bay is in this state
     faults: tuple[str, ...] = ()  #: the ids of those in force
 
+    @property
+    def rule(self) -> tuple[State, int | None, str]:
+        """What bound it, without the numbers that were measured: equal for the same rule at another time."""
+        return self.state, self.step, _NUMBERS.sub("#", self.why)
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """One rule and all the times in which it bound the bay."""
+
+    number: int  #: from 1, in the order in which they came
+    spans: tuple[Span, ...]
+
+    @property
+    def total_s(self) -> float:
+        """How long altogether."""
+        return sum(span.to_s - span.from_s for span in self.spans)
+
+
+def bounds(spans: Iterable[Span]) -> list[Bound]:
+    """The spans by their rule, in the order in which the rules came."""
+    by_rule: dict[object, list[Span]] = {}
+    for span in spans:
+        by_rule.setdefault(span.rule, []).append(span)
+    return [Bound(number, tuple(same)) for number, same in enumerate(by_rule.values(), start=1)]
+
 
 @dataclass(slots=True)
 class Trail:
@@ -43,7 +70,6 @@ class Trail:
 
     moments: list[Moment] = field(default_factory=list)
     spans: list[Span] = field(default_factory=list)
-    _key: tuple[object, ...] = ()
 
     def add(self, plant: Plant, decision: Decision) -> None:
         """One more moment, at the plant's time."""
@@ -62,16 +88,14 @@ class Trail:
         )
         why = step.rule if step is not None and decision.state is State.CHARGING else decision.reason
         faults = tuple(fault.id for fault in decision.faults)
-        key = (decision.state, step.index if step else None, _NUMBERS.sub("#", why), faults)
-        if key == self._key:
-            return
-        self._key = key
-        self.close(plant.t_s)
         index, amps = (step.index, step.current_a) if step else (None, None)
-        self.spans.append(Span(plant.t_s, plant.t_s, decision.state, index, amps, why, faults))
+        span = Span(plant.t_s, plant.t_s, decision.state, index, amps, why, faults)
+        if self.spans and (span.rule, span.faults) == (self.spans[-1].rule, self.spans[-1].faults):
+            return
+        self.close(plant.t_s)
+        self.spans.append(span)
 
     def close(self, t_s: float) -> None:
         """The last span ends here."""
         if self.spans:
-            last = self.spans[-1]
-            self.spans[-1] = Span(last.from_s, t_s, last.state, last.step, last.step_a, last.why, last.faults)
+            self.spans[-1] = replace(self.spans[-1], to_s=t_s)
