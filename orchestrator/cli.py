@@ -8,7 +8,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import cast
 
@@ -99,10 +99,19 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--old-protocol", action="store_true", help="ask for the BMU's older, undocumented pages as well"
     )
     probe.set_defaults(run=_probe)
+    _add_simulate(verbs)
     demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
     demo.add_argument("--fault", metavar="NAME", help="inject a fault in mid-charge; 'list' shows the names")
     demo.add_argument("--plain", action="store_true", help="lines instead of a live picture")
     demo.set_defaults(run=_demo)
+
+
+def _add_simulate(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    simulate = verbs.add_parser("simulate", help="try policies on a scenario: hours of charging in a moment")
+    simulate.add_argument("policy", nargs="+", help="policies to compare: shipped names or files")
+    simulate.add_argument("--scenario", required=True, help="what happens: a shipped name or a file")
+    simulate.add_argument("--out", type=Path, metavar="DIR", help="write a page and a picture there")
+    simulate.set_defaults(run=_simulate)
 
 
 NMT = ("start", "stop", "reset-node", "reset-communication")
@@ -198,11 +207,40 @@ def _probe(arguments: argparse.Namespace) -> int:
     return probe(station, arguments.bay, arguments.nmt, old_protocol=arguments.old_protocol)
 
 
+def _simulate(arguments: argparse.Namespace) -> int:
+    from orchestrator.workbench.simulate import as_table, play
+
+    runs = play(arguments.policy, arguments.scenario, _progress())
+    print(as_table(runs))
+    if arguments.out is not None:
+        try:
+            from orchestrator.workbench.present import save
+        except ImportError as error:
+            raise _extra_missing("a page", error, "workbench") from None
+        print("", *save(runs, arguments.out), sep="\n")
+    return 0
+
+
+def _progress() -> Callable[[str, float], None]:
+    """Says on a terminal how far what takes longer than a second has come."""
+    begin_s = time.monotonic()
+
+    def say(what: str, share: float) -> None:
+        if time.monotonic() - begin_s > 1 and sys.stderr.isatty():
+            print(f"\r\x1b[K{what}: {share:.0%}", end="\r", file=sys.stderr, flush=True)
+
+    return say
+
+
+def _extra_missing(what: str, error: ImportError, extra: str) -> OrchestratorError:
+    return OrchestratorError(
+        f"{what} needs the package {error.name}: pip install 'charging-station-orchestrator[{extra}]'"
+    )
+
+
 def _demo(arguments: argparse.Namespace) -> int:
     try:
         from orchestrator.demo.run import demo
     except ImportError as error:
-        raise OrchestratorError(
-            f"the demo needs the package {error.name}: pip install 'charging-station-orchestrator[demo]'"
-        ) from None
+        raise _extra_missing("the demo", error, "demo") from None
     return demo(arguments.fault, plain=arguments.plain)

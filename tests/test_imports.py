@@ -38,7 +38,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "demo": ("config", "errors", "keys", "model", "service", "show", "sim"),
     "cli": (
         "config", "core", "demo", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service",
-        "show", "sim",
+        "show", "sim", "workbench",
     ),
     "__main__": ("cli", "service.estop", "service.guardian"),
 }  # fmt: skip
@@ -48,6 +48,8 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
     "durand": ("sim",),
+    "jinja2": ("workbench.page",),
+    "matplotlib": ("workbench.plot", "workbench.tradeoff"),
     "rich": ("demo",),
     "serial": ("link.serial",),
     "transitions": ("core.machine",),

@@ -129,11 +129,11 @@ ROWS: tuple[Row, ...] = (
 
 
 def table(all_figures: Sequence[Figures]) -> list[list[str]]:
-    """A row for each figure and each state, a column for each policy; the first row and column are headings."""
+    """A row for each figure and each state that lasts, a column for each policy; first of all headings."""
     rows = [["", *(f.policy for f in all_figures)]]
     rows += [[name, *(tell(f) for f in all_figures)] for name, tell in ROWS]
     for state in State:
-        if any(f.state_h.get(state) for f in all_figures):
+        if any(f.state_h.get(state, 0.0) * 3600 >= 1 for f in all_figures):
             rows.append([f"time {state}, h:min:s", *(_long(f.state_h.get(state, 0.0)) for f in all_figures)])
     return rows
 

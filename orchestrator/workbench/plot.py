@@ -124,6 +124,11 @@ def _look(number: int) -> tuple[str, Literal["-", "--", ":"]]:
     return COLOURS[number % len(COLOURS)], DASHES[number // len(COLOURS) % len(DASHES)]
 
 
+def colour(number: int) -> str:
+    """Of the policy with this number, from 0."""
+    return COLOURS[number % len(COLOURS)]
+
+
 def _legend(figure: Figure, runs: Sequence[Run], top: float) -> None:
     handles = [
         Line2D([], [], color=_look(number)[0], linestyle=_look(number)[1], label=f"{run.policy.policy}")
