@@ -1,10 +1,11 @@
 """From file names to a `Station`, a `Policy`, an `ObjectMap` or a `Scenario`; or to every finding in them, at once."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
+from orchestrator.config.change import changed
 from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.policy import Policy
 from orchestrator.config.reader import Reader
@@ -24,9 +25,14 @@ def load_station(path: str | Path) -> Station:
     return _load(STATION, place(path), Station)
 
 
-def load_policy(name_or_path: str | Path, relative_to: Path | None = None) -> Policy:
-    """A policy by a shipped name or a path (relative to the directory `relative_to`). Raises `ConfigError`."""
-    return _load(POLICY, _find(POLICY, name_or_path, relative_to), Policy)
+def load_policy(
+    name_or_path: str | Path, relative_to: Path | None = None, changes: Mapping[str, str] | None = None
+) -> Policy:
+    """A policy by a shipped name or a path (relative to the directory `relative_to`). Raises `ConfigError`.
+
+    `changes` are read instead of what is written, by dotted path: `{"current.soc_pct[0].to": "80"}`.
+    """
+    return _load(POLICY, _find(POLICY, name_or_path, relative_to), Policy, changes or {})
 
 
 def load_map(name_or_path: str | Path, relative_to: Path | None = None) -> ObjectMap:
@@ -51,8 +57,8 @@ def check(paths: Iterable[str | Path]) -> list[Finding]:
     return sorted(set(loader.findings))
 
 
-def _load(kind: Kind, where: Place, wanted: type[T]) -> T:
-    loader = _Loader([where])
+def _load(kind: Kind, where: Place, wanted: type[T], changes: Mapping[str, str] | None = None) -> T:
+    loader = _Loader([where], changes or {})
     value: object = INVALID
     try:
         value = loader.load(kind, where)
@@ -75,8 +81,9 @@ def _find(kind: Kind, name_or_path: str | Path, relative_to: Path | None) -> Pla
 class _Loader:
     """Reads each file once, however many bays name it, and collects the findings of all."""
 
-    def __init__(self, named: Iterable[Place]) -> None:
+    def __init__(self, named: Iterable[Place], changes: Mapping[str, str] | None = None) -> None:
         self.findings: list[Finding] = []
+        self._changes = changes or {}
         self._shown = {os.path.realpath(one.path): one.shown for one in named}
         self._trees: dict[str, Node | None] = {}
         self._loaded: dict[tuple[str, str], object] = {}
@@ -97,7 +104,7 @@ class _Loader:
     def load(self, kind: Kind, where: Place) -> object:
         """The record in a file, or `INVALID` if anything in it, or in a file that it names, is wrong.
 
-        Raises `UnfitError` if the file is of another kind.
+        Raises `UnfitError` if the file is of another kind, or has no place for a change.
         """
         real = (os.path.realpath(where.path), kind.key)
         if real not in self._loaded:
@@ -106,7 +113,7 @@ class _Loader:
             if others and kind not in others:
                 text = f"{self._name(where)} has the key {others[0].key!r}; needed is a file with the key {kind.key!r}"
                 raise UnfitError(text)
-            self._loaded[real] = self._read(kind, where, node)
+            self._loaded[real] = self._read(kind, where, changed(node, self._changes) if node else None)
         return self._loaded[real]
 
     def _read(self, kind: Kind, where: Place, node: Node | None) -> object:

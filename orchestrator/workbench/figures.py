@@ -134,11 +134,12 @@ def table(all_figures: Sequence[Figures]) -> list[list[str]]:
     rows += [[name, *(tell(f) for f in all_figures)] for name, tell in ROWS]
     for state in State:
         if any(f.state_h.get(state, 0.0) * 3600 >= 1 for f in all_figures):
-            rows.append([f"time {state}, h:min:s", *(_long(f.state_h.get(state, 0.0)) for f in all_figures)])
+            rows.append([f"time {state}, h:min:s", *(clock_s(f.state_h.get(state, 0.0)) for f in all_figures)])
     return rows
 
 
-def _long(hours: float) -> str:
+def clock_s(hours: float) -> str:
+    """Hours, minutes and seconds, `2:05:07`."""
     seconds = round(hours * 3600)
     return f"{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader
 
-from orchestrator.workbench.figures import clock, figures, table
+from orchestrator.workbench.figures import clock_s, figures, table
 from orchestrator.workbench.plot import colour, says, svg, when
 from orchestrator.workbench.simulation import Run
 from orchestrator.workbench.trail import Moment, bounds
@@ -40,7 +40,7 @@ def _policy(run: Run, number: int) -> dict[str, object]:
         "file": run.policy.source.file,
         "colour": colour(number),
         "rules": [(bound.number, when(bound), says(bound.spans[0])) for bound in bounds(run.trail.spans)],
-        "spans": [[span.from_s, f"{clock(span.from_s / 3600)}  {says(span)}"] for span in run.trail.spans],
+        "spans": [[span.from_s, f"{clock_s(span.from_s / 3600)}  {says(span)}"] for span in run.trail.spans],
         "moments": [_rounded(moment) for moment in moments[::every]],
     }
 

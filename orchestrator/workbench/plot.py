@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 
 from orchestrator.model import State
 from orchestrator.workbench.compare import differences
-from orchestrator.workbench.figures import clock
+from orchestrator.workbench.figures import clock_s
 from orchestrator.workbench.simulation import Run
 from orchestrator.workbench.trail import Bound, Moment, Span, bounds
 
@@ -79,36 +79,39 @@ def _style() -> AbstractContextManager[None]:
 def save_png(runs: Sequence[Run], path: Path) -> None:
     """The picture with the rules below it."""
     with _style():
-        _draw(runs, with_rules=True).savefig(path, dpi=130)
+        _draw(runs, whole=True).savefig(path, dpi=130)
 
 
 def svg(runs: Sequence[Run]) -> Drawing:
-    """The picture without the rules, for a page that has them in a table."""
+    """The picture without title and rules, for a page that has them as text."""
     with _style():
-        figure, text = _draw(runs, with_rules=False), StringIO()
+        figure, text = _draw(runs, whole=False), StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
         box = figure.axes[0].get_position()
     return Drawing(text.getvalue()[text.getvalue().index("<svg") :], box.x0, box.x1)
 
 
-def _draw(runs: Sequence[Run], *, with_rules: bool) -> Figure:
+def _draw(runs: Sequence[Run], *, whole: bool) -> Figure:
     told = [_worth_telling(run, max(MAX_RULES // len(runs), MIN_RULES)) for run in runs]
-    band_in, rules_in = 0.32 * len(runs) + 0.1, sum(0.19 * len(rules) + 0.3 for rules in told) if with_rules else 0.0
+    band_in, rules_in = 0.32 * len(runs) + 0.1, sum(0.19 * len(rules) + 0.3 for rules in told) if whole else 0.0
     heights = [*(0.62 * height for height in HEIGHTS), band_in]
-    height_in = sum(heights) * 1.22 + 1.2 + rules_in
+    top_in = 0.95 if whole else 0.6
+    height_in = sum(heights) * 1.22 + top_in + 0.25 + rules_in
     figure = Figure(figsize=(WIDTH_IN, height_in))
     axes = figure.subplots(len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights, "hspace": 0.3})
-    figure.subplots_adjust(left=0.055, right=0.985, top=1 - 0.95 / height_in, bottom=(0.45 + rules_in) / height_in)
+    figure.subplots_adjust(left=0.055, right=0.985, top=1 - top_in / height_in, bottom=(0.45 + rules_in) / height_in)
     scenario = runs[0].scenario
-    figure.text(0.055, 1 - 0.2 / height_in, f"{scenario.scenario}: {scenario.about}", size=12, weight="bold", va="top")
-    _legend(figure, runs, 1 - 0.42 / height_in)
+    if whole:
+        title = f"{scenario.scenario}: {scenario.about}"
+        figure.text(0.055, 1 - 0.2 / height_in, title, size=12, weight="bold", va="top")
+    _legend(figure, runs, 1 - (top_in - 0.53) / height_in)
     for ax, (title, _) in zip(axes, PANELS, strict=False):
         ax.set_title(title, loc="left", pad=3, color="#444444")
     for number, run in enumerate(runs):
         _curves(axes, run, number)
         _band(axes[-1], run, number)
     _finish(axes, runs)
-    if with_rules:
+    if whole:
         _rules(figure, runs, told, height_in, rules_in)
     return figure
 
@@ -198,8 +201,8 @@ def _rules(
 def when(bound: Bound) -> str:
     """From when to when; and how often between, for how long."""
     first, last, times = bound.spans[0], bound.spans[-1], len(bound.spans)
-    often = f" ({times} times, {clock(bound.total_s / 3600)} h)" if times > 1 else ""
-    return f"{clock(first.from_s / 3600)} … {clock(last.to_s / 3600)}{often}"
+    often = f" ({times} times, {clock_s(bound.total_s / 3600)})" if times > 1 else ""
+    return f"{clock_s(first.from_s / 3600)} … {clock_s(last.to_s / 3600)}{often}"
 
 
 def says(span: Span) -> str:
