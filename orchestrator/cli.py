@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import cast
 
 from orchestrator import __version__
@@ -110,6 +111,12 @@ def _add_simulate(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     simulate = verbs.add_parser("simulate", help="try policies on a scenario: hours of charging in a moment")
     simulate.add_argument("policy", nargs="+", help="policies to compare: shipped names or files")
     simulate.add_argument("--scenario", required=True, help="what happens: a shipped name or a file")
+    simulate.add_argument(
+        "--sweep", action="append", default=[], metavar="KEY=A..B:N",
+        help="one policy with N values of a key instead; may be repeated for every combination",
+    )  # fmt: skip
+    simulate.add_argument("--jobs", type=int, metavar="N", help="processes for a sweep (default: one for each core)")
+    simulate.add_argument("--dask", metavar="ADDRESS", help="play a sweep on this Dask cluster instead")
     simulate.add_argument("--out", type=Path, metavar="DIR", help="write a page and a picture there")
     simulate.set_defaults(run=_simulate)
 
@@ -210,15 +217,36 @@ def _probe(arguments: argparse.Namespace) -> int:
 def _simulate(arguments: argparse.Namespace) -> int:
     from orchestrator.workbench.simulate import as_table, play
 
+    if arguments.sweep:
+        return _sweep(arguments)
     runs = play(arguments.policy, arguments.scenario, _progress())
     print(as_table(runs))
     if arguments.out is not None:
-        try:
-            from orchestrator.workbench.present import save
-        except ImportError as error:
-            raise _extra_missing("a page", error, "workbench") from None
-        print("", *save(runs, arguments.out), sep="\n")
+        print("", *_present().save(runs, arguments.out), sep="\n")
     return 0
+
+
+def _sweep(arguments: argparse.Namespace) -> int:
+    from orchestrator.workbench.figures import aligned
+    from orchestrator.workbench.sweep import axis, cluster, cores, played, rows
+
+    if len(arguments.policy) != 1:
+        raise UsageError("--sweep: name one policy")
+    axes = [axis(text) for text in arguments.sweep]
+    with cluster(arguments.dask) if arguments.dask else cores(arguments.jobs) as pool:
+        done = played(arguments.policy[0], arguments.scenario, axes, pool, _progress())
+    print(aligned(rows(done)))
+    if arguments.out is not None:
+        print("", *_present().save_sweep(done, arguments.out), sep="\n")
+    return 0 if any(point.figures for point in done.points) else 1
+
+
+def _present() -> ModuleType:
+    try:
+        from orchestrator.workbench import present
+    except ImportError as error:
+        raise _extra_missing("--out", error, "workbench") from None
+    return present
 
 
 def _progress() -> Callable[[str, float], None]:

@@ -47,6 +47,7 @@ EDGES: dict[str, tuple[str, ...]] = {
 OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
+    "distributed": ("workbench.sweep",),
     "durand": ("sim",),
     "jinja2": ("workbench.page",),
     "matplotlib": ("workbench.plot", "workbench.tradeoff"),
