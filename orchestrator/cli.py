@@ -14,12 +14,7 @@ from types import ModuleType
 from typing import cast
 
 from orchestrator import __version__
-from orchestrator.errors import ConfigError, HexError, OrchestratorError
-
-
-class UsageError(OrchestratorError):
-    """The command line cannot be understood; the text says what is missing."""
-
+from orchestrator.errors import ConfigError, HexError, OrchestratorError, UsageError
 
 REQUESTS = {
     "start": "let a bay charge (again): after a stop, a pause or a reset",

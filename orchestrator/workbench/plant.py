@@ -14,7 +14,7 @@ from orchestrator.sim.pack import Pack
 
 CHEMISTRIES: dict[Cell, Chemistry] = {Cell.NMC: NMC, Cell.LFP: LFP}
 #: The longest piece: with a constant current, and while the constant voltage limits it.
-STEADY_S, TAPERING_S = 10.0, 2.0
+STEADY_S, TAPERING_S = 10.0, 4.0
 #: From here on the constant voltage may come to limit the current within a piece.
 NEARLY_TAPERING = 1.5
 

@@ -11,7 +11,7 @@ from multiprocessing import get_context
 
 from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Scenario
-from orchestrator.errors import ConfigError, OrchestratorError
+from orchestrator.errors import OrchestratorError, UsageError
 from orchestrator.workbench.figures import ROWS, Figures, figures
 from orchestrator.workbench.simulation import rules_of, simulate
 
@@ -25,8 +25,8 @@ CHUNK = 8
 CONNECT_S = 10
 
 
-class SweepError(OrchestratorError):
-    """A `--sweep` that cannot be understood: what was written, and how it is meant."""
+class ClusterError(OrchestratorError):
+    """There is no Dask cluster, or nothing to reach it with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,16 +52,16 @@ class Point:
 
 
 def axis(text: str) -> Axis:
-    """The axis that `key=a..b:n` stands for: n values from a to b. Raises SweepError."""
+    """The axis that `key=a..b:n` stands for: n values from a to b. Raises UsageError."""
     match = _FORM.fullmatch(text)
     try:
         if match is None:
             raise ValueError
         low, high, count = float(match["low"]), float(match["high"]), int(match["count"])
     except ValueError:
-        raise SweepError(f"--sweep {text}: write KEY=FROM..TO:COUNT, e.g. finish.soc_pct=80..100:5") from None
+        raise UsageError(f"--sweep {text}: write KEY=FROM..TO:COUNT, e.g. finish.soc_pct=80..100:5") from None
     if not 2 <= count <= MAX_POINTS:
-        raise SweepError(f"--sweep {text}: {count} values; write 2 … {MAX_POINTS}")
+        raise UsageError(f"--sweep {text}: {count} values; write 2 … {MAX_POINTS}")
     values = (low + (high - low) * i / (count - 1) for i in range(count))
     return Axis(tuple(match["keys"].split(",")), tuple(f"{value:.6f}".rstrip("0").rstrip(".") for value in values))
 
@@ -82,11 +82,11 @@ def played(
     """Every combination of the axes' values, played in the pool.
 
     `watch` is called with the policy's name and the share that is done. Raises ConfigError for what is wrong in the
-    files as they are, UnsuitableError for a policy that is not for the scenario, SweepError for too many points.
+    files as they are, UnsuitableError for a policy that is not for the scenario, UsageError for too many points.
     """
     combinations = list(product(*(one.values for one in axes)))
     if len(combinations) > MAX_POINTS:
-        raise SweepError(f"--sweep: {len(combinations)} combinations; at most {MAX_POINTS} at a time")
+        raise UsageError(f"--sweep: {len(combinations)} combinations; at most {MAX_POINTS} at a time")
     what_happens, as_it_is = load_scenario(scenario), load_policy(policy)
     rules_of(as_it_is, what_happens)
     points = []
@@ -101,7 +101,7 @@ def _try(policy: str, scenario: Scenario, axes: tuple[Axis, ...], values: tuple[
     try:
         changed = load_policy(policy, changes=changes)
         return Point(values, figures(simulate(changed, scenario)))
-    except (ConfigError, OrchestratorError) as error:
+    except OrchestratorError as error:
         return Point(values, None, str(error).splitlines()[0])
 
 
@@ -111,17 +111,17 @@ def cores(jobs: int | None = None) -> Executor:
 
 
 def cluster(address: str) -> Executor:
-    """The workers of a Dask cluster. Raises SweepError if there is none at that address, or no Dask here."""
+    """The workers of a Dask cluster. Raises ClusterError if there is none at that address, or no Dask here."""
     try:
         from distributed import Client  # noqa: PLC0415 - an extra of its own, for those who have a cluster
     except ImportError:
-        raise SweepError(
+        raise ClusterError(
             "--dask needs the package distributed: pip install 'charging-station-orchestrator[dask]'"
         ) from None
     try:
         executor: Executor = Client(address, timeout=CONNECT_S).get_executor()
     except (OSError, ValueError) as error:
-        raise SweepError(f"--dask {address}: no cluster answers there: {error}") from None
+        raise ClusterError(f"--dask {address}: no cluster answers there: {error}") from None
     return executor
 
 
