@@ -13,14 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from orchestrator import __version__
-from orchestrator.errors import ConfigError, HexError, OrchestratorError
+from orchestrator.errors import ConfigError, HexError, OrchestratorError, UsageError
+from orchestrator.workbench.verbs import add_workbench_verbs, missing
 
 if TYPE_CHECKING:
     from orchestrator.config.station import Station
-
-
-class UsageError(OrchestratorError):
-    """The command line cannot be understood; the text says what is missing."""
 
 
 REQUESTS = {
@@ -105,16 +102,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--old-protocol", action="store_true", help="ask for the BMU's older, undocumented pages as well"
     )
     probe.set_defaults(run=_probe)
-    replay = verbs.add_parser("replay", help="take recorded decisions again, with the same policy or with another")
-    replay.add_argument("journal", nargs="+", type=Path, help="a journal's directory, or files of one (may be gzipped)")
-    replay.add_argument("--policy", metavar="FILE", help="what this policy would have decided, and what that changes")
-    replay.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
-    replay.set_defaults(run=_replay)
-    diagram = verbs.add_parser("diagram", help="the state machine as a picture")
-    diagram.add_argument("--policy", metavar="FILE", help="as this policy uses it, with its thresholds")
-    diagram.add_argument("--format", choices=PICTURES, default=PICTURES[0], help="default: %(default)s, which is text")
-    diagram.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
-    diagram.set_defaults(run=_diagram)
+    add_workbench_verbs(verbs)
     demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
     demo.add_argument("--fault", metavar="NAME", help="inject a fault in mid-charge; 'list' shows the names")
     demo.add_argument("--plain", action="store_true", help="lines instead of a live picture")
@@ -122,7 +110,6 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 SCHEMAS = ("policy", "station", "map")
-PICTURES = ("mermaid", "svg", "png")
 NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
@@ -241,54 +228,9 @@ def _probe(arguments: argparse.Namespace) -> int:
     return probe(station, arguments.bay, arguments.nmt, old_protocol=arguments.old_protocol)
 
 
-def _replay(arguments: argparse.Namespace) -> int:
-    try:
-        from orchestrator.workbench.replaying import replay
-    except ImportError as error:
-        raise _missing("workbench", error) from None
-    return replay(arguments.journal, arguments.policy, arguments.bay)
-
-
-def _diagram(arguments: argparse.Namespace) -> int:
-    from orchestrator.config.load import load_policy
-    from orchestrator.workbench.diagram import diagram, mermaid
-
-    of = diagram(load_policy(arguments.policy) if arguments.policy else None)
-    if arguments.format == "mermaid":
-        _give(mermaid(of).encode(), arguments.out)
-        return 0
-    try:
-        from orchestrator.workbench.drawing import draw
-    except ImportError as error:
-        raise _missing("workbench", error) from None
-    if arguments.out is None and sys.stdout.isatty():
-        raise UsageError("a picture is nothing for a terminal: name a file with --out")
-    _give(draw(of, arguments.format), arguments.out)
-    return 0
-
-
-def _give(data: bytes, out: Path | None) -> None:
-    """To a file, or to standard output."""
-    if out is None:
-        sys.stdout.buffer.write(data)
-        sys.stdout.flush()
-        return
-    try:
-        out.write_bytes(data)
-    except OSError as error:
-        raise OrchestratorError(f"{out}: {error.strerror}") from None
-
-
-def _missing(extra: str, error: ImportError) -> OrchestratorError:
-    """What to install for a verb whose libraries a gateway need not have."""
-    return OrchestratorError(
-        f"this needs the package {error.name}: pip install 'charging-station-orchestrator[{extra}]'"
-    )
-
-
 def _demo(arguments: argparse.Namespace) -> int:
     try:
         from orchestrator.demo.run import demo
     except ImportError as error:
-        raise _missing("demo", error) from None
+        raise missing("the demo", error, "demo") from None
     return demo(arguments.fault, plain=arguments.plain)

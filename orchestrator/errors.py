@@ -40,6 +40,10 @@ class ProtocolError(OrchestratorError):
     """An answer came whole and with a good checksum, but it is not what was asked for: expected and got."""
 
 
+class UsageError(OrchestratorError):
+    """The command line cannot be understood; the text says what is missing."""
+
+
 class HexError(OrchestratorError):
     """Text that a person gave is not hexadecimal: which characters, and where."""
 

@@ -30,8 +30,11 @@ EDGES: dict[str, tuple[str, ...]] = {
     "service": ("config", "core", "devices", "errors", "interlock", "keys", "link", "model", "protocol"),
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
-    # What it checks is the core itself, so it runs on nothing but what the core is made of.
-    "workbench": ("config", "core", "errors", "keys", "model", "service.records"),
+    # What it checks and tries is the core itself, on the models of the emulators, without any line between them.
+    "workbench": (
+        "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
+        "sim.chemistry", "sim.pack",
+    ),
     "show": (),
     "demo": ("config", "errors", "keys", "model", "service", "show", "sim"),
     "cli": (
@@ -46,7 +49,10 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
     "cattrs": ("workbench.recording",),
+    "distributed": ("workbench.sweep",),
     "durand": ("sim",),
+    "jinja2": ("workbench.page",),
+    "matplotlib": ("workbench.plot", "workbench.tradeoff"),
     "pygraphviz": ("workbench.drawing",),
     "rich": ("demo",),
     "serial": ("link.serial",),
@@ -63,7 +69,7 @@ LIBRARY = frozenset({
 #: … and none of these built-in functions.
 IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "open", "print"})
 
-CLOCK_READERS = ("cli", "demo", "service", "sim")
+CLOCK_READERS = ("cli", "demo", "service", "sim", "workbench.verbs")
 CLOCKS = frozenset({
     "clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "monotonic", "monotonic_ns", "perf_counter",
     "perf_counter_ns", "process_time", "process_time_ns", "strftime", "thread_time", "thread_time_ns", "time",

@@ -1,4 +1,4 @@
-"""The three kinds of file, and how one is found by a path or by the name of a shipped one."""
+"""The four kinds of file, and how one is found by a path or by the name of a shipped one."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -10,6 +10,8 @@ from orchestrator.config.policy import Policy
 from orchestrator.config.policy_rules import POLICY_RULES
 from orchestrator.config.rules import Problems, problems
 from orchestrator.config.scalars import UnfitError, did_you_mean, nearest, shown
+from orchestrator.config.scenario import Scenario
+from orchestrator.config.scenario_rules import SCENARIO_RULES
 from orchestrator.config.shipped import shipped_dir, shipped_names
 from orchestrator.config.station import Station
 from orchestrator.config.station_rules import station_problems
@@ -30,7 +32,8 @@ class Kind:
 POLICY = Kind("policy", "policy", Policy, "policies", lambda values: problems(POLICY_RULES, values))
 MAP = Kind("map", "object map", ObjectMap, "configs/maps", lambda values: problems(MAP_RULES, values))
 STATION = Kind("station", "station", Station, "configs/stations", station_problems)
-KINDS = (POLICY, MAP, STATION)
+SCENARIO = Kind("scenario", "scenario", Scenario, "configs/scenarios", lambda values: problems(SCENARIO_RULES, values))
+KINDS = (POLICY, MAP, STATION, SCENARIO)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,15 +1,17 @@
-"""From file names to a `Station`, a `Policy` or an `ObjectMap`; or to every finding in them, at once."""
+"""From file names to a `Station`, a `Policy`, an `ObjectMap` or a `Scenario`; or to every finding in them, at once."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import TypeVar
 
-from orchestrator.config.files import KINDS, MAP, POLICY, STATION, Kind, Place, find, nearest_file, place
+from orchestrator.config.change import changed
+from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.policy import Policy
 from orchestrator.config.reader import Reader
 from orchestrator.config.scalars import UnfitError, nearest
+from orchestrator.config.scenario import Scenario
 from orchestrator.config.schema import INVALID
 from orchestrator.config.station import Station
 from orchestrator.config.yamltree import MAX_BYTES, Entries, Node, Refused, parse
@@ -26,9 +28,14 @@ def load_station(path: str | Path) -> Station:
     return _load(STATION, place(path), Station)
 
 
-def load_policy(name_or_path: str | Path, relative_to: Path | None = None) -> Policy:
-    """A policy by a shipped name or a path (relative to the directory `relative_to`). Raises `ConfigError`."""
-    return _load(POLICY, _find(POLICY, name_or_path, relative_to), Policy)
+def load_policy(
+    name_or_path: str | Path, relative_to: Path | None = None, changes: Mapping[str, str] | None = None
+) -> Policy:
+    """A policy by a shipped name or a path (relative to the directory `relative_to`). Raises `ConfigError`.
+
+    `changes` are read instead of what is written, by dotted path: `{"current.soc_pct[0].to": "80"}`.
+    """
+    return _load(POLICY, _find(POLICY, name_or_path, relative_to), Policy, changes or {})
 
 
 def load_map(name_or_path: str | Path, relative_to: Path | None = None) -> ObjectMap:
@@ -36,10 +43,15 @@ def load_map(name_or_path: str | Path, relative_to: Path | None = None) -> Objec
     return _load(MAP, _find(MAP, name_or_path, relative_to), ObjectMap)
 
 
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """A scenario by a shipped name or a path. Raises `ConfigError`."""
+    return _load(SCENARIO, _find(SCENARIO, name_or_path, None), Scenario)
+
+
 def check(paths: Iterable[str | Path]) -> list[Finding]:
     """Everything that is wrong in these files and in those that they name, sorted; an empty list is a yes.
 
-    What a file is, is told by its key `policy`, `station` or `map`. A file named twice is reported once.
+    What a file is, is told by its key `policy`, `station`, `map` or `scenario`. A file named twice is reported once.
     """
     places = [place(path) for path in paths]
     loader = _Loader(places)
@@ -48,8 +60,8 @@ def check(paths: Iterable[str | Path]) -> list[Finding]:
     return sorted(set(loader.findings))
 
 
-def _load(kind: Kind, where: Place, wanted: type[T]) -> T:
-    loader = _Loader([where])
+def _load(kind: Kind, where: Place, wanted: type[T], changes: Mapping[str, str] | None = None) -> T:
+    loader = _Loader([where], changes or {})
     value: object = INVALID
     try:
         value = loader.load(kind, where)
@@ -72,8 +84,9 @@ def _find(kind: Kind, name_or_path: str | Path, relative_to: Path | None) -> Pla
 class _Loader:
     """Reads each file once, however many bays name it, and collects the findings of all."""
 
-    def __init__(self, named: Iterable[Place]) -> None:
+    def __init__(self, named: Iterable[Place], changes: Mapping[str, str] | None = None) -> None:
         self.findings: list[Finding] = []
+        self._changes = changes or {}
         self._shown = {os.path.realpath(one.path): one.shown for one in named}
         self._trees: dict[str, Node | None] = {}
         self._digests: dict[str, str] = {}
@@ -89,13 +102,13 @@ class _Loader:
             return
         keys = [name.text for name, _ in node.entries] if isinstance(node, Entries) else []
         near = next((f" ({key!r}: did you mean {found}?)" for key in keys if (found := _kind_near(key))), "")
-        text = f"this is no file of ours: it has none of the keys policy, station, map{near}"
+        text = f"this is no file of ours: it has none of the keys policy, station, map, scenario{near}"
         self.findings.append(Finding(self._name(where), node.mark.line, node.mark.column, text))
 
     def load(self, kind: Kind, where: Place) -> object:
         """The record in a file, or `INVALID` if anything in it, or in a file that it names, is wrong.
 
-        Raises `UnfitError` if the file is of another kind.
+        Raises `UnfitError` if the file is of another kind, or has no place for a change.
         """
         real = (os.path.realpath(where.path), kind.key)
         if real not in self._loaded:
@@ -104,7 +117,7 @@ class _Loader:
             if others and kind not in others:
                 text = f"{self._name(where)} has the key {others[0].key!r}; needed is a file with the key {kind.key!r}"
                 raise UnfitError(text)
-            self._loaded[real] = self._read(kind, where, node)
+            self._loaded[real] = self._read(kind, where, changed(node, self._changes) if node else None)
         return self._loaded[real]
 
     def _read(self, kind: Kind, where: Place, node: Node | None) -> object:

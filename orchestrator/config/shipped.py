@@ -14,5 +14,5 @@ def shipped_dir() -> Path:
 
 
 def shipped_names(folder: str) -> tuple[str, ...]:
-    """The names of the shipped files in `folder` ("policies", "configs/maps", "configs/stations"), sorted."""
+    """The names of the shipped files in `folder` ("policies", "configs/maps", …), sorted."""
     return tuple(sorted(path.stem for path in (shipped_dir() / folder).glob("*.yaml")))

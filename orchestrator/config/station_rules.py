@@ -161,7 +161,8 @@ def _bay_name(name: str) -> Problems:
         yield "name", problem
 
 
-def _steps(steps_a: tuple[float, ...]) -> Problems:
+def step_problems(steps_a: tuple[float, ...]) -> Problems:
+    """The five current-limit steps of a charger, below the key `charger`."""
     if len(steps_a) != STEPS:
         commas = " (a decimal has a point, 2.5, not a comma)" if len(steps_a) > STEPS else ""
         yield (
@@ -177,7 +178,8 @@ def _steps(steps_a: tuple[float, ...]) -> Problems:
             return  # steps from the highest down are one mistake
 
 
-def _lowest_step(steps_a: tuple[float, ...], current_a: float) -> Problems:
+def lowest_step_problems(steps_a: tuple[float, ...], current_a: float) -> Problems:
+    """At least one of them may be used."""
     if steps_a[0] > current_a:
         yield (
             "charger.steps_a[0]",
@@ -216,8 +218,8 @@ def _tpdos(object_map: ObjectMap, _tpdo_s: float) -> Problems:
 
 _BAY_RULES: tuple[Rule, ...] = (
     Rule(_bay_name, ("name",)),
-    Rule(_steps, ("charger.steps_a",)),
-    Rule(_lowest_step, ("charger.steps_a", "limits.current_a")),
+    Rule(step_problems, ("charger.steps_a",)),
+    Rule(lowest_step_problems, ("charger.steps_a", "limits.current_a")),
     Rule(_voltage, ("policy", "limits.voltage_v")),
     Rule(_temperature, ("policy", "limits.temperature_c")),
     Rule(_tpdos, ("battery.map", "battery.tpdo_s")),

@@ -19,6 +19,8 @@ from orchestrator.model import ENERGISED, ChargeMode, Operation, Session, State
 #: How far apart the kept temperatures are.
 WARMTH_EVERY_S = 10.0
 
+Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
+
 
 def follow(f: Facts, last_s: float | None) -> None:
     """Bring the memory up to this step; `last_s` is the time of the one before."""
@@ -100,9 +102,14 @@ def _follow_warmth(f: Facts) -> None:
     if sample == memory.sample:
         return
     memory.sample_before, memory.sample = memory.sample, sample
-    if not memory.warmth or newest.t_s - memory.warmth[-1][0] >= WARMTH_EVERY_S:
-        kept = tuple(w for w in memory.warmth if newest.t_s - w[0] <= WARMING_S + WARMTH_EVERY_S)
-        memory.warmth = (*kept, sample)
+    memory.warmth = thinned(memory.warmth, sample)
+
+
+def thinned(warmth: Warmth, sample: tuple[float, float]) -> Warmth:
+    """The kept temperatures with this one, if it is due, and without those that are too old."""
+    if warmth and sample[0] - warmth[-1][0] < WARMTH_EVERY_S:
+        return warmth
+    return (*(kept for kept in warmth if sample[0] - kept[0] <= WARMING_S + WARMTH_EVERY_S), sample)
 
 
 def _follow_battery(f: Facts) -> None:

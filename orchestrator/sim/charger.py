@@ -133,6 +133,12 @@ class Charger:
         return self.run and not standing and self.mode is not ChargeMode.FULL
 
     @property
+    def pulsing(self) -> bool:
+        """Whether its output goes on and off by itself."""
+        pulses = self.precharge is Precharge.PULSE or self.mode is ChargeMode.BATTERY_RECOVERY
+        return pulses and self.running and self.mode is not ChargeMode.CHARGE
+
+    @property
     def operation(self) -> Operation:
         """As it reports it."""
         return Operation.RUNNING if self.running else Operation.STOPPED
@@ -167,20 +173,30 @@ class Charger:
         if self.control_mode is ControlMode.AUTOMATIC:
             self._next_stage(pack)
         self._start_by_itself(dt_s)
-        demand_a = self._demand_a() * self.gain
-        room_a = max(self.cv_v - pack.ocv_v, 0.0) / (pack.resistance_ohm + self.lead_ohm)
-        self.current_a = min(demand_a, room_a, self.current_a + SOFT_START_A_PER_S * dt_s)
-        self.voltage_v = pack.ocv_v + self.current_a * (pack.resistance_ohm + self.lead_ohm)
+        demand_a, room_a = self.demand_a, self.room_a(pack)
+        self.current_a = self.output_a(dt_s, demand_a, room_a)
+        self.voltage_v = pack.ocv_v + self.current_a * (pack.series_ohm + self.lead_ohm)
         self._watch_taper(dt_s, tapering=demand_a > room_a)
 
-    def _demand_a(self) -> float:
+    def output_a(self, dt_s: float, demand_a: float, room_a: float) -> float:
+        """What it delivers `dt_s` after what it delivers now."""
+        return min(demand_a, room_a, self.current_a + SOFT_START_A_PER_S * dt_s)
+
+    def room_a(self, pack: Pack) -> float:
+        """What the constant voltage leaves room for."""
+        return max(self.cv_v - pack.ocv_v, 0.0) / (pack.series_ohm + self.lead_ohm)
+
+    @property
+    def demand_a(self) -> float:
         """What the output is set to before the voltage limits it."""
+        return self._set_a() * self.gain
+
+    def _set_a(self) -> float:
         if not self.running:
             return 0.0
         if self.mode is ChargeMode.CHARGE:
             return self.steps_a[self.current_limit]
-        pulsing = self.precharge is Precharge.PULSE or self.mode is ChargeMode.BATTERY_RECOVERY
-        if pulsing:
+        if self.pulsing:
             return self.precharge_a if self.stage_s % (2 * PULSE_S) < PULSE_S else 0.0
         if self.mode is ChargeMode.PRECHARGE and self.precharge is Precharge.CONTINUOUS:
             return self.precharge_a

@@ -1,53 +1,27 @@
 """A model of a lithium battery pack: charge, open-circuit voltage, resistance, heat. Pure: time is an argument.
 
+It is the equivalent circuit that is called Thevenin's: a voltage source (the open-circuit voltage over the charge), a
+series resistance and, if `polarisation_ohm` is given, one resistor beside a capacitor, which is why a pack's voltage
+goes on falling for a minute after the current has stopped. Its heat warms one lump that cools towards its surroundings.
+
 Below 0 % lies the deep discharge: a few per cent of the capacity in which the voltage of an NMC pack climbs from
 2.54 V to 3.0 V a cell. It is where a pack must be woken gently before it may be charged.
 """
 
 import math
-from bisect import bisect_right
 from dataclasses import dataclass
 
 from orchestrator.model import BatteryStatus
+from orchestrator.sim.chemistry import NMC, Chemistry, interpolate
 
-#: Open-circuit volts of one cell over its state of charge (0 … 1), typical of NMC; beyond 1 it is overcharged.
-NMC = (
-    (0.00, 3.00),
-    (0.05, 3.35),
-    (0.10, 3.45),
-    (0.20, 3.55),
-    (0.30, 3.60),
-    (0.40, 3.65),
-    (0.50, 3.70),
-    (0.60, 3.78),
-    (0.70, 3.88),
-    (0.80, 3.98),
-    (0.90, 4.08),
-    (1.00, 4.19),
-    (1.05, 4.45),
-)
+#: Where a BMU of this kind sets its status bits, °C; wider than what any charge policy allows.
+HIGH_C, LOW_C = 60.0, -20.0
 
-#: The same below 0 %, over the share of the deep discharge that is gone (−1 … 0): steep at first, then flatter.
-DEEP = ((-2.0, 0.0), (-1.0, 2.54), (-0.57, 2.76), (0.0, 3.00))
-
-#: Where a BMU of this kind sets its status bits: volts of a cell and °C; wider than what any charge policy allows.
-HIGH_CELL_V, LOW_CELL_V, HIGH_C, LOW_C = 4.25, 2.80, 60.0, -20.0
+#: The temperature that a resistance is given for, and absolute zero.
+REFERENCE_C, ZERO_C = 25.0, -273.15
 
 #: How fast a fault can heat or cool a pack: not faster than a sensor's reading can be believed.
 DRIVEN_K_PER_S = 4.0
-
-Curve = tuple[tuple[float, float], ...]
-
-
-def interpolate(curve: Curve, x: float) -> float:
-    """The curve's value at x, straight between its points and flat beyond its ends; x must ascend."""
-    upper = bisect_right(curve, (x, math.inf))
-    if upper == 0:
-        return curve[0][1]
-    if upper == len(curve):
-        return curve[-1][1]
-    (x0, y0), (x1, y1) = curve[upper - 1], curve[upper]
-    return y0 + (y1 - y0) * (x - x0) / (x1 - x0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,16 +44,21 @@ class Readout:
 class Pack:
     """One battery. `charge_ah` is what it holds above 0 %; negative in the deep discharge."""
 
+    chemistry: Chemistry = NMC
     cells: int = 13
     capacity_ah: float = 20.0  #: nominal; `soh_pct` of it can be used
     deep_ah: float = 0.4  #: what lies between 2.54 V and 3.0 V a cell
-    resistance_ohm: float = 0.05
+    resistance_ohm: float = 0.05  #: at once, at 25 °C
+    arrhenius_k: float = 0.0  #: how it grows in the cold: by exp(this × (1/T − 1/298 K)); 0: not at all
+    polarisation_ohm: float = 0.0  #: what comes to it …
+    polarisation_s: float = 60.0  #: … with this time constant
     soh_pct: float = 100.0
     temperature_c: float = 20.0
     ambient_c: float = 20.0
     heat_j_per_k: float = 6000.0  #: about 6 kg of cells and their case
     cooling_w_per_k: float = 2.0
     charge_ah: float = 0.0
+    polarisation_v: float = 0.0
     current_a: float = 0.0  #: positive while charging
     bias_v: float = 0.0  #: added to the open-circuit voltage by a fault
     leaky: bool = False  #: a fault: charge that flows in is lost inside
@@ -97,15 +76,25 @@ class Pack:
 
     @property
     def ocv_v(self) -> float:
-        """Volts without current."""
-        deep = self.charge_ah < 0
-        cell_v = interpolate(DEEP, self.charge_ah / self.deep_ah) if deep else interpolate(NMC, self.soc)
-        return self.cells * cell_v + self.bias_v
+        """Volts once the current has stopped; with polarisation they still fall from there."""
+        chemistry, deep = self.chemistry, self.charge_ah < 0
+        cell_v = (
+            interpolate(chemistry.deep, self.charge_ah / self.deep_ah) if deep else interpolate(chemistry.ocv, self.soc)
+        )
+        return self.cells * cell_v + self.polarisation_v + self.bias_v
+
+    @property
+    def series_ohm(self) -> float:
+        """The resistance at the present temperature."""
+        if not self.arrhenius_k:
+            return self.resistance_ohm
+        colder = 1 / (self.temperature_c - ZERO_C) - 1 / (REFERENCE_C - ZERO_C)
+        return self.resistance_ohm * math.exp(self.arrhenius_k * colder)
 
     @property
     def voltage_v(self) -> float:
         """Volts at the terminals with the present current."""
-        return self.ocv_v + self.current_a * self.resistance_ohm
+        return self.ocv_v + self.current_a * self.series_ohm
 
     def set_soc(self, pct: float) -> None:
         """Put the pack to a state of charge; −100 is the bottom of the deep discharge."""
@@ -116,16 +105,28 @@ class Pack:
         if not self.leaky:
             self.charge_ah += current_a * dt_s / 3600
         self.current_a = current_a
+        polarisation_w = self._polarise(dt_s)
         if self.driven_c is None:
-            self._warm(dt_s)
+            self._warm(dt_s, polarisation_w)
         else:
             self._drive(dt_s, self.driven_c)
 
-    def _warm(self, dt_s: float) -> None:
-        loss_w = self.current_a * self.current_a * self.resistance_ohm
-        settled_c = self.ambient_c + loss_w / self.cooling_w_per_k
-        share = -math.expm1(-dt_s * self.cooling_w_per_k / self.heat_j_per_k)
-        self.temperature_c += (settled_c - self.temperature_c) * share
+    def _polarise(self, dt_s: float) -> float:
+        """The mean heat of the polarisation meanwhile."""
+        if not self.polarisation_ohm:
+            return 0.0
+        before_v, settled_v = self.polarisation_v, self.current_a * self.polarisation_ohm
+        self.polarisation_v += (settled_v - before_v) * -math.expm1(-dt_s / self.polarisation_s)
+        return (before_v * before_v + self.polarisation_v * self.polarisation_v) / 2 / self.polarisation_ohm
+
+    def _warm(self, dt_s: float, polarisation_w: float) -> None:
+        series_w = self.current_a * self.current_a * self.series_ohm
+        # The warmer it gets, the less resistance has a pack: as if it were cooled the better by that.
+        kelvin = self.temperature_c - ZERO_C
+        cooling_w_per_k = self.cooling_w_per_k + series_w * self.arrhenius_k / (kelvin * kelvin)
+        surplus_w = series_w + polarisation_w - self.cooling_w_per_k * (self.temperature_c - self.ambient_c)
+        share = -math.expm1(-dt_s * cooling_w_per_k / self.heat_j_per_k)
+        self.temperature_c += surplus_w / cooling_w_per_k * share
 
     def _drive(self, dt_s: float, target_c: float) -> None:
         step_k = DRIVEN_K_PER_S * dt_s
@@ -137,8 +138,8 @@ class Pack:
         """The status bits that the pack's own state sets."""
         cell_v = self.voltage_v / self.cells
         active = (
-            (BatteryStatus.OVER_VOLTAGE, cell_v > HIGH_CELL_V),
-            (BatteryStatus.LOW_VOLTAGE, cell_v < LOW_CELL_V),
+            (BatteryStatus.OVER_VOLTAGE, cell_v > self.chemistry.high_cell_v),
+            (BatteryStatus.LOW_VOLTAGE, cell_v < self.chemistry.low_cell_v),
             (BatteryStatus.HIGH_TEMPERATURE, self.temperature_c > HIGH_C),
             (BatteryStatus.LOW_TEMPERATURE, self.temperature_c < LOW_C),
         )

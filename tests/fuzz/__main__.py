@@ -131,7 +131,9 @@ def _part(name: str, how: str, runs: int, seed: int) -> int:
         say("\n".join(said[-40:]))
         say(f"{name}, {how}: FOUND something; all of it is in {log}")
     else:
-        say(f"{name}, {how}: {runs:,} inputs in {took_s:,.0f} s, {runs / took_s:,.0f} a second, {' '.join(peak.split())}")
+        say(
+            f"{name}, {how}: {runs:,} inputs in {took_s:,.0f} s, {runs / took_s:,.0f} a second, {' '.join(peak.split())}"
+        )
     return 1 if status else 0
 
 

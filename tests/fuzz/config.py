@@ -10,8 +10,8 @@ from zlib import crc32
 
 from orchestrator.config import load, ports
 from orchestrator.config.reader import MAX_FINDINGS
-from orchestrator.config.yamltree import MAX_FINDINGS as MAX_YAML_FINDINGS
 from orchestrator.config.station import Station
+from orchestrator.config.yamltree import MAX_FINDINGS as MAX_YAML_FINDINGS
 from orchestrator.errors import ConfigError, Finding
 from tests.fuzz.target import Target
 
@@ -112,6 +112,7 @@ def _is_shown_well(finding: Finding, lines: list[bytes]) -> None:
 
 SHORT = 250  #: bytes of a broken file that is quick
 BROKEN = [path.read_bytes() for path in sorted((TESTS / "broken").glob("*.yaml"))]
+
 
 def kind(token: bytes) -> object:
     """Words and texts are alike, blanks are alike, and each other character is like itself."""

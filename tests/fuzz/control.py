@@ -87,7 +87,9 @@ def one(data: bytes) -> None:
 
 def _is_what_was_asked(request: Mapping[str, object], said: dict[str, Any]) -> None:
     if request["verb"] == "status":
-        assert [bay["name"] for bay in said["bays"]] == ([request["bay"]] if request.get("bay") is not None else list(BAYS))
+        assert [bay["name"] for bay in said["bays"]] == (
+            [request["bay"]] if request.get("bay") is not None else list(BAYS)
+        )
         return
     assert request["verb"] in set(Request)
     bays: Any = request.get("bays")
@@ -97,6 +99,7 @@ def _is_what_was_asked(request: Mapping[str, object], said: dict[str, Any]) -> N
 
 TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|[\w.+-]+|\s+|.', re.DOTALL)
 VERBS = ("status", *Request)
+
 
 def kind(token: bytes) -> object:
     """Words and texts are alike, blanks are alike, and each other character is like itself."""

@@ -4,7 +4,6 @@ import os
 import socket
 import tempfile
 from array import array
-from pathlib import Path
 
 from orchestrator.service.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
 from orchestrator.service.laststop import first_stop

@@ -5,14 +5,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.model import BatteryStatus
-from orchestrator.sim.pack import DEEP, NMC, Pack, interpolate
+from orchestrator.sim.chemistry import LFP, NMC, Chemistry, interpolate
+from orchestrator.sim.pack import Pack
 
 
-def test_the_curves_ascend_and_meet_at_empty() -> None:
-    for curve in (NMC, DEEP):
+@pytest.mark.parametrize(("chemistry", "empty_v"), [(NMC, 3.0), (LFP, 2.5)])
+def test_the_curves_ascend_and_meet_at_empty(chemistry: Chemistry, empty_v: float) -> None:
+    for curve in (chemistry.ocv, chemistry.deep):
         assert list(curve) == sorted(curve)
         assert [volts for _, volts in curve] == sorted(volts for _, volts in curve)
-    assert NMC[0][1] == DEEP[-1][1] == 3.0
+    assert chemistry.ocv[0] == (0.0, empty_v)
+    assert chemistry.deep[-1] == (0.0, empty_v)
 
 
 @pytest.mark.parametrize(("x", "y"), [(-1, 10), (0, 10), (1, 15), (2, 20), (3, 0), (9, 0)])
@@ -58,6 +61,32 @@ def test_energy_in_is_energy_stored_plus_heat(amps: float, seconds: float) -> No
         into_j += (middle_v + amps * pack.resistance_ohm) * amps * dt_s
     heat_j = (pack.temperature_c - 20) * pack.heat_j_per_k
     assert into_j == pytest.approx(stored_j + heat_j, abs=0.05, rel=1e-3)
+
+
+def test_polarisation_comes_and_goes_with_its_time_constant() -> None:
+    pack = Pack(capacity_ah=1e6, polarisation_ohm=0.02, polarisation_s=60)
+    pack.set_soc(50)
+    pack.advance(60, 10)
+    assert pack.voltage_v == pytest.approx(48.1 + 10 * 0.05 + 0.2 * (1 - 1 / 2.71828), abs=1e-3)
+    pack.advance(600, 10)
+    assert pack.voltage_v == pytest.approx(48.1 + 10 * 0.05 + 0.2, abs=1e-3)
+    pack.advance(60, 0)
+    assert pack.voltage_v == pytest.approx(48.1 + 0.2 / 2.71828, abs=1e-3)
+
+
+def test_polarisation_is_as_much_charged_however_it_is_cut() -> None:
+    whole, cut = (Pack(polarisation_ohm=0.02) for _ in range(2))
+    whole.advance(90, 10)
+    for _ in range(9):
+        cut.advance(10, 10)
+    assert whole.voltage_v == pytest.approx(cut.voltage_v)
+
+
+@pytest.mark.parametrize(("celsius", "times"), [(25, 1.0), (0, 1.846), (45, 0.656)])
+def test_resistance_grows_in_the_cold(celsius: float, times: float) -> None:
+    pack = Pack(temperature_c=celsius, arrhenius_k=2000)
+    assert pack.series_ohm == pytest.approx(0.05 * times, abs=1e-4)
+    assert Pack(temperature_c=celsius).series_ohm == 0.05
 
 
 def test_a_warm_pack_cools_towards_its_surroundings() -> None:

@@ -1,0 +1,135 @@
+"""The verbs for those who tune policies, and for those who ask afterwards. None needs a service or a device.
+
+Each imports what it needs when it runs: plots and their like are extras, which a gateway need not have.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+from orchestrator.errors import OrchestratorError, UsageError
+
+PICTURES = ("mermaid", "svg", "png")
+
+
+def add_workbench_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """`simulate`, `replay` and `diagram`."""
+    _add_simulate(verbs)
+    replay = verbs.add_parser("replay", help="take recorded decisions again, with the same policy or with another")
+    replay.add_argument("journal", nargs="+", type=Path, help="a journal's directory, or files of one (may be gzipped)")
+    replay.add_argument("--policy", metavar="FILE", help="what this policy would have decided, and what that changes")
+    replay.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
+    replay.set_defaults(run=_replay)
+    diagram = verbs.add_parser("diagram", help="the state machine as a picture")
+    diagram.add_argument("--policy", metavar="FILE", help="as this policy uses it, with its thresholds")
+    diagram.add_argument("--format", choices=PICTURES, default=PICTURES[0], help="default: %(default)s, which is text")
+    diagram.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
+    diagram.set_defaults(run=_diagram)
+
+
+def _add_simulate(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    simulate = verbs.add_parser("simulate", help="try policies on a scenario: hours of charging in a moment")
+    simulate.add_argument("policy", nargs="+", help="policies to compare: shipped names or files")
+    simulate.add_argument("--scenario", required=True, help="what happens: a shipped name or a file")
+    simulate.add_argument(
+        "--sweep", action="append", default=[], metavar="KEY=A..B:N",
+        help="one policy with N values of a key instead; may be repeated for every combination",
+    )  # fmt: skip
+    simulate.add_argument("--jobs", type=int, metavar="N", help="processes for a sweep (default: one for each core)")
+    simulate.add_argument("--dask", metavar="ADDRESS", help="play a sweep on this Dask cluster instead")
+    simulate.add_argument("--out", type=Path, metavar="DIR", help="write a page and a picture there")
+    simulate.set_defaults(run=_simulate)
+
+
+def _simulate(arguments: argparse.Namespace) -> int:
+    from orchestrator.workbench.simulate import as_table, play
+
+    if arguments.sweep:
+        return _sweep(arguments)
+    runs = play(arguments.policy, arguments.scenario, _progress())
+    print(as_table(runs))
+    if arguments.out is not None:
+        print("", *_present().save(runs, arguments.out), sep="\n")
+    return 0
+
+
+def _sweep(arguments: argparse.Namespace) -> int:
+    from orchestrator.workbench.figures import aligned
+    from orchestrator.workbench.sweep import axis, cluster, cores, played, rows
+
+    if len(arguments.policy) != 1:
+        raise UsageError("--sweep: name one policy")
+    axes = [axis(text) for text in arguments.sweep]
+    with cluster(arguments.dask) if arguments.dask else cores(arguments.jobs) as pool:
+        done = played(arguments.policy[0], arguments.scenario, axes, pool, _progress())
+    print(aligned(rows(done)))
+    if arguments.out is not None:
+        print("", *_present().save_sweep(done, arguments.out), sep="\n")
+    return 0 if any(point.figures for point in done.points) else 1
+
+
+def _present() -> ModuleType:
+    try:
+        from orchestrator.workbench import present
+    except ImportError as error:
+        raise missing("--out", error) from None
+    return present
+
+
+def _progress() -> Callable[[str, float], None]:
+    """Says on a terminal how far what takes longer than a second has come."""
+    begin_s = time.monotonic()
+
+    def say(what: str, share: float) -> None:
+        if time.monotonic() - begin_s > 1 and sys.stderr.isatty():
+            print(f"\r\x1b[K{what}: {share:.0%}", end="\r", file=sys.stderr, flush=True)
+
+    return say
+
+
+def _replay(arguments: argparse.Namespace) -> int:
+    try:
+        from orchestrator.workbench.replaying import replay
+    except ImportError as error:
+        raise missing("replay", error) from None
+    return replay(arguments.journal, arguments.policy, arguments.bay)
+
+
+def _diagram(arguments: argparse.Namespace) -> int:
+    from orchestrator.config.load import load_policy
+    from orchestrator.workbench.diagram import diagram, mermaid
+
+    of = diagram(load_policy(arguments.policy) if arguments.policy else None)
+    if arguments.format == "mermaid":
+        _give(mermaid(of).encode(), arguments.out)
+        return 0
+    try:
+        from orchestrator.workbench.drawing import draw
+    except ImportError as error:
+        raise missing(arguments.format, error) from None
+    if arguments.out is None and sys.stdout.isatty():
+        raise UsageError("a picture is nothing for a terminal: name a file with --out")
+    _give(draw(of, arguments.format), arguments.out)
+    return 0
+
+
+def _give(data: bytes, out: Path | None) -> None:
+    """To a file, or to standard output."""
+    if out is None:
+        sys.stdout.buffer.write(data)
+        sys.stdout.flush()
+        return
+    try:
+        out.write_bytes(data)
+    except OSError as error:
+        raise OrchestratorError(f"{out}: {error.strerror}") from None
+
+
+def missing(what: str, error: ImportError, extra: str = "workbench") -> OrchestratorError:
+    """What to install for something whose libraries a gateway need not have."""
+    return OrchestratorError(
+        f"{what} needs the package {error.name}: pip install 'charging-station-orchestrator[{extra}]'"
+    )

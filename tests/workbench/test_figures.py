@@ -1,0 +1,123 @@
+"""The figures are those of the moments and spans that they are drawn from."""
+
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.config.load import load_policy
+from orchestrator.config.scenario import Visit
+from orchestrator.model import State
+from orchestrator.workbench.compare import differences
+from orchestrator.workbench.figures import aligned, clock, clock_s, figures, table
+from orchestrator.workbench.simulation import Run, simulate
+from orchestrator.workbench.trail import Moment, Span, Trail, bounds
+from tests.workbench.scenarios import battery, scenario
+
+POLICY = load_policy("li-ion-48v")
+
+
+def moment(hours: float, state: State = State.CHARGING, volts: float = 50.0, celsius: float = 20.0) -> Moment:
+    return Moment(hours * 3600, 50.0 + hours, volts, 8.0, celsius, 20.0, 2, state)
+
+
+def span(from_h: float, to_h: float, state: State, step: int | None = None, *faults: str) -> Span:
+    return Span(from_h * 3600, to_h * 3600, state, step, None, f"{state} for a reason", faults)
+
+
+def run(moments: list[Moment], spans: list[Span], hours: float = 4.0, **changes: object) -> Run:
+    return Run(POLICY, scenario(hours, **changes), Trail(moments, spans), 12.0, 600.0, 100)
+
+
+def test_a_charge_with_everything_in_it() -> None:
+    moments = [
+        moment(0.5),
+        moment(1.0, celsius=31.5),
+        moment(1.5, State.SUSPENDED),
+        moment(2.0, volts=53.2),
+        moment(2.5, volts=53.4),
+        moment(3.0, State.FULL, volts=53.4),
+        moment(4.0, State.FULL, volts=52.0),
+    ]
+    spans = [
+        span(0, 0.5, State.CHARGING, 4),
+        span(0.5, 1.0, State.CHARGING, 2, "status_limit"),
+        span(1.0, 1.01, State.STOPPING, None, "over_temperature"),
+        span(1.01, 1.5, State.SUSPENDED, None, "over_temperature"),
+        span(1.5, 2.99, State.CHARGING, 2),
+        span(2.99, 3.0, State.STOPPING),
+        span(3.0, 4.0, State.FULL),
+    ]
+    found = figures(run(moments, spans))
+    assert (found.policy, found.visits, found.full, found.full_h) == ("li-ion-48v", 1, 1, 3.0)
+    assert (found.left_pct, found.peak_c, found.charged_ah, found.charged_wh) == (54.0, 31.5, 12.0, 600.0)
+    assert found.high_voltage_h == pytest.approx(1.0)  # 13 × 4.1 V is 53.3 V: from 2.0 to 3.0
+    assert (found.stops, found.step_changes) == (1, 1)
+    assert found.faults == {"status_limit": 1, "over_temperature": 1}
+    assert found.state_h[State.CHARGING] == pytest.approx(2.49)
+    assert sum(found.state_h.values()) == pytest.approx(4.0)
+
+
+def test_time_to_full_is_of_each_battery_from_its_arrival() -> None:
+    visits = (Visit(battery="a", from_h=0, to_h=1, soc_pct=50), Visit(battery="b", from_h=1, to_h=2, soc_pct=50),
+              Visit(battery="a", from_h=2, used_pct=10))  # fmt: skip
+    moments = [moment(0.5, State.FULL), moment(1.5), moment(2.25), moment(2.75, State.FULL)]
+    found = figures(
+        run(moments, [span(0, 3, State.IDLE)], 3.0, visits=visits, batteries={"a": battery(), "b": battery()})
+    )
+    assert (found.visits, found.full, found.full_h) == (3, 2, pytest.approx(0.625))
+
+
+def test_nothing_charged_has_dashes() -> None:
+    found = figures(run([], [span(0, 4, State.IDLE)]))
+    rows = dict(table([found]))
+    assert rows["time to full, h:min"] == rows["peak temperature"] == "–"
+    assert rows["faults"] == "none"
+
+
+def test_a_column_for_each_policy_and_a_row_for_each_state_that_lasts() -> None:
+    first = figures(run([], [span(0, 3, State.CHARGING), span(3, 3.0001, State.STOPPING), span(3.0001, 4, State.FULL)]))
+    second = replace(first, policy="other", state_h={State.SUSPENDED: 4.0})
+    head, *rows = table([first, second])
+    assert head == ["", "li-ion-48v", "other"]
+    assert [row for row in rows if row[0].startswith("time CHARGING")] == [
+        ["time CHARGING, h:min:s", "3:00:00", "0:00:00"]
+    ]
+    assert not [row for row in rows if "STOPPING" in row[0]]
+    assert len({line.index("other") for line in [aligned([head, *rows]).splitlines()[0]]}) == 1
+
+
+def test_clocks() -> None:
+    assert (clock(2.0833), clock(0.999), clock_s(2.0853)) == ("2:05", "1:00", "2:05:07")
+
+
+def test_rules_are_gathered_whatever_was_measured() -> None:
+    def because(from_h: float, why: str, step: int) -> Span:
+        return Span(from_h * 3600, from_h * 3600 + 60, State.CHARGING, step, 5.0, why)
+
+    cool, warm = "temperature {} °C in 15 … 35, p.yaml:37", "temperature {} °C in 35 … 40, p.yaml:38"
+    spans = [because(0, cool.format(34.9), 3), because(1, warm.format(35.0), 1), because(2, cool.format(34.8), 3)]
+    found = bounds(spans)
+    assert [(one.number, len(one.spans), one.total_s) for one in found] == [(1, 2, 120.0), (2, 1, 60.0)]
+
+
+def test_policies_differ_where_state_or_step_do() -> None:
+    one = [span(0, 1, State.CHARGING, 4), span(1, 1.001, State.STOPPING), span(1.001, 4, State.FULL)]
+    other = [span(0, 0.5, State.CHARGING, 4), span(0.5, 2, State.CHARGING, 2), span(2, 4, State.FULL)]
+    assert differences([one, other]) == [(1800.0, 7200.0)]
+    assert differences([one, one]) == []
+    assert differences([one]) == []
+
+
+def test_a_difference_of_a_moment_is_none() -> None:
+    one = [span(0, 1, State.CHARGING, 4), span(1, 2, State.FULL)]
+    other = [span(0, 1.01, State.CHARGING, 4), span(1.01, 2, State.FULL)]
+    assert differences([one, other]) == []
+
+
+def test_the_figures_of_a_simulation_add_up() -> None:
+    found = figures(simulate(POLICY, scenario(1.0)))
+    assert sum(found.state_h.values()) == pytest.approx(1.0, abs=0.001)
+    assert found.left_pct is not None
+    assert found.charged_ah == pytest.approx((found.left_pct - 30) / 100 * 8, abs=0.001)
+    assert found.full_h is not None
+    assert 0.4 < found.full_h < 0.6

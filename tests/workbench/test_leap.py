@@ -1,0 +1,107 @@
+"""Time that stretches changes no decision: hours in leaps and hours in ticks end alike."""
+
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.config.load import load_policy, load_scenario
+from orchestrator.config.scenario import Ask, Defect, Sensor, SensorFault
+from orchestrator.core.memory import Memory
+from orchestrator.core.step import step
+from orchestrator.model import Decision, Request, State
+from orchestrator.workbench import simulation
+from orchestrator.workbench.devices import TICK_S
+from orchestrator.workbench.leap import outline
+from orchestrator.workbench.simulation import Run, Simulation, simulate
+from tests.workbench.scenarios import battery, scenario
+
+#: Hours of each shipped scenario that are stepped through tick by tick: up to behind what is special to it.
+SHIPPED = {
+    "aged-pack": 2.2,
+    "agv-day": 2.1,
+    "cold-morning": 3.4,
+    "deep-discharge": 0.3,
+    "faulty-sensor": 1.85,
+    "hot-afternoon": 0.75,
+}
+#: A warm pack's temperature rises by 0.0001 K in a tick: two ways of summing it up may differ by some of them.
+SAME_S = 4 * TICK_S
+
+
+def same(leaps: Run, ticks: Run) -> None:
+    """Every state, step, rule and fault, in the same order and at the same time."""
+    assert [span.rule for span in leaps.trail.spans] == [span.rule for span in ticks.trail.spans]
+    for leapt, ticked in zip(leaps.trail.spans, ticks.trail.spans, strict=True):
+        assert leapt.from_s == pytest.approx(ticked.from_s, abs=SAME_S), (leapt, ticked)
+        assert leapt.faults == ticked.faults
+    assert leaps.charged_ah == pytest.approx(ticks.charged_ah, rel=1e-4)
+    assert leaps.steps < ticks.steps / 3
+
+
+@pytest.mark.timeout(600)  # tens of thousands of steps, on a machine that may be busy
+@pytest.mark.parametrize("name", SHIPPED)
+def test_leaps_decide_what_ticks_decide(name: str) -> None:
+    cut = replace(load_scenario(name), hours=SHIPPED[name])
+    policy = load_policy("li-ion-48v")
+    same(simulate(policy, cut), simulate(policy, cut, stretch=False))
+
+
+def test_leaps_decide_what_ticks_decide_to_the_end_of_a_charge() -> None:
+    whole = scenario(0.55)
+    leaps = simulate(load_policy("li-ion-48v"), whole)
+    same(leaps, simulate(load_policy("li-ion-48v"), whole, stretch=False))
+    assert leaps.trail.spans[-1].state is State.FULL
+
+
+def test_leaps_decide_what_ticks_decide_where_limits_are_held_and_left() -> None:
+    """A policy with many bands, a sensor that drifts, an operator who pauses, and the Ah limit at the end."""
+    policy = load_policy("lfp-48v", changes={"pack.cells_in_series": "13", "pack.voltage_v[1]": "55.2",
+                                             "current.voltage_v[2].to": "56.5", "finish.max_ah": "3",
+                                             "finish.taper.above_v": "53"})  # fmt: skip
+    busy = scenario(
+        1.0,
+        batteries={"pack-1": battery(soh_pct=77)},
+        sensors=(SensorFault(sensor=Sensor.TEMPERATURE_C, defect=Defect.DRIFT, by=-30, from_h=0.1),),
+        operator=(Ask(at_h=0.2, request=Request.PAUSE), Ask(at_h=0.3, request=Request.START)),
+    )
+    leaps, ticks = simulate(policy, busy), simulate(policy, busy, stretch=False)
+    same(leaps, ticks)
+    assert len({span.step for span in leaps.trail.spans}) > 2
+    assert "ah_limit" in leaps.trail.spans[-1].faults
+
+
+def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sums and kept temperatures too: what the fault table looks at, a leap must not lose."""
+    memories: list[Memory] = []
+
+    def recorded(*arguments: object) -> tuple[Decision, Memory]:
+        decision, memory = step(*arguments)  # type: ignore[arg-type]  # handed on as it came
+        memories.append(memory)
+        return decision, memory
+
+    monkeypatch.setattr(simulation, "step", recorded)
+    last = []
+    for max_leap in (240, 1):
+        memories.clear()
+        Simulation(load_policy("li-ion-48v"), scenario(0.25), max_leap).run(lambda _: None)
+        last.append((memories[-1], len(memories)))
+    (leapt, few), (ticked, many) = last
+    assert few < many / 20
+    assert leapt.state is ticked.state is State.CHARGING
+    assert leapt.session is not None
+    assert ticked.session is not None
+    assert leapt.session.charged_ah == pytest.approx(ticked.session.charged_ah, rel=1e-5)
+    assert leapt.session.charged_wh == pytest.approx(ticked.session.charged_wh, rel=1e-3)
+    assert leapt.session.energised_s == ticked.session.energised_s
+    assert [t_s for t_s, _ in leapt.warmth] == [t_s for t_s, _ in ticked.warmth]
+    assert [c for _, c in leapt.warmth] == pytest.approx([c for _, c in ticked.warmth], abs=0.1)
+    assert (leapt.sample, leapt.counted_t_s, leapt.last_s) == (ticked.sample, ticked.counted_t_s, ticked.last_s)
+    assert outline(Decision(State.CHARGING, ""), leapt) == outline(Decision(State.CHARGING, ""), ticked)
+
+
+def test_an_outline_has_all_of_the_memory_that_is_no_measurement() -> None:
+    """A field that is new in the memory must be told here or there."""
+    told = set(outline.__code__.co_names) & set(vars(Memory()))
+    measured = {"state", "reason", "faults", "session", "counted_t_s", "last_s", "resume_s", "order_s", "tries", "step",
+                "sample", "sample_before", "warmth", "mark_v", "mode_s"}  # fmt: skip
+    assert told | measured == set(vars(Memory()))
