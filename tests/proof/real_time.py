@@ -60,6 +60,7 @@ class Real:
     charges: int = 0
     departures: int = 0
     requests: int = 0
+    faults: int = 0
     stops_s: dict[str, list[float]] = field(default_factory=dict)  #: fault → from its moment to the first stop byte
     missed: list[str] = field(default_factory=list)
     false_stops: list[str] = field(default_factory=list)
@@ -144,6 +145,7 @@ class Life:
         return self._faults.pop()
 
     def _break(self, name: str) -> None:
+        self.real.faults += 1
         injected_s = self._plant.inject(name)
         if name == "ignore_stop":
             self._ask("stop")
@@ -249,11 +251,11 @@ def live(minutes: float, seed: int = 1) -> Real:
         life.live()
         real = life.real
         real.status = stage.end()
-        _judge(real, stage.directory / "run" / "journal", life.due)
+        judge(real, stage.directory / "run" / "journal", life.due)
     return real
 
 
-def _judge(real: Real, journal: Path, due: list[tuple[float, float]]) -> None:
+def judge(real: Real, journal: Path, due: list[tuple[float, float]]) -> None:
     """A fault that stops or latches while nothing was wrong is a false one."""
     state, before, changed_s = "", "", 0.0
     for line in _lines(journal):

@@ -69,9 +69,8 @@ def _ends(row: Sequence[object]) -> tuple[int, int, int]:
 
 def told_of_real(real: Real, minutes: float) -> Iterator[str]:
     """The part with real processes in figures."""
-    broken = sum(len(stops) for stops in real.stops_s.values())
     yield (
-        f"\n{minutes:g} real minutes: {real.departures} batteries, {real.charges} charged full, {broken} faults in "
+        f"\n{minutes:g} real minutes: {real.departures} batteries, {real.charges} charged full, {real.faults} faults in "
         f"mid-charge, {real.requests} operator's requests; the service ended with status {real.status}"
     )
     for name, stops_s in sorted(real.stops_s.items()):
