@@ -7,6 +7,7 @@ Each has a main of its own, with more options: `tests.proof.whole_grid`, `campai
 """
 
 import argparse
+import resource
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +23,12 @@ PARTS: Mapping[str, tuple[str, Callable[[Sequence[str]], int]]] = {
 }
 
 
+def cpu_s() -> float:
+    """What this process and those that it has waited for have used of a core."""
+    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Those parts, in this order; 1 if any of them found something."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -35,8 +42,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         if name in chosen:
             about, run = PARTS[name]
             say(f"\n--- {name}: {about}\n")
+            before_s = cpu_s()
             if run([]):
                 found.append(name)
+            say(f"{cpu_s() - before_s:.0f} s of one core")
     say(
         f"\n{time.monotonic() - began_s:.0f} s; "
         + (f"FOUND SOMETHING: {', '.join(found)}" if found else "nothing found")

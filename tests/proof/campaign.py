@@ -21,7 +21,7 @@ from tests.proof.script import SEE_S, Script, shrink
 
 #: A failure is made smaller with at most this many plays.
 SHRINK_PLAYS = 400
-#: What was there for less than this, or until somebody stopped the bay, need not have shown itself.
+#: What was there for less than this need not have shown itself.
 SHOWN_S = SEE_S - 0.5
 #: Nobody has to notice these: they are harmless until something else happens, or look like a healthy bay.
 WHY_UNSEEN = {
@@ -80,8 +80,8 @@ def seen(one: Injected) -> bool:
 
 
 def unseen(one: Injected) -> bool:
-    """It was there for long enough, and nobody noticed."""
-    return not seen(one) and (one.lasted_s or 0.0) >= SHOWN_S
+    """It was there for long enough, the charger ran on, and nobody noticed."""
+    return not (seen(one) or one.verified) and (one.lasted_s or 0.0) >= SHOWN_S
 
 
 def _row(name: str, rows: list[Injected]) -> str:

@@ -69,10 +69,9 @@ def _ends(row: Sequence[object]) -> tuple[int, int, int]:
 
 def told_of_real(real: Real, minutes: float) -> Iterator[str]:
     """The part with real processes in figures."""
-    broken = sum(len(stops) for stops in real.stops_s.values())
     yield (
-        f"\n{minutes:g} real minutes: {real.departures} batteries, {real.charges} charged full, {broken} faults in "
-        f"mid-charge, {real.requests} operator's requests; the service ended with status {real.status}"
+        f"\n{minutes:g} real minutes: {real.departures} batteries, {real.charges} charged full, {real.faults} faults "
+        f"in mid-charge, {real.requests} operator's requests; the service ended with status {real.status}"
     )
     for name, stops_s in sorted(real.stops_s.items()):
         times = f"{statistics.median(stops_s):6.3f} {max(stops_s):6.3f}" if stops_s else "no stop byte came through"
