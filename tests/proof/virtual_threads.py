@@ -58,12 +58,12 @@ class Thread:
     """`threading.Thread`."""
 
     def __init__(self, time: Time, target: Callable[[], object], name: str = "", daemon: bool = True) -> None:
-        self._time, self._target, self._name = time, target, name
+        self._time, self._target = time, target
         self._runner: Runner | None = None
         self._ending = Waiting(time)
 
     def start(self) -> None:
-        self._runner = self._time.start(self._run, self._name)
+        self._runner = self._time.start(self._run)
 
     def _run(self) -> None:
         try:

@@ -1,16 +1,18 @@
 """Time that jumps, for the unchanged service: its threads run one at a time, and the clock moves when all of them wait.
 
-A virtual thread is a real one that holds a baton. Whoever waits looks for what comes next in one queue of moments:
-callbacks are run on the spot, a thread is handed the baton. Thus everything happens in one order, the same in every
-run, and an hour passes as quickly as it can be computed.
+A virtual thread is a greenlet. Whoever waits looks for what comes next in one queue of moments: callbacks are run on the
+spot, to a thread is switched. Thus everything happens in one order, the same in every run, and an hour passes as quickly
+as it can be computed.
 """
 
-import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
+
+from greenlet import getcurrent, greenlet
 
 #: A clock never shows the same time twice; that is also the time that one look at it costs.
 TICK_S = 1e-6
@@ -33,17 +35,17 @@ class Handle:
         self.callback = None
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Runner:
     """One virtual thread; `turn` counts its wake-ups, so that a later one for the same wait is void."""
 
-    baton: threading.Lock = field(default_factory=threading.Lock)
+    let: greenlet
     turn: int = 0
     ended: bool = False
 
 
 class Time:
-    """The clock, the queue of moments and the baton. `call_later`, `call_soon` and `time` are as in an asyncio loop."""
+    """The clock, the queue of moments and whose turn it is. `call_later`, `call_soon` and `time` are as in an asyncio loop."""
 
     def __init__(self, end_s: float = inf) -> None:
         self.now_s = 1000.0
@@ -51,8 +53,7 @@ class Time:
         self.failure: BaseException | None = None  #: what ended the world, if anything did
         self._moments: list[tuple[float, int, Handle | Runner, int]] = []
         self._order = count()
-        self._main = self._running = Runner()
-        self._main.baton.acquire()
+        self._main = self._running = Runner(getcurrent())
         self._runners: list[Runner] = [self._main]
         self._busy_from = (self.now_s, 0)
 
@@ -78,7 +79,7 @@ class Time:
         return self.call_at(self.now_s, callback, *args)
 
     def me(self) -> Runner:
-        """Whoever holds the baton."""
+        """Whose turn it is."""
         return self._running
 
     def wake(self, runner: Runner, at_s: float | None = None) -> None:
@@ -92,17 +93,15 @@ class Time:
             self.wake(me, max(until_s, self.now_s))
         following = self._next()
         if following is not me:
-            following.baton.release()
-            me.baton.acquire()
+            following.let.switch()
         self._running = me
         if self.failure is not None:
             raise StuckError from self.failure
 
-    def start(self, target: Callable[[], object], name: str) -> Runner:
-        runner = Runner()
-        runner.baton.acquire()
+    def start(self, target: Callable[[], object]) -> Runner:
+        runner = Runner(greenlet(parent=self._main.let))
+        runner.let.run = partial(self._live, runner, target)
         self._runners.append(runner)
-        threading.Thread(target=self._live, args=(runner, target), name=name, daemon=True).start()
         self.wake(runner)
         return runner
 
@@ -110,14 +109,12 @@ class Time:
         """Let every thread that is left run into its end. By the main runner, at the end of a world."""
         self.failure = self.failure or StuckError("closed")
         while left := [runner for runner in self._runners[1:] if not runner.ended]:
-            left[0].baton.release()
-            self._main.baton.acquire()
+            left[0].let.switch()
         self._moments.clear()
 
-    # --- the baton ----------------------------------------------------------------------------------------------------
+    # --- whose turn it is ---------------------------------------------------------------------------------------------
 
-    def _live(self, runner: Runner, target: Callable[[], object]) -> None:
-        runner.baton.acquire()
+    def _live(self, runner: Runner, target: Callable[[], object], *_ended: object) -> None:
         self._running = runner
         try:
             if self.failure is None:
@@ -126,7 +123,7 @@ class Time:
             self.failure = self.failure or error
         runner.ended = True
         following = self._main if self.failure is not None else self._next()
-        following.baton.release()
+        runner.let.parent = following.let  # where a greenlet that returns leads to
 
     def _next(self) -> Runner:
         """Let moments happen until one is a thread's; the main one's where nothing may happen any more."""
