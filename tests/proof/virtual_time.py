@@ -1,8 +1,8 @@
 """Time that jumps, for the unchanged service: its threads run one at a time, and the clock moves when all of them wait.
 
-A virtual thread is a greenlet. Whoever waits looks for what comes next in one queue of moments: callbacks are run on the
-spot, to a thread is switched. Thus everything happens in one order, the same in every run, and an hour passes as quickly
-as it can be computed.
+A virtual thread is a greenlet. Whoever waits looks for what comes next in one queue of moments: callbacks are run on
+the spot, to a thread is switched. Thus everything happens in one order, the same in every run, and an hour passes as
+quickly as it can be computed.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,7 @@ class Runner:
 
 
 class Time:
-    """The clock, the queue of moments and whose turn it is. `call_later`, `call_soon` and `time` are as in an asyncio loop."""
+    """The clock, the queue of moments, whose turn it is. `call_later`, `call_soon`, `time` are as in an asyncio loop."""
 
     def __init__(self, end_s: float = inf) -> None:
         self.now_s = 1000.0
