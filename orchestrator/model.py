@@ -180,6 +180,17 @@ class BatteryLink:
     bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers
 
 
+# --- the contactor between them --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ContactorLink:
+    """How the contactor's output is doing; a bay that has none is always connected."""
+
+    connected: bool = True  #: the charger's newest reading was taken with the contactor closed
+    problem: str = ""  #: why the output cannot be driven, for a person: chip, line, what to do
+
+
 # --- what the core is given and what it says -------------------------------------------------------------------------
 
 
@@ -202,6 +213,7 @@ class Snapshot:
     battery_link: BatteryLink = BatteryLink()
     request: Request | None = None
     internal: str = ""  #: an exception of our own code, caught at the boundary, in words
+    contactor: ContactorLink = ContactorLink()
 
 
 class State(StrEnum):
@@ -293,6 +305,7 @@ class Decision:
     setpoint: Setpoint = STANDBY
     step: Step | None = None  #: while energised
     faults: tuple[ActiveFault, ...] = ()  #: worst first
-    alarm: bool = False  #: the interlock output is to be open
+    alarm: bool = False  #: the charger is out of control, and people must know
+    closed: bool = False  #: the contactor between charger and battery is to be closed
     session: Session | None = None  #: running, or just ended (`result` set, in this one decision)
     answer: str = ""  #: what became of the operator's request: "" is yes, else why not

@@ -55,6 +55,7 @@ class Memory:
     idle_a_s: float | None = None  #: since when a running charger has delivered nothing
     mode_s: float = 0.0  #: since when the charger has shown its present mode …
     mode: int = 0  #: … which is this one
+    closed: bool = False  #: the contactor is to be closed
 
     def copy(self) -> "Memory":
         """An independent copy."""

@@ -23,6 +23,7 @@ from orchestrator.model import (
     ChargerReading,
     Command,
     Connection,
+    ContactorLink,
     ControlMode,
     Decision,
     Measurement,
@@ -123,6 +124,7 @@ class World:
         self.reading: ChargerReading | None = None
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
+        self.contactor = ContactorLink()
         self.internal = ""  #: an exception of our own, for one tick
         self.decisions: list[Decision] = []
 
@@ -220,6 +222,7 @@ class World:
             battery_link=replace(self.battery_link, online=self.battery_link.online and not silent),
             request=request,
             internal=internal,
+            contactor=self.contactor,
         )
 
     def _line(self) -> ChargerLink:
