@@ -1,7 +1,6 @@
 """The nouns that travel through the system, all frozen: readings in, a decision out.
 
-Units are in the names. Times called `t_s` are monotonic seconds and say when the value was *asked for*, so that an age
-computed from them is never too young. Unknown is `None`, never a number.
+Units are in the names. Unknown is `None`, never a number. A `t_s`, in monotonic seconds, says when a value was asked for.
 """
 
 from collections.abc import Mapping
@@ -180,17 +179,6 @@ class BatteryLink:
     bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers
 
 
-# --- the contactor between them --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class ContactorLink:
-    """How the contactor's output is doing; a bay that has none is always connected."""
-
-    connected: bool = True  #: the charger's newest reading was taken with the contactor closed
-    problem: str = ""  #: why the output cannot be driven, for a person: chip, line, what to do
-
-
 # --- what the core is given and what it says -------------------------------------------------------------------------
 
 
@@ -213,7 +201,8 @@ class Snapshot:
     battery_link: BatteryLink = BatteryLink()
     request: Request | None = None
     internal: str = ""  #: an exception of our own code, caught at the boundary, in words
-    contactor: ContactorLink = ContactorLink()
+    connected: bool = True  #: nothing is between charger and battery, or a contactor that was closed for this reading
+    contactor_problem: str = ""  #: why the contactor cannot be driven, for a person: chip, line, what to do
 
 
 class State(StrEnum):

@@ -46,6 +46,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
     "durand": ("sim",),
+    "gpiod": ("link.gpio",),
     "rich": ("demo",),
     "serial": ("link.serial",),
     "transitions": ("core.machine",),

@@ -1,4 +1,4 @@
-"""Ports, contactors and control socket of a station, even of one whose file has mistakes: what an emergency stop needs."""
+"""Ports, contactors and socket of a station, even of one whose file has mistakes: what an emergency stop needs."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -62,7 +62,7 @@ def _contactors(node: Node | None) -> Iterator[tuple[str, int, bool]]:
         entries = contactor.entries if isinstance(contactor, Entries) else ()
         given = {name.text: _text(value) for name, value in entries}
         chip, line, active_low = given.pop("chip", ""), given.pop("line", ""), given.pop("active_low", "false")
-        if "/" in chip and _LINE.fullmatch(line) and active_low in _BOOLS and not given and len(entries) <= 3:
+        if "/" in chip and _LINE.fullmatch(line) and active_low in _BOOLS and not given:
             yield chip, int(line, 16 if "x" in line else 10), _BOOLS[active_low]
 
 

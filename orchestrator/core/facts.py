@@ -91,7 +91,7 @@ class Facts:
         self.temperature_c = _fresh(battery.temperature_c, now_s, fast_s)
         self.soc = _fresh(battery.soc_pct, now_s, slow_s)
         self.soh = _fresh(battery.soh_pct, now_s, slow_s)
-        self.connected = snapshot.contactor.connected
+        self.connected = snapshot.connected
         self.energised = memory.state in ENERGISED
         self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
         #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis

@@ -24,6 +24,7 @@ from orchestrator.model import (
     Snapshot,
     State,
 )
+from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
 from orchestrator.service.kept import Kept
 from orchestrator.service.records import SnapshotRecorder, decision_lines
@@ -65,7 +66,15 @@ class BayRunner:
     """Runs `step()` for one bay. Used by the control loop's thread only, but for `ask` and `status`."""
 
     def __init__(
-        self, bay: Bay, charger: Charger, battery: Battery, journal: Journal, memory: Memory, *, snapshots: bool = True
+        self,
+        bay: Bay,
+        charger: Charger,
+        battery: Battery,
+        journal: Journal,
+        memory: Memory,
+        *,
+        contactor: Contactor | None = None,
+        snapshots: bool = True,
     ) -> None:
         self.name = bay.name
         self.last_s = 0.0  #: when the last step was taken
@@ -75,6 +84,8 @@ class BayRunner:
         self._kept: Kept | None = None
         self._ending = False
         self._charger, self._battery, self._journal = charger, battery, journal
+        self._contactor = contactor
+        self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
         self._snapshot = Snapshot()
         self._recorder = SnapshotRecorder() if snapshots else None
         self._asked: list[Asked] = []
@@ -91,6 +102,12 @@ class BayRunner:
         self._ending = True
         self.ask(Asked(Request.STOP))
 
+    def isolate(self) -> None:
+        """Open the contactor for good, at the end of the service, and write it down."""
+        if self._contactor is not None:
+            self._contactor.give_back()
+            self._write_down_contactor(self._contactor)
+
     def ask(self, asked: Asked) -> None:
         """Hand in an operator's request; it is answered by the next step."""
         self._asked.append(asked)
@@ -102,6 +119,7 @@ class BayRunner:
             self._step(now_s, asked.request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
             self._charger.order(STOP)
+            self._drive(now_s, closed=False)
             self._failed(error, now_s)
             if asked:
                 asked.answer = f"internal error: {self._internal}"
@@ -121,9 +139,13 @@ class BayRunner:
         reading, charger_link = self._charger.view
         values, battery_link = self._battery.view
         snapshot = Snapshot(reading, charger_link, values, battery_link, request, self._internal)
+        if self._contactor is not None:
+            connected, problem = self._contactor.connects(reading), self._contactor.problem
+            snapshot = replace(snapshot, connected=connected, contactor_problem=problem)
         before, memory = self.decision, self._memory
         decision, self._memory = step(now_s, snapshot, memory, self._rules)
         self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
+        self._drive(now_s, closed=decision.closed)
         self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
         if before is None or decision != before:
             self._write_down(before, decision)
@@ -131,6 +153,18 @@ class BayRunner:
         if line is not None:
             self._journal.put(self.name, line)
         self._keep()
+
+    def _drive(self, now_s: float, *, closed: bool) -> None:
+        """Bring the contactor, if there is one, to what was decided: after the order, so that a stop goes first."""
+        if self._contactor is not None:
+            self._contactor.drive(now_s, closed=closed)
+            self._write_down_contactor(self._contactor)
+
+    def _write_down_contactor(self, contactor: Contactor) -> None:
+        now = (contactor.problem, contactor.closed_s is not None)
+        if now != self._written:
+            self._written = now
+            self._journal.put(self.name, ("contactor", {"closed": now[1], "problem": now[0]}))
 
     def _keep(self) -> None:
         kept = Kept.of(self._memory)
@@ -153,4 +187,6 @@ class BayRunner:
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
         status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
-        return {**status, "port": str(Path(self._rules.bay.charger.port).absolute())}
+        contactor = self._contactor
+        shown = contactor and {"closed": contactor.closed_s is not None, "problem": contactor.problem}
+        return {**status, "contactor": shown, "port": str(Path(self._rules.bay.charger.port).absolute())}

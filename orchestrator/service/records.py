@@ -118,6 +118,9 @@ def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
         fields["battery"] = _new_values(old.battery, new.battery)
     if new.battery_link is not old.battery_link:
         fields["battery_link"] = _plain(new.battery_link)
+    for name in ("connected", "contactor_problem"):
+        if getattr(new, name) != getattr(old, name):
+            fields[name] = getattr(new, name)
     if new.request is not old.request:
         fields["request"] = new.request
     if new.internal != old.internal:

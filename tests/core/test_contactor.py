@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 
 from orchestrator.core.contactor import closes
-from orchestrator.model import ENERGISED, Action, ContactorLink, Request, State
+from orchestrator.model import ENERGISED, Action, Request, State
 from tests.core.bays import charging
 from tests.core.world import TICK_S, World
 
@@ -44,7 +44,7 @@ class Wired:
     def tick(self, request: Request | None = None) -> State:
         world = self.world
         closed = bool(world.decisions) and world.decision.closed
-        world.contactor = ContactorLink(connected=closed)
+        world.connected = closed
         world.volts = None if closed and world.battery_answers else 0.0
         return world.tick(request=request).state
 
@@ -162,6 +162,6 @@ def test_a_battery_whose_bmu_falls_silent_does_not_look_like_one_that_left() -> 
 @pytest.mark.parametrize("state", sorted(ENERGISED))
 def test_without_its_output_nothing_charges(state: State) -> None:
     world = charging() if state is State.CHARGING else World(voltage_v=36.0).charging(state)
-    world.contactor = ContactorLink(connected=False, problem="/dev/gpiochip0 line 17: gone")
+    world.connected, world.contactor_problem = False, "/dev/gpiochip0 line 17: gone"
     world.tick()
     assert (world.state, set(world.raised)) == (State.STOPPING, {"contactor_lost"})

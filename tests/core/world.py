@@ -23,7 +23,6 @@ from orchestrator.model import (
     ChargerReading,
     Command,
     Connection,
-    ContactorLink,
     ControlMode,
     Decision,
     Measurement,
@@ -124,7 +123,8 @@ class World:
         self.reading: ChargerReading | None = None
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
-        self.contactor = ContactorLink()
+        self.connected = True  #: the contactor, if there is one, is closed
+        self.contactor_problem = ""
         self.internal = ""  #: an exception of our own, for one tick
         self.decisions: list[Decision] = []
 
@@ -222,7 +222,8 @@ class World:
             battery_link=replace(self.battery_link, online=self.battery_link.online and not silent),
             request=request,
             internal=internal,
-            contactor=self.contactor,
+            connected=self.connected,
+            contactor_problem=self.contactor_problem,
         )
 
     def _line(self) -> ChargerLink:

@@ -76,7 +76,7 @@ def setting_not_obeyed(f: Facts) -> str | None:
 
 def contactor_lost(f: Facts) -> str | None:
     """FAULTS C6: without it, nothing is left for a charger that does not obey."""
-    return f.snapshot.contactor.problem or None
+    return f.snapshot.contactor_problem or None
 
 
 def _unconfirmed(f: Facts, what: str) -> str | None:
