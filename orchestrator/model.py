@@ -1,6 +1,6 @@
 """The nouns that travel through the system, all frozen: readings in, a decision out.
 
-Units are in the names. Unknown is `None`, never a number. A `t_s`, in monotonic seconds, says when a value was asked for.
+Units are in the names; unknown is `None`, never a number. A `t_s` (monotonic) says when a value was asked for.
 """
 
 from collections.abc import Mapping
