@@ -20,9 +20,10 @@ lock() { # OUTPUT SOURCE [OPTION]...
     sed -i 's/^# The following packages are considered.*/# builds the package/' "$output"
 }
 
-# Each list is part of the next. setuptools, which builds the package, is in all of them: an installation fetches
-# nothing that its list does not name.
+# runtime is part of demo and of gpio, both are part of dev. setuptools, which builds the package, is in all of them: an
+# installation fetches nothing that its list does not name.
 rm -f requirements/*.txt
 lock runtime.txt pyproject.toml --build-deps-for=editable
 lock demo.txt pyproject.toml --build-deps-for=editable --extra=demo --constraint=requirements/runtime.txt
+lock gpio.txt pyproject.toml --build-deps-for=editable --extra=gpio --constraint=requirements/runtime.txt
 lock dev.txt requirements/dev.in
