@@ -21,7 +21,7 @@ _NO_CHIP = "no such GPIO chip: check the name in the station file (gpiodetect li
 _FORBIDDEN = "permission denied: add the user that runs this to the chip's group (ls -l shows it), then log in again"
 _BUSY = "in use: another program or a driver of the kernel holds the line (gpioinfo shows which)"
 _NO_LINE = "it has no such line, or the line cannot be an output (gpioinfo lists them)"
-_GONE = "the chip is gone: plug its adapter in again, or look at the kernel's log"
+_GONE = "not a GPIO chip, or one that is gone: check its name (gpiodetect lists them), or plug its adapter in again"
 
 #: What a person has to know and do, by what the kernel says.
 _SENTENCES = {

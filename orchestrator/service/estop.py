@@ -15,7 +15,8 @@ usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-h
 
 Stop the charger on every port of the station file (default: station.yaml), or on the given ports, and verify it.
 Needs no running service. One that runs is told to hold these bays until an operator starts them.
-Then the station file's contactors are opened, but not those that a running service holds: it opens them itself.
+Then the station file's contactors are opened. Those that a service holds are left to it: it opens them by itself
+where a charger does not obey.
 
   --port PATH ...  these ports, without a station file
   --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or what the station file says)

@@ -6,6 +6,7 @@ from itertools import product
 import pytest
 
 from orchestrator.core.contactor import closes
+from orchestrator.core.course import QUALIFY_S
 from orchestrator.model import ENERGISED, Action, Request, State
 from tests.core.bays import charging
 from tests.core.world import TICK_S, World
@@ -157,6 +158,22 @@ def test_a_battery_whose_bmu_falls_silent_does_not_look_like_one_that_left() -> 
     wired.world.tick()
     assert wired.world.decision.closed
     assert "bmu_silent" in wired.world.raised
+
+
+def test_what_was_measured_behind_an_open_contactor_qualifies_nothing() -> None:
+    """The charger's volts must be those of the battery, and that shows only when the contactor is closed."""
+    world = World()
+    world.connected = False
+    for _ in range(round(20 / TICK_S)):
+        world.tick()
+    assert (world.state, world.decision.closed) == (State.QUALIFYING, True)
+    assert "waiting for the contactor" in world.decision.reason
+    world.connected = True
+    closed_s = world.now_s
+    while world.state is State.QUALIFYING:
+        world.tick()
+    assert world.state is State.CHARGING
+    assert world.now_s - closed_s >= QUALIFY_S
 
 
 @pytest.mark.parametrize("state", sorted(ENERGISED))

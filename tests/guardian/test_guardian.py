@@ -14,15 +14,18 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.service.guardian import ACTED, ALIVE, BEAT, DONE, DROP, PORT
+from orchestrator.service.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
+from orchestrator.service.lastopen import OPEN, SET_VALUES
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
 from tests.whole.station import die_with_parent
 
-#: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3.
+#: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3. There is no GPIO line
+#: on most machines: a test hands over a pipe, and what the guardian would ask of the kernel comes out at its other end.
 LAUNCH = """
 import os, socket, sys
-from orchestrator.service import guardian
+from orchestrator.service import guardian, lastopen
+lastopen.fcntl.ioctl = lambda fd, number, argument: os.write(fd, number.to_bytes(4, "big") + argument)
 for word in sys.argv[3:]:
     name, _, value = word.partition("=")
     assert hasattr(guardian, name)
@@ -130,6 +133,36 @@ def watched(
             process.wait()
             for child in left:  # it knows of no guardian, and would wait for ever
                 os.kill(child, signal.SIGKILL)
+
+
+class Contactor:
+    """A pipe in the place of a line."""
+
+    ASKED = SET_VALUES.to_bytes(4, "big") + OPEN
+
+    def __init__(self) -> None:
+        self.reader, self.writer = os.pipe()
+        os.set_blocking(self.reader, False)
+
+    def opened(self) -> int:
+        """How often it was opened since this was last asked; nothing else was done to it."""
+        try:
+            data = os.read(self.reader, 4096)
+        except BlockingIOError:
+            return 0
+        assert data == self.ASKED * (len(data) // len(self.ASKED))
+        return len(data) // len(self.ASKED)
+
+    def close(self) -> None:
+        os.close(self.reader)
+        os.close(self.writer)
+
+
+@pytest.fixture
+def contactor() -> Iterator[Contactor]:
+    made = Contactor()
+    yield made
+    made.close()
 
 
 # --- when it acts, and when not --------------------------------------------------------------------------------------
@@ -467,3 +500,63 @@ def test_a_systemd_that_does_not_listen_holds_nothing_up(tmp_path: Path) -> None
             guardian.link.close()
             assert guardian.ended() == ACTED
         assert not bench.runs
+
+
+# --- contactors ------------------------------------------------------------------------------------------------------
+
+
+def test_a_contactor_opens_after_the_charger_has_had_its_stop(tmp_path: Path, contactor: Contactor) -> None:
+    """Without load where the stop was obeyed: a contactor that breaks a current may weld."""
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        assert contactor.opened() == 0
+        guardian.link.close()
+        wait_until(lambda: contactor.opened() > 0, END_S)
+        assert not bench.runs
+        assert guardian.ended() == ACTED
+        assert guardian.log.splitlines()[-1] == "guardian: contactor bay-1: open"
+
+
+def test_a_charger_that_does_not_obey_is_cut_off_within_a_second(tmp_path: Path, contactor: Contactor) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, "VERIFY_S=5") as guardian:
+        bench.charger.ignores_stop = True
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        guardian.link.close()
+        wait_until(lambda: contactor.opened() > 0, END_S)
+        assert guardian.process.poll() is None, "it goes on to stop the charger"
+        assert bench.runs
+        assert bench.stops <= 2 * 2, "in the first round; one more on a busy machine"
+
+
+@pytest.mark.parametrize("orderly", [True, False])
+def test_contactors_open_where_no_charger_has_to_be_stopped(
+    tmp_path: Path, contactor: Contactor, *, orderly: bool
+) -> None:
+    with watched(tmp_path, controller="pass") as guardian:
+        guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        if orderly:
+            guardian.send(DONE)
+        guardian.link.close()
+        assert guardian.ended() == 0
+        assert contactor.opened() == 1
+
+
+def test_a_line_that_is_given_back_is_free(tmp_path: Path, contactor: Contactor) -> None:
+    with watched(tmp_path, controller="pass") as guardian:
+        guardian.beat()
+        before = guardian.files
+        for _ in range(2):  # the second one takes the first one's place
+            guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        assert guardian.files == before + 1
+        guardian.send(CONTACTOR + b"bay-1")
+        guardian.beat()
+        assert guardian.files == before
+        guardian.link.close()
+        assert guardian.ended() == 0
+        assert contactor.opened() == 0
