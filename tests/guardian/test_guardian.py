@@ -5,6 +5,7 @@ import fcntl
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
 from orchestrator.service.lastopen import OPEN, SET_VALUES
 from tests.guardian.chargers import running_chargers
@@ -23,9 +25,9 @@ from tests.whole.station import die_with_parent
 #: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3. There is no GPIO line
 #: on most machines: a test hands over a pipe, and what the guardian would ask of the kernel comes out at its other end.
 LAUNCH = """
-import os, socket, sys
+import os, socket, struct, sys, time
 from orchestrator.service import guardian, lastopen
-lastopen.fcntl.ioctl = lambda fd, number, argument: os.write(fd, number.to_bytes(4, "big") + argument)
+lastopen.fcntl.ioctl = lambda fd, number, asked: os.write(fd, struct.pack("=dI16s", time.monotonic(), number, asked))
 for word in sys.argv[3:]:
     name, _, value = word.partition("=")
     assert hasattr(guardian, name)
@@ -38,6 +40,8 @@ ENDS_WITH_3 = "import sys; sys.exit(3)"
 ENDS_WITH_4_WHEN_TOLD = (
     "import signal, sys; signal.signal(15, lambda *_: sys.exit(4)); print(flush=True); signal.pause()"
 )
+#: A charger that obeys has no current any more.
+OBEYED_S = 0.2
 #: The guardian is done with whatever it has to do by then, on a busy machine, too.
 END_S = 20.0
 
@@ -138,20 +142,20 @@ def watched(
 class Contactor:
     """A pipe in the place of a line."""
 
-    ASKED = SET_VALUES.to_bytes(4, "big") + OPEN
-
     def __init__(self) -> None:
         self.reader, self.writer = os.pipe()
         os.set_blocking(self.reader, False)
+        self.opened_s: float | None = None  #: when it was first opened
 
     def opened(self) -> int:
         """How often it was opened since this was last asked; nothing else was done to it."""
         try:
-            data = os.read(self.reader, 4096)
+            asked = list(struct.iter_unpack("=dI16s", os.read(self.reader, 4096)))
         except BlockingIOError:
             return 0
-        assert data == self.ASKED * (len(data) // len(self.ASKED))
-        return len(data) // len(self.ASKED)
+        assert {tuple(ask[1:]) for ask in asked} == {(SET_VALUES, OPEN)}
+        self.opened_s = self.opened_s or asked[0][0]
+        return len(asked)
 
     def close(self) -> None:
         os.close(self.reader)
@@ -515,6 +519,10 @@ def test_a_contactor_opens_after_the_charger_has_had_its_stop(tmp_path: Path, co
         guardian.link.close()
         wait_until(lambda: contactor.opened() > 0, END_S)
         assert not bench.runs
+        stop_s = bench.wire.counters.first_stop_s
+        assert contactor.opened_s is not None
+        assert stop_s is not None
+        assert contactor.opened_s - stop_s > OBEYED_S
         assert guardian.ended() == ACTED
         assert guardian.log.splitlines()[-1] == "guardian: contactor bay-1: open"
 
@@ -560,3 +568,17 @@ def test_a_line_that_is_given_back_is_free(tmp_path: Path, contactor: Contactor)
         guardian.link.close()
         assert guardian.ended() == 0
         assert contactor.opened() == 0
+
+
+def test_the_controllers_own_words_for_a_line_are_understood(tmp_path: Path, contactor: Contactor) -> None:
+    other = Contactor()
+    with watched(tmp_path, controller="pass") as guardian:
+        link = GuardianLink(os.dup(guardian.link.fileno()))
+        link.hold_contactor("bay-1", contactor.writer)
+        link.hold_contactor("bay-2", other.writer)
+        link.hold_contactor("bay-2", None)
+        link._socket.close()
+        guardian.link.close()
+        assert guardian.ended() == 0
+    assert (contactor.opened(), other.opened()) == (1, 0)
+    other.close()
