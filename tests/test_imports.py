@@ -51,6 +51,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "cattrs": ("workbench.recording",),
     "distributed": ("workbench.sweep",),
     "durand": ("sim",),
+    "gpiod": ("link.gpio",),
     "jinja2": ("workbench.page",),
     "matplotlib": ("workbench.plot", "workbench.tradeoff"),
     "pygraphviz": ("workbench.drawing",),

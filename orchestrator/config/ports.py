@@ -1,7 +1,7 @@
-"""Serial ports and control socket of a station, even of one whose file has mistakes: what an emergency stop needs."""
+"""Ports, contactors and socket of a station, even of one whose file has mistakes: what an emergency stop needs."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,12 +12,21 @@ _PORT = re.compile(rb"""(?:^|[\s{,])port:\s+["']?(/[^\s"',}#]+)""", re.MULTILINE
 _SOCKET = re.compile(rb"""(?:^|[\s{,])socket:\s+["']?([^\s"',}#]+)""", re.MULTILINE)
 
 
+_LINE = re.compile(r"0x[0-9a-fA-F]{1,3}|[0-9]{1,4}")
+#: As `config/scalars.py` reads it.
+_BOOLS = {"false": False, "true": True}
+
+
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """Every charger's port, in the file's order, with its bay's name; and the socket. "" is what cannot be told."""
+    """Every charger's port, in the file's order, with its bay's name; and the socket. "" is what cannot be told.
+
+    Contactors are (chip, line, active low), only those whose keys leave no doubt: a guess might close one.
+    """
 
     ports: Mapping[str, str]
     socket: str
+    contactors: tuple[tuple[str, int, bool], ...] = ()
 
 
 def wiring(path: Path) -> Wiring:
@@ -39,6 +48,7 @@ def wiring(path: Path) -> Wiring:
     return Wiring(
         {_shown(path.parent / port): name for port, name in ports.items()},
         _shown(path.parent / socket) if socket else "",
+        tuple((_shown(path.parent / chip), line, active_low) for chip, line, active_low in _contactors(node)),
     )
 
 
@@ -47,10 +57,23 @@ def _shown(path: Path) -> str:
     return str(path).replace("\0", "\\0")
 
 
-def _ports(node: Node) -> dict[str, str]:
+def _bays(node: Node | None) -> tuple[Node, ...]:
     bays = _get(node, "bays")
+    return tuple(bays.items) if isinstance(bays, Items) else ()
+
+
+def _contactors(node: Node | None) -> Iterator[tuple[str, int, bool]]:
+    for contactor in (_get(bay, "contactor") for bay in _bays(node)):
+        entries = contactor.entries if isinstance(contactor, Entries) else ()
+        given = {name.text: _text(value) for name, value in entries}
+        chip, line, active_low = given.pop("chip", ""), given.pop("line", ""), given.pop("active_low", "false")
+        if "/" in chip and _LINE.fullmatch(line) and active_low in _BOOLS and not given:
+            yield chip, int(line, 16 if "x" in line else 10), _BOOLS[active_low]
+
+
+def _ports(node: Node) -> dict[str, str]:
     ports: dict[str, str] = {}
-    for bay in bays.items if isinstance(bays, Items) else ():
+    for bay in _bays(node):
         port = _text(_get(_get(bay, "charger"), "port"))
         if "/" in port:
             ports.setdefault(port, _text(_get(bay, "name")))

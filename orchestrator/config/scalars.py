@@ -118,7 +118,7 @@ def read_path(node: Scalar, key: Key) -> str:
     if len(text) > _MAX_PATH:
         raise UnfitError(f"a path has at most {_MAX_PATH} characters, this one {len(text)}")
     if key.is_path and "/" not in text:
-        example = f"/dev/{text}" if text.startswith("tty") else "/dev/ttyUSB0"
+        example = f"/dev/{text}" if text.startswith(("tty", "gpiochip")) else "/dev/ttyUSB0"
         raise UnfitError(f"{shown(text)} is not a whole path: write e.g. {example[:_MAX_DIGITS]}")
     return text
 

@@ -59,6 +59,15 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ContactorConfig:
+    """The GPIO line that closes the contactor between charger and battery."""
+
+    chip: str = key("the GPIO chip, as /dev/gpiochip0 (gpiodetect lists them)", is_path=True)
+    line: int = key("the line's number on that chip (gpioinfo lists them)", ge=0, le=1023)
+    active_low: bool = key("true if the contactor is closed while the pin is low", default=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Bay:
     """One charging place: a charger, the battery that comes to it, their limits and a policy."""
 
@@ -67,6 +76,7 @@ class Bay:
     battery: BatteryConfig = key("the battery's BMU")
     limits: Limits = key("hard limits; a policy may only be stricter")
     policy: Policy = key("the charging policy: a shipped name or a path")
+    contactor: ContactorConfig | None = key("the contactor between charger and battery; null: none", default=None)
     source: Source = field(default=Source("<station>"), compare=False)
 
 

@@ -93,10 +93,17 @@ def _node(bay: Values) -> Iterator[object]:
         yield bus, node_id
 
 
+def _line(bay: Values) -> Iterator[object]:
+    chip, line = bay.get("contactor.chip"), bay.get("contactor.line")
+    if chip is not None and line is not None:
+        yield os.path.realpath(str(chip)), line
+
+
 _UNIQUE: tuple[tuple[str, Callable[[Values], Iterable[object]], str], ...] = (
     ("name", _name, "{bay} has this name already; each bay needs its own"),
     ("charger.port", _port, "{bay} is on this port already; each charger needs its own port (its address is fixed)"),
     ("battery.node_id", _node, "{bay} has this node id on the same bus already; set the BMU's switch to another"),
+    ("contactor.line", _line, "{bay} has this line already; each contactor needs its own line"),
 )
 
 

@@ -200,6 +200,9 @@ def _qualifying(f: Facts) -> Course:
     if not f.present or f.volts is None:
         memory.qualified_s = None
         return None, f"waiting for fresh values: {f.missing or 'the charger’s status'}"
+    if not f.connected:
+        memory.qualified_s = None
+        return None, "waiting for the contactor, behind which charger and battery cannot be compared"
     if memory.qualified_s is None:
         memory.qualified_s = f.now_s
     if f.now_s - memory.qualified_s < QUALIFY_S or not _seen_twice(f, memory.qualified_s) or not f.stopped:

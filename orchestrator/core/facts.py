@@ -54,6 +54,7 @@ class Facts:
         "amps",
         "battery",
         "charger",
+        "connected",
         "energised",
         "memory",
         "now_s",
@@ -92,6 +93,7 @@ class Facts:
         self.temperature_c = _fresh(battery.temperature_c, now_s, fast_s)
         self.soc = _fresh(battery.soc_pct, now_s, slow_s)
         self.soh = _fresh(battery.soh_pct, now_s, slow_s)
+        self.connected = snapshot.connected
         self.energised = memory.state in ENERGISED
         self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
         #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
@@ -114,8 +116,12 @@ class Facts:
 
     @property
     def departed(self) -> bool:
-        """The battery has left, as batteries do: its BMU is silent and the charger sees no voltage."""
-        return self.silent and not self.battery.online and self.volts is not None and self.volts < TERMINAL_V
+        """The battery has left, as batteries do: its BMU is silent and the charger sees no voltage.
+
+        Behind an open contactor it never sees one.
+        """
+        gone = self.volts is not None and self.volts < TERMINAL_V and self.connected
+        return gone and self.silent and not self.battery.online
 
     @property
     def present(self) -> bool:

@@ -86,6 +86,8 @@ FAULTS: tuple[Row, ...] = (
         "somebody else commands this charger, or it is defective: find out, then reset"),
     Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNSTOPPED,
         "cut the charger's mains now; reset after it was repaired", for_s=OBEY_STOP_S),
+    Row("contactor_lost", "C6", E.STOP, Clear.BACKOFF, obedience.contactor_lost, ALWAYS,
+        "check the GPIO chip and the line that the station file names (gpioinfo shows who uses it)"),
     Row("will_not_start", "C7", E.STOP, Clear.BACKOFF, obedience.will_not_start, ENERGISED,
         "check the charger's rotary switch and its mains"),
     Row("stopped_by_itself", "C4", E.STOP, Clear.OPERATOR, obedience.stopped_by_itself, ENERGISED,

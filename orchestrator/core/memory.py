@@ -75,6 +75,7 @@ class Memory:
     limit_before: int | None = None  #: … the one that it showed before …
     limit_s: float = 0.0  #: … and since when it shows this one
     still: Still | None = None  #: the charger's measurements, for as long as they do not change
+    closed: bool = False  #: the contactor is to be closed
 
     def copy(self) -> "Memory":
         """An independent copy."""

@@ -2,8 +2,8 @@
 
 Theory of operation. The safe state is *verified* standby: a status reply, requested after the whole stop was handed to
 the port, that shows operation 0 and a current of about 0. Until then the standing order is STOP, which the port repeats
-every 500 ms. A charger that has not been verified after `OBEY_STOP_S` is uncontrollable: the order stays, the interlock
-output opens, and only a verified standby ends it. In states of rest the standing order is nothing, as long as fresh
+every 500 ms. A charger that has not been verified after `OBEY_STOP_S` is uncontrollable: the order stays, the
+contactor opens, and only a verified standby ends it. In states of rest the standing order is nothing, as long as fresh
 replies go on to show standby; the moment one does not, it is STOP again.
 
 Standby does not show whether both frames of a stop were heard, and a charger that missed the second one may run on its

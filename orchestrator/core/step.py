@@ -6,6 +6,7 @@ facts → what has lasted → the operator's request → faults → the trigger,
 from dataclasses import replace
 
 from orchestrator.core import latches, limits
+from orchestrator.core.contactor import closes
 from orchestrator.core.course import course
 from orchestrator.core.facts import Facts
 from orchestrator.core.machine import fire
@@ -60,6 +61,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     faults = latches.shown(memory.faults)
     ended = _move(f, faults)
     setpoint, chosen = _setpoint(f, faults)
+    memory.closed = closes(memory.state, closed=memory.closed, standby=f.standby)
     return (
         Decision(
             state=memory.state,
@@ -69,6 +71,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
             step=chosen,
             faults=faults,
             alarm=memory.state is State.UNCONTROLLABLE,
+            closed=memory.closed,
             session=ended or memory.session,
             answer=answer,
         ),

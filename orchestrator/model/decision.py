@@ -30,6 +30,8 @@ class Snapshot:
     slept_s: float = 0.0  #: how long the whole machine was suspended since the step before
     unkept: str = ""  #: why faults that latch now would be forgotten by a restart, "" while they would not
     ending: str = ""  #: why the service is about to end, "" while it is not
+    connected: bool = True  #: nothing is between charger and battery, or a contactor that was closed for this reading
+    contactor_problem: str = ""  #: why the contactor cannot be driven, for a person: chip, line, what to do
 
 
 class State(StrEnum):
@@ -121,6 +123,7 @@ class Decision:
     setpoint: Setpoint = STANDBY
     step: Step | None = None  #: while energised
     faults: tuple[ActiveFault, ...] = ()  #: worst first
-    alarm: bool = False  #: the interlock output is to be open
+    alarm: bool = False  #: the charger is out of control, and people must know
+    closed: bool = False  #: the contactor between charger and battery is to be closed
     session: Session | None = None  #: running, or just ended (`result` set, in this one decision)
     answer: str = ""  #: what became of the operator's request: "" is yes, else why not

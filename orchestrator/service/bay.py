@@ -24,6 +24,7 @@ from orchestrator.model import (
     Snapshot,
     State,
 )
+from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
 from orchestrator.service.kept import Kept
 from orchestrator.service.records import SnapshotRecorder, decision_lines
@@ -67,7 +68,15 @@ class BayRunner:
     """Runs `step()` for one bay. Used by the control loop's thread only, but for `ask` and `status`."""
 
     def __init__(
-        self, bay: Bay, charger: Charger, battery: Battery, journal: Journal, memory: Memory, *, snapshots: bool = True
+        self,
+        bay: Bay,
+        charger: Charger,
+        battery: Battery,
+        journal: Journal,
+        memory: Memory,
+        *,
+        contactor: Contactor | None = None,
+        snapshots: bool = True,
     ) -> None:
         self.name = bay.name
         self.last_s = 0.0  #: when the last step was taken
@@ -79,6 +88,8 @@ class BayRunner:
         self._offered: Bay | None = None  # with a policy that is not in force yet
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
+        self._contactor = contactor
+        self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
         self._snapshot = Snapshot()
         self._recorder = SnapshotRecorder(bay) if snapshots else None
         self._asked: list[Asked] = []
@@ -108,6 +119,12 @@ class BayRunner:
         self._offered = bay
         return f"{_shown(bay)} comes into force when the bay stands by"
 
+    def isolate(self) -> None:
+        """Open the contactor for good, at the end of the service, and write it down."""
+        if self._contactor is not None:
+            self._contactor.give_back()
+            self._write_down_contactor(self._contactor)
+
     def ask(self, asked: Asked) -> None:
         """Hand in an operator's request; it is answered by the next step."""
         self._asked.append(asked)
@@ -122,6 +139,7 @@ class BayRunner:
             self._step(now_s, asleep_s, asked.request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
             self._charger.order(STOP)
+            self._drive(now_s, closed=False)
             self._failed(error, now_s)
             if asked:
                 asked.answer = f"internal error: {self._internal}"
@@ -139,10 +157,30 @@ class BayRunner:
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         self._take_over()
+        snapshot = self._look(now_s, asleep_s, request)
+        before, memory = self.decision, self._memory
+        decision, self._memory = step(now_s, snapshot, memory, self._rules)
+        self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
+        self._drive(now_s, closed=decision.closed)
+        self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
+        lines = list(decision_lines(before, decision)) if before is None or decision != before else []
+        if self._recorder is not None:
+            recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
+            lines += [recorded] if recorded is not None else []
+        for line in lines:
+            self._journal.put(self.name, line)
+        if before is None or before.state is not decision.state:
+            came_from = f"{before.state} → " if before else ""
+            self._journal.say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
+        self._keep()
+
+    def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
+        """All that is known of the bay now."""
         reading, charger_link = self._charger.view
         values, battery_link = self._battery.view
         late_s = now_s - self.last_s - TICK_S if self.decision else 0.0
         slept_s = asleep_s - self._asleep_s if self.decision else 0.0
+        self._asleep_s = asleep_s
         snapshot = Snapshot(
             reading,
             charger_link,
@@ -155,21 +193,22 @@ class BayRunner:
             unkept=self._journal.unkept,
             ending=self._ending,
         )
-        self._asleep_s = asleep_s
-        before, memory = self.decision, self._memory
-        decision, self._memory = step(now_s, snapshot, memory, self._rules)
-        self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
-        self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
-        lines = list(decision_lines(before, decision)) if before is None or decision != before else []
-        if self._recorder is not None:
-            recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
-            lines += [recorded] if recorded is not None else []
-        for line in lines:
-            self._journal.put(self.name, line)
-        if before is None or before.state is not decision.state:
-            came_from = f"{before.state} → " if before else ""
-            self._journal.say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
-        self._keep()
+        if self._contactor is not None:
+            connected, problem = self._contactor.connects(reading), self._contactor.problem
+            snapshot = replace(snapshot, connected=connected, contactor_problem=problem)
+        return snapshot
+
+    def _drive(self, now_s: float, *, closed: bool) -> None:
+        """Bring the contactor, if there is one, to what was decided: after the order, so that a stop goes first."""
+        if self._contactor is not None:
+            self._contactor.drive(now_s, closed=closed)
+            self._write_down_contactor(self._contactor)
+
+    def _write_down_contactor(self, contactor: Contactor) -> None:
+        now = (contactor.problem, contactor.closed_s is not None)
+        if now != self._written:
+            self._written = now
+            self._journal.put(self.name, ("contactor", {"closed": now[1], "problem": now[0]}))
 
     def _take_over(self) -> None:
         bay, decision = self._offered, self.decision
@@ -194,9 +233,10 @@ class BayRunner:
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
         status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
-        bay, offered = self._rules.bay, self._offered
+        bay, offered, contactor = self._rules.bay, self._offered, self._contactor
         return {
             **status,
+            "contactor": contactor and {"closed": contactor.closed_s is not None, "problem": contactor.problem},
             "port": str(Path(bay.charger.port).absolute()),
             "policy": {
                 "name": bay.policy.policy,

@@ -1,12 +1,13 @@
-"""The controller's side of the guardian: heartbeats, the serial ports handed over, and what to do when it is gone."""
+"""The controller's side of the guardian: heartbeats, what is handed over, and what to do when it is gone."""
 
 import array
 import socket
 import threading
 from collections.abc import Callable
 
+from orchestrator.link.gpio import OutputLine
 from orchestrator.link.serial import SerialLine
-from orchestrator.service.guardian import ALIVE, BEAT, DONE, DROP, PORT
+from orchestrator.service.guardian import ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
 
 #: A guardian that has not answered a heartbeat for this long is gone, or hangs.
 SILENCE_S = 2.0
@@ -40,6 +41,10 @@ class GuardianLink:
     def drop(self, port: str) -> None:
         """Let the guardian close its descriptor, so that the port's name becomes free."""
         self._send(DROP + port.encode(errors="surrogateescape"))
+
+    def hold_contactor(self, name: str, fd: int | None) -> None:
+        """Give the guardian its own descriptor of a contactor's line; None: let it close the one that it has."""
+        self._send(CONTACTOR + name.encode(errors="surrogateescape"), fd)
 
     def done(self) -> None:
         """Every charger was stopped, and verified where it can be; the end of this process needs no other stop."""
@@ -84,3 +89,18 @@ class GuardedLine:
         """Give the port back; the guardian does, too."""
         self._guardian.drop(self._port)
         self._line.close()
+
+
+class GuardedOutput:
+    """A contactor's line of which the guardian has a duplicate for as long as it is open."""
+
+    def __init__(self, name: str, open_output: Callable[[], OutputLine], guardian: GuardianLink) -> None:
+        self._name, self._guardian = name, guardian
+        self._output = open_output()
+        guardian.hold_contactor(name, self._output.fileno())
+        self.drive = self._output.drive
+
+    def close(self) -> None:
+        """Give the line back; the guardian does, too."""
+        self._guardian.hold_contactor(self._name, None)
+        self._output.close()

@@ -1,10 +1,11 @@
 """The guardian: parent of the controller, and the one who stops the chargers when the controller cannot.
 
 Theory of operation. `orchestrator run` is this process; it starts the controller and then only waits. The controller
-hands it a duplicate of every serial port it opens (SCM_RIGHTS) and sends a heartbeat when *all* its loops have turned.
-No heartbeat for SILENCE_S, or the end of the connection, means that nobody is at the wheel: the guardian kills what is
-left, stops the charger on every port that it was ever told of, verifies it, and ends with an error, so that systemd
-starts anew. It answers each heartbeat; a controller without answers knows that its guardian is gone, stops, and ends.
+hands it a duplicate of every serial port and contactor line it opens (SCM_RIGHTS) and sends a heartbeat when *all* its
+loops have turned. No heartbeat for SILENCE_S, or the end of the connection, means that nobody is at the wheel: the
+guardian kills what is left, stops the charger on every port that it was ever told of, verifies it, and ends with an
+error, so that systemd starts anew. Contactors open after the first round of stops; `lastopen.py` says why not before.
+It answers each heartbeat; a controller without answers knows that its guardian is gone, stops, and ends.
 
 Standard library and `protocol/standby.py` only: what is not imported cannot fail. Nothing here ever waits for anybody
 but the controller: not for systemd, not for who reads the log, not for a line that takes nothing.
@@ -21,11 +22,13 @@ import time
 from collections.abc import Sequence
 from types import FrameType
 
+from orchestrator.service.lastopen import open_contactor
 from orchestrator.service.laststop import drop_port, stop_all
 from orchestrator.service.say import Systemd, say
 
-#: Messages from the controller: one letter, then a port's name; PORT carries the descriptor.
-BEAT, PORT, DROP, DONE = b"B", b"P", b"D", b"E"
+#: Messages from the controller: one letter, then a name. PORT carries a port's descriptor, CONTACTOR that of a GPIO
+#: line, or none when the controller has given the line back.
+BEAT, PORT, DROP, CONTACTOR, DONE = b"B", b"P", b"D", b"C", b"E"
 #: The guardian's answer to each BEAT.
 ALIVE = b"A"
 #: Five heartbeats missed: the controller hangs (DESIGN §6: stop within 0.6 s).
@@ -59,6 +62,7 @@ class Guardian:
     def __init__(self, child: int, link: socket.socket) -> None:
         self._child, self._link = os.pidfd_open(child), link
         self._ports: dict[str, int | None] = {}  # None: the controller has closed it, for now
+        self._contactors: dict[str, int] = {}
         self._done = self._ending = self._ready = False
         self._excused = False  # since the last heartbeat
         self._deadline_s = time.monotonic() + STARTUP_S
@@ -76,12 +80,15 @@ class Guardian:
             signal.signal(signal.SIGHUP, self._pass_on_reload)
         self._reason = self._watch()
         if self._done or not self._ports:
+            self._open()
             return self._status(END_S)
         self._signal(signal.SIGKILL)
         # Without waiting for a gap: what the dying controller has written goes out first, the kernel keeps the order.
         # Was that half a frame, or was it just then in a write, the second stop comes 20 ms later.
-        for name, why in stop_all(self._ports, VERIFY_S, on_stop=self._stopping).items():
+        for name, why in stop_all(self._ports, VERIFY_S, on_stop=self._stopping, on_round=self._open).items():
             say(f"guardian: {name}: {why or 'standby verified'}")
+        for name, fd in self._contactors.items():
+            say(f"guardian: contactor {name}: {open_contactor(fd)}")
         return self._status(KILLED_S) or ACTED
 
     def _pass_on(self, _number: int, _frame: FrameType | None) -> None:
@@ -134,6 +141,8 @@ class Guardian:
             self._hold(name, descriptors.pop() if descriptors else None)
         elif kind == DROP and not self._done:
             self._hold(name, None)
+        elif kind == CONTACTOR:
+            self._hold_contactor(name, descriptors.pop() if descriptors else None)
         elif kind == DONE:
             self._done, self._deadline_s = True, time.monotonic() + END_S
         for fd in descriptors:
@@ -158,6 +167,19 @@ class Guardian:
         self._ports[name] = fd
         if old is not None:
             drop_port(old)
+
+    def _hold_contactor(self, name: str, fd: int | None) -> None:
+        """Keep this descriptor of the line, or none: then the line is free again."""
+        old = self._contactors.pop(name, None)
+        if old is not None:
+            os.close(old)
+        if fd is not None:
+            self._contactors[name] = fd
+
+    def _open(self) -> None:
+        """Open every contactor: whoever obeys has stopped by now."""
+        for fd in self._contactors.values():
+            open_contactor(fd)
 
     def _stopping(self) -> None:
         """The stops of a round are out; after the first one there is time to tell."""

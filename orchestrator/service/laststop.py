@@ -49,13 +49,15 @@ def stop_all(
     *,
     leave_held: bool = True,
     on_stop: Callable[[], None] = lambda: None,
+    on_round: Callable[[], None] = lambda: None,
     witness: Witness = lambda _names, _since_s: {},
 ) -> dict[str, str]:
     """Stop the charger on every port and wait until each has shown standby; no new round begins after `within_s`.
 
     `ports` maps names to open descriptors, which are taken over, or to None: opened by name, but not if a service holds
-    it and `leave_held` is set. `on_stop` is called after each round's stops. Ports that `witness` knows about are not
-    read here. Returns for each name "" where standby was verified, else why not. Never raises for what a port does.
+    it and `leave_held` is set. `on_stop` is called after each round's stops, `on_round` after its answers. Ports that
+    `witness` knows about are not read here. Returns for each name "" where standby was verified, else why not.
+    Never raises for what a port does.
     """
     lines = [_Line(name, fd, leave_held=leave_held) for name, fd in ports.items()]
     doubtful, now_s = lines, time.monotonic()
@@ -72,6 +74,7 @@ def stop_all(
         for line in doubtful:
             line.why = seen.get(line.name, line.why)
         _question([line for line in doubtful if line.name not in seen])
+        on_round()
         doubtful = [line for line in doubtful if line.why not in ("", HELD)]
         if doubtful:
             _pause_until(now_s + ROUND_S)

@@ -8,10 +8,11 @@ from collections.abc import Callable, Sequence
 from textwrap import indent
 from time import monotonic
 
-from orchestrator.config.station import Bay, ChargerConfig, Rs485, Station
+from orchestrator.config.station import Bay, ChargerConfig, ContactorConfig, Rs485, Station
 from orchestrator.devices.dialogue import REQUESTS, SILENCE, Dialogue
 from orchestrator.errors import LinkError, ServiceError
 from orchestrator.link.can import CanBus
+from orchestrator.link.gpio import describe
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import ChargerReading
 from orchestrator.protocol.explain import explain
@@ -55,6 +56,8 @@ def probe(
         show(f"=== {bay.name}")
         if not _charger(bay.charger, show):
             silent.append(f"{bay.name}'s charger")
+        if bay.contactor is not None and not _contactor(bay.contactor, show):
+            silent.append(f"{bay.name}'s contactor")
         if not _bmu(station, bay, NMT[nmt] if nmt else None, old_protocol=old_protocol, show=show):
             silent.append(f"{bay.name}'s BMU")
     show(f"NO ANSWER: {', '.join(silent)}" if silent else "every device answered")
@@ -103,6 +106,19 @@ def _ask(line: SerialLine, dialogue: Dialogue) -> tuple[ChargerReading | None, b
         exchange, sending, now_s = exchange + came, 0, monotonic()
         reading = dialogue.hear(came, now_s)
     return reading or dialogue.give_up(now_s), exchange
+
+
+# --- the contactor ---------------------------------------------------------------------------------------------------
+
+
+def _contactor(config: ContactorConfig, show: Show) -> bool:
+    try:
+        closes = "low" if config.active_low else "high"
+        show(f"contactor on {describe(config.chip, config.line)}; closed while the pin is {closes}")
+    except LinkError as error:
+        show(f"contactor: {error}")
+        return False
+    return True
 
 
 # --- the BMU ---------------------------------------------------------------------------------------------------------

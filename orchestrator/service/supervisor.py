@@ -19,11 +19,13 @@ from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
 from orchestrator.link.can import CanBus, load
+from orchestrator.link.gpio import OutputLine, need_gpiod
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
 from orchestrator.service.bay import TICK_S, Asked, BayRunner
+from orchestrator.service.contactor import Contactor
 from orchestrator.service.control import ControlSocket
-from orchestrator.service.guarded import GuardedLine, GuardianLink
+from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.kept import read_kept
 from orchestrator.service.reload import Reload
@@ -71,8 +73,11 @@ class Supervisor:
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             self._ports.append(port)
-            memory, snapshots = kept[bay.name].memory(monotonic()), self._station.journal.snapshots
-            self._bays.append(BayRunner(bay, port, node, self._journal, memory, snapshots=snapshots))
+            contactor, memory = _contactor(bay, self._guardian), kept[bay.name].memory(monotonic())
+            snapshots = self._station.journal.snapshots
+            self._bays.append(
+                BayRunner(bay, port, node, self._journal, memory, contactor=contactor, snapshots=snapshots)
+            )
         self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
 
     @property
@@ -155,6 +160,8 @@ class Supervisor:
         while monotonic() < end_s and not all(bay.verified for bay in self._bays):
             self._turn()
         unverified = [bay.name for bay in self._bays if not bay.verified]
+        for bay in self._bays:
+            bay.isolate()
         self._guardian.done()
         self._control.close()
         for worker in self._devices:
@@ -216,3 +223,13 @@ def _charger_port(bay: Bay, poke: Callable[[], None], guardian: GuardianLink) ->
         clock=monotonic,
         on_change=poke,
     )
+
+
+def _contactor(bay: Bay, guardian: GuardianLink) -> Contactor | None:
+    """The bay's contactor, if it has one. LinkError where the library for it is not installed."""
+    config = bay.contactor
+    if config is None:
+        return None
+    need_gpiod()
+    open_output = partial(OutputLine.open, config.chip, config.line, active_low=config.active_low)
+    return Contactor(partial(GuardedOutput, bay.name, open_output, guardian))

@@ -76,3 +76,50 @@ def test_a_file_without_ports_has_none(tmp_path: Path) -> None:
     assert wiring(file) == Wiring({}, "")
     with pytest.raises(OSError, match="No such file"):
         wiring(tmp_path / "none.yaml")
+
+
+CONTACTOR = "    contactor: {chip: /dev/gpiochip0, line: 17}\n"
+
+
+def with_contactor(tmp_path: Path, text: str) -> tuple[tuple[str, int, bool], ...]:
+    file = tmp_path / "x.yaml"
+    file.write_text(GOOD.replace("\ncontrol:", f"\n{text}control:"))
+    return wiring(file).contactors
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (CONTACTOR, ("/dev/gpiochip0", 17, False)),
+        (CONTACTOR.replace("}", ", active_low: true}"), ("/dev/gpiochip0", 17, True)),
+        (CONTACTOR.replace("17", "0x11"), ("/dev/gpiochip0", 17, False)),
+        (CONTACTOR + "    no-such-key: 1\n", ("/dev/gpiochip0", 17, False)),
+    ],
+)
+def test_a_contactor_is_found(text: str, found: tuple[str, int, bool], tmp_path: Path) -> None:
+    assert with_contactor(tmp_path, text) == (found,)
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        CONTACTOR.replace("}", ", active_lo: true}"),
+        CONTACTOR.replace("}", ", active_low: yes}"),
+        CONTACTOR.replace("}", ", active_low: }"),
+        CONTACTOR.replace("17", "GPIO17"),
+        CONTACTOR.replace("17", "-1"),
+        CONTACTOR.replace("/dev/gpiochip0", "gpiochip0"),
+    ],
+)
+def test_a_contactor_in_doubt_is_left_alone(spoilt: str, tmp_path: Path) -> None:
+    """With the wrong polarity it would be closed."""
+    assert with_contactor(tmp_path, spoilt) == ()
+
+
+def test_contactors_are_those_of_the_service(tmp_path: Path) -> None:
+    file = tmp_path / "x.yaml"
+    file.write_text(GOOD.replace("\ncontrol:", f"\n{CONTACTOR.replace('/dev', './dev')}control:"))
+    first, second = (bay.contactor for bay in load_station(file).bays)
+    assert first is None
+    assert second is not None
+    assert wiring(file).contactors == ((second.chip, second.line, second.active_low),)

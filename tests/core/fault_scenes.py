@@ -252,6 +252,8 @@ SCENES: tuple[Scene, ...] = (
     Scene("rogue_run", world_has(leak_a=0.51), world_has(leak_a=0.5), ("0.51 A",), S.UNCONTROLLABLE, begin=full,
           anywhere=False),
     Scene("will_not_stop", stopped_in_vain, hears, ("14.00 A",), S.UNCONTROLLABLE, 3.25, anywhere=False),
+    Scene("contactor_lost", world_has(connected=False, contactor_problem="/dev/gpiochip0: gone"),
+          world_has(connected=True, contactor_problem=""), ("/dev/gpiochip0: gone",), S.SUSPENDED),
     Scene("will_not_start", nothing, hears, ("told 'run' for 5.0 s",), S.SUSPENDED, 5.0, begin=ordered_to_run,
           anywhere=False, lapse=False),
     Scene("stopped_by_itself", stops_by_itself, nothing, ("stopped though",), S.IDLE, 0.5, lapse=False),

@@ -123,6 +123,8 @@ class World:
         self.reading: ChargerReading | None = None
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
+        self.connected = True  #: the contactor, if there is one, is closed
+        self.contactor_problem = ""
         self.internal = ""  #: an exception of our own, for one tick
         self.ours: dict[str, Any] = {}  #: what else the service says of itself
         self.decisions: list[Decision] = []
@@ -221,6 +223,8 @@ class World:
             battery_link=replace(self.battery_link, online=self.battery_link.online and not silent),
             request=request,
             internal=internal,
+            connected=self.connected,
+            contactor_problem=self.contactor_problem,
             **self.ours,
         )
 

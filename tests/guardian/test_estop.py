@@ -80,6 +80,22 @@ def test_a_station_file_without_ports_or_none_at_all(tmp_path: Path) -> None:
         assert done.stderr.endswith("no port to stop: name a station file or --port PATH\n")
 
 
+def test_contactors_of_a_station_file_come_after_the_stops(tmp_path: Path) -> None:
+    """What is not a chip is told, and changes nothing for the chargers."""
+    bays = BAYS.replace("{name: right,", "{name: right, contactor: {chip: ./gpiochip0, line: 17},")
+    with running_chargers(tmp_path, 2) as (left, right):
+        for chip, became in (("none yet", "No such file or directory"), ("a file", "Inappropriate ioctl for device")):
+            if chip == "a file":
+                (tmp_path / "gpiochip0").touch()
+            done = estop(str(station_file(tmp_path, bays)))
+            assert (done.returncode, done.stderr) == (0, NOBODY)
+            assert done.stdout.splitlines() == [
+                f"left ({left.name}): standby verified",
+                f"right ({right.name}): standby verified",
+                f"contactor on {tmp_path}/gpiochip0 line 17: {became}",
+            ]
+
+
 @pytest.mark.parametrize(
     ("args", "said"),
     [

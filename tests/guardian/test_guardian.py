@@ -5,6 +5,7 @@ import fcntl
 import os
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import termios
@@ -16,15 +17,19 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.service.guardian import ACTED, ALIVE, BEAT, DONE, DROP, PORT
+from orchestrator.service.guarded import GuardianLink
+from orchestrator.service.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
+from orchestrator.service.lastopen import OPEN, SET_VALUES
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
 from tests.whole.station import die_with_parent
 
-#: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3.
+#: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3. There is no GPIO line
+#: on most machines: a test hands over a pipe, and what the guardian would ask of the kernel comes out at its other end.
 LAUNCH = """
-import os, socket, sys
-from orchestrator.service import guardian
+import os, socket, struct, sys, time
+from orchestrator.service import guardian, lastopen
+lastopen.fcntl.ioctl = lambda fd, number, asked: os.write(fd, struct.pack("=dI16s", time.monotonic(), number, asked))
 for word in sys.argv[3:]:
     name, _, value = word.partition("=")
     assert hasattr(guardian, name)
@@ -41,6 +46,8 @@ SAYS_WHEN_HUNG_UP = (
     "import signal; signal.signal(1, lambda *_: print('hung up', flush=True)); print(flush=True)\n"
     "while True: signal.pause()"
 )
+#: A charger that obeys has no current any more.
+OBEYED_S = 0.2
 #: The guardian is done with whatever it has to do by then, on a busy machine, too.
 END_S = 20.0
 
@@ -143,6 +150,36 @@ def watched(
             process.wait()
             for child in left:  # it knows of no guardian, and would wait for ever
                 os.kill(child, signal.SIGKILL)
+
+
+class Contactor:
+    """A pipe in the place of a line."""
+
+    def __init__(self) -> None:
+        self.reader, self.writer = os.pipe()
+        os.set_blocking(self.reader, False)
+        self.opened_s: float | None = None  #: when it was first opened
+
+    def opened(self) -> int:
+        """How often it was opened since this was last asked; nothing else was done to it."""
+        try:
+            asked = list(struct.iter_unpack("=dI16s", os.read(self.reader, 4096)))
+        except BlockingIOError:
+            return 0
+        assert {tuple(ask[1:]) for ask in asked} == {(SET_VALUES, OPEN)}
+        self.opened_s = self.opened_s or asked[0][0]
+        return len(asked)
+
+    def close(self) -> None:
+        os.close(self.reader)
+        os.close(self.writer)
+
+
+@pytest.fixture
+def contactor() -> Iterator[Contactor]:
+    made = Contactor()
+    yield made
+    made.close()
 
 
 # --- when it acts, and when not --------------------------------------------------------------------------------------
@@ -507,3 +544,81 @@ def test_a_systemd_that_does_not_listen_holds_nothing_up(tmp_path: Path) -> None
             guardian.link.close()
             assert guardian.ended() == ACTED
         assert not bench.runs
+
+
+# --- contactors ------------------------------------------------------------------------------------------------------
+
+
+def test_a_contactor_opens_after_the_charger_has_had_its_stop(tmp_path: Path, contactor: Contactor) -> None:
+    """Without load where the stop was obeyed: a contactor that breaks a current may weld."""
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        assert contactor.opened() == 0
+        guardian.link.close()
+        wait_until(lambda: contactor.opened() > 0, END_S)
+        assert not bench.runs
+        stop_s = bench.wire.counters.first_stop_s
+        assert contactor.opened_s is not None
+        assert stop_s is not None
+        assert contactor.opened_s - stop_s > OBEYED_S
+        assert guardian.ended() == ACTED
+        assert guardian.log.splitlines()[-1] == "guardian: contactor bay-1: open"
+
+
+def test_a_charger_that_does_not_obey_is_cut_off_within_a_second(tmp_path: Path, contactor: Contactor) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, "VERIFY_S=5") as guardian:
+        bench.charger.ignores_stop = True
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        guardian.link.close()
+        wait_until(lambda: contactor.opened() > 0, END_S)
+        assert guardian.process.poll() is None, "it goes on to stop the charger"
+        assert bench.runs
+        assert bench.stops <= 2 * 2, "in the first round; one more on a busy machine"
+
+
+@pytest.mark.parametrize("orderly", [True, False])
+def test_contactors_open_where_no_charger_has_to_be_stopped(
+    tmp_path: Path, contactor: Contactor, *, orderly: bool
+) -> None:
+    with watched(tmp_path, controller="pass") as guardian:
+        guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        if orderly:
+            guardian.send(DONE)
+        guardian.link.close()
+        assert guardian.ended() == 0
+        assert contactor.opened() == 1
+
+
+def test_a_line_that_is_given_back_is_free(tmp_path: Path, contactor: Contactor) -> None:
+    with watched(tmp_path, controller="pass") as guardian:
+        guardian.beat()
+        before = guardian.files
+        for _ in range(2):  # the second one takes the first one's place
+            guardian.send(CONTACTOR + b"bay-1", contactor.writer)
+        guardian.beat()
+        assert guardian.files == before + 1
+        guardian.send(CONTACTOR + b"bay-1")
+        guardian.beat()
+        assert guardian.files == before
+        guardian.link.close()
+        assert guardian.ended() == 0
+        assert contactor.opened() == 0
+
+
+def test_the_controllers_own_words_for_a_line_are_understood(tmp_path: Path, contactor: Contactor) -> None:
+    other = Contactor()
+    with watched(tmp_path, controller="pass") as guardian:
+        link = GuardianLink(os.dup(guardian.link.fileno()))
+        link.hold_contactor("bay-1", contactor.writer)
+        link.hold_contactor("bay-2", other.writer)
+        link.hold_contactor("bay-2", None)
+        link._socket.close()
+        guardian.link.close()
+        assert guardian.ended() == 0
+    assert (contactor.opened(), other.opened()) == (1, 0)
+    other.close()

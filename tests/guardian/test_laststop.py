@@ -34,6 +34,24 @@ def test_every_charger_is_stopped_and_verified(tmp_path: Path) -> None:
         assert not any(bench.runs or bench.charger.run for bench in benches)
 
 
+def test_a_round_ends_when_its_chargers_have_had_time_to_obey(tmp_path: Path) -> None:
+    """Whoever opens contactors at its end breaks no current where the stop was obeyed, and does not wait otherwise."""
+    with running_chargers(tmp_path, 2) as (good, deaf):
+        deaf.charger.ignores_stop = True
+        seen: list[tuple[bool, bool]] = []
+        began_s = time.monotonic()
+        rounds_s: list[float] = []
+
+        def look() -> None:
+            seen.append((good.runs, deaf.runs))
+            rounds_s.append(time.monotonic() - began_s)
+
+        stop_all({good.name: None, deaf.name: None}, 3 * ROUND_S, on_round=look)
+        assert set(seen) == {(False, True)}
+        assert len(seen) >= 2
+        assert rounds_s[0] < 2 * ROUND_S
+
+
 def test_a_port_is_opened_by_its_name(tmp_path: Path) -> None:
     with running_chargers(tmp_path) as (bench,):
         assert stop_all({bench.name: None}, 3.0) == {bench.name: ""}

@@ -17,9 +17,10 @@ STOP = PACKAGES | {"protocol.standby", "service.laststop"}
 LEAN: dict[str, set[str]] = {
     "protocol.standby": {"", "protocol", "protocol.standby"},
     "service.say": {"", "service", "service.say"},
+    "service.lastopen": {"", "service", "service.lastopen"},
     "service.laststop": STOP,
     "service.estop": STOP | {"service.estop"},
-    "service.guardian": STOP | {"service.say", "service.guardian"},
+    "service.guardian": STOP | {"service.lastopen", "service.say", "service.guardian"},
 }
 MODULES = {module.name: module for module in product()}
 

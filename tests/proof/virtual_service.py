@@ -18,7 +18,16 @@ import serial.serialutil
 
 from orchestrator.config.load import load_map, load_policy
 from orchestrator.config.policy import Policy
-from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Control, JournalConfig, Limits, Station
+from orchestrator.config.station import (
+    BatteryConfig,
+    Bay,
+    ChargerConfig,
+    ContactorConfig,
+    Control,
+    JournalConfig,
+    Limits,
+    Station,
+)
 from orchestrator.core.memory import Memory
 from orchestrator.devices import bus as bus_module
 from orchestrator.devices import charger as charger_module
@@ -58,8 +67,29 @@ class Guardian:
     def drop(self, _port: str) -> None:
         """As the real one."""
 
+    def hold_contactor(self, _name: str, _fd: int | None) -> None:
+        """As the real one."""
+
     def done(self) -> None:
         """As the real one."""
+
+
+class Contactor:
+    """A bay's GPIO line and what hangs on it: open, the charger sees no battery. Nobody else is in that bay's cable."""
+
+    def __init__(self, rig: VirtualRig) -> None:
+        self._rig = rig
+        self.drive(closed=False)
+
+    def drive(self, *, closed: bool) -> None:
+        self._rig.catch_up(force=True)
+        self._rig.bay.connected = closed
+
+    def fileno(self) -> int:
+        return -1
+
+    def close(self) -> None:
+        """The line stays as it is."""
 
 
 class Notebook:
@@ -109,7 +139,12 @@ class Silence:
 
 
 def station(
-    controls: Sequence[ControlMode], policies: Sequence[Policy] = (), limit_a: float = 15.0, **battery: Any
+    controls: Sequence[ControlMode],
+    policies: Sequence[Policy] = (),
+    limit_a: float = 15.0,
+    *,
+    contactors: bool = False,
+    **battery: Any,
 ) -> Station:
     """A bay of the design's example for each control mode, on one bus; li-ion-48v where there is no other policy."""
     settings = {"can": "can0", "map": load_map("tabos"), **battery}
@@ -124,6 +159,7 @@ def station(
                 battery=BatteryConfig(node_id=FIRST_NODE + number, **settings),
                 limits=Limits(voltage_v=58.4, current_a=limit_a, temperature_c=Range(0, 45)),
                 policy=policy,
+                contactor=ContactorConfig(chip="/virtual/gpiochip", line=number) if contactors else None,
             )
             for number, (control, policy) in enumerate(zip(controls, chosen, strict=True))
         ),
@@ -211,6 +247,7 @@ class World:
         change = self._patches.enter_context
         replaced: dict[Any, dict[str, Any]] = {
             supervisor_module: {
+                "OutputLine": SimpleNamespace(open=lambda _chip, line, **_: Contactor(self.rigs[line])),
                 "monotonic": time.clock, "boottime": time.clock, "SimpleQueue": _Queues(time),
                 "Journal": Notebook, "ControlSocket": Silence,
                 "signal": SimpleNamespace(

@@ -45,7 +45,7 @@ class Runner:
 
 
 class Time:
-    """The clock, the queue of moments, whose turn it is. `call_later`, `call_soon`, `time` are as in an asyncio loop."""
+    """The clock, the queue of moments, whose turn it is. `call_later`, `call_soon`, `time` as in an asyncio loop."""
 
     def __init__(self, end_s: float = inf) -> None:
         self.now_s = 1000.0

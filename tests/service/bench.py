@@ -28,6 +28,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.service.bay import Asked, BayRunner
+from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
@@ -61,6 +62,7 @@ class Charger:
             Connection.NORMAL,
         )
         self.link = ChargerLink(online=True)
+        self.deaf = False  #: does not obey any more
 
     def order(self, command: Command | None, grant: Grant | None = None) -> None:
         self.orders.append((command, grant))
@@ -84,7 +86,7 @@ class Charger:
                 Action.SET_MODE: {"charge_mode": ChargeMode(command.value) if command.value else None},
                 Action.RUN: {"operation": Operation.RUNNING},
             }
-            changes = effects.get(command.action, {})
+            changes = {} if self.deaf else effects.get(command.action, {})
         reading = replace(self.reading, **changes)  # type: ignore[arg-type]  # the fields of a reading, by the order
         running = reading.operation is Operation.RUNNING
         self.reading = replace(reading, t_s=now_s, current_a=STEPS_A[reading.current_limit or 0] if running else 0.0)
@@ -114,13 +116,21 @@ class Bench:
     """A bay, its devices, and a journal that nobody writes: its lines wait in it."""
 
     def __init__(
-        self, directory: Path, memory: Memory | None = None, bay: Bay | None = None, max_mb: float = 1.0
+        self,
+        directory: Path,
+        memory: Memory | None = None,
+        bay: Bay | None = None,
+        *,
+        max_mb: float = 1.0,
+        contactor: Contactor | None = None,
     ) -> None:
         self.charger, self.battery = Charger(), Battery()
         self.now_s = 1000.0
         self.asleep_s = 0.0
         self.journal = Journal(directory, max_mb, lambda: self.now_s, time.time)
-        self.bay = BayRunner(bay or the_bay(), self.charger, self.battery, self.journal, memory or Memory())
+        self.bay = BayRunner(
+            bay or the_bay(), self.charger, self.battery, self.journal, memory or Memory(), contactor=contactor
+        )
 
     def step(self, count: int = 1) -> State:
         for _ in range(count):

@@ -202,6 +202,27 @@ def test_a_port_that_is_missing_or_taken_is_told_and_the_bmu_asked_all_the_same(
     assert "BMU 0x10 on can0: answers" in shown
 
 
+def test_a_contactor_that_cannot_be_looked_at_is_told(site: Site) -> None:
+    def no_chip(document: Document) -> None:
+        document["bays"][0]["contactor"] = {"chip": "./gpiochip9", "line": 17}
+
+    status, shown = site.probe(change=no_chip)
+    assert status == 1
+    assert "contactor: " in shown
+    assert "gpiochip9 line 17: no such GPIO chip: check the name in the station file" in shown
+    assert shown.endswith("NO ANSWER: bay-1's contactor")
+
+
+def test_a_contactors_line_is_shown(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    def low(document: Document) -> None:
+        document["bays"][0]["contactor"] = {"chip": "/dev/gpiochip0", "line": 17, "active_low": True}
+
+    monkeypatch.setattr("orchestrator.service.probe.describe", lambda chip, line: f"{chip} line {line}: input, free")
+    status, shown = site.probe(change=low)
+    assert status == 0
+    assert "contactor on /dev/gpiochip0 line 17: input, free; closed while the pin is low" in shown
+
+
 def test_a_bus_that_cannot_be_opened_is_told(site: Site) -> None:
     def no_adapter(document: Document) -> None:
         document["can"]["can0"] = {"interface": "slcan", "channel": "/dev/not-there", "bitrate": 250000}

@@ -147,6 +147,8 @@ snapshots = st.builds(
     st.sampled_from([BatteryLink(), BatteryLink(online=True, implausible={"soc_pct": "140"})]),
     st.sampled_from([None, *Request]),
     st.sampled_from(["", "broken"]),
+    st.booleans(),
+    st.sampled_from(["", "the line is gone"]),
 )
 
 

@@ -76,6 +76,11 @@ def setting_not_obeyed(f: Facts) -> str | None:
     return _unconfirmed(f, f"{order.action.value.removeprefix('set_')} {order.value}")
 
 
+def contactor_lost(f: Facts) -> str | None:
+    """FAULTS C6: without it, nothing is left for a charger that does not obey."""
+    return f.snapshot.contactor_problem or None
+
+
 def _unconfirmed(f: Facts, what: str) -> str | None:
     waited_s = f.now_s - f.memory.order_s
     if waited_s < OBEY_S:

@@ -22,7 +22,7 @@ def over_voltage(f: Facts) -> str | None:
 
 def volts_disagree(f: Facts) -> str | None:
     """FAULTS B15."""
-    if f.volts is None or f.pack_v is None:
+    if f.volts is None or f.pack_v is None or not f.connected:
         return None
     limits = f.rules.policy.faults
     if abs(f.volts - f.pack_v) <= max(limits.volts_differ_v, limits.volts_differ_pct / 100 * f.pack_v):

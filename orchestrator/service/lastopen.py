@@ -1,0 +1,70 @@
+"""Open contactors on bare file descriptors: for the guardian and `estop`, when nothing else works any more.
+
+Theory of operation. A GPIO line that was requested from the kernel is an open file; whoever has it may drive the line
+with one ioctl, whatever library requested it. The guardian has duplicates of the controller's; `estop`, which comes
+when nobody may be left, requests the lines anew. Values are logical: the kernel knows which lines are active low.
+
+First the stop, then the contactor. A contactor that breaks a load wears out, and may weld when it is needed next; a
+charger that obeys is without current within the first round of stops (`laststop.ROUND_S`, half a second). So contactors
+open when that round is over: without load where the stop was obeyed, under load where nothing else is left. To wait for
+longer would only make the time longer in which a charger that nobody controls goes on.
+
+The numbers are those of linux/gpio.h (GPIO ABI v2, Linux 5.10) where ioctls are numbered as in asm-generic/ioctl.h: on
+x86, ARM and RISC-V. Standard library only.
+"""
+
+import errno
+import fcntl
+import os
+import struct
+from collections.abc import Iterable
+
+#: _IOWR(0xB4, 0x07, struct gpio_v2_line_request) and _IOWR(0xB4, 0x0F, struct gpio_v2_line_values).
+GET_LINE = 0xC250B407
+SET_VALUES = 0xC010B40F
+#: struct gpio_v2_line_values: bits, mask. The request's only line is its line 0.
+OPEN = struct.pack("=QQ", 0, 1)
+#: struct gpio_v2_line_request, up to the descriptor that comes back: offsets[64] (the first is ours), consumer[32],
+#: config {flags, num_attrs, padding[5], attrs[10]}, num_lines, event_buffer_size, padding[5]; fd.
+REQUEST = struct.Struct("=I252x32sQI20x240xII20xi")
+#: enum gpio_v2_line_flag
+ACTIVE_LOW, OUTPUT = 1 << 1, 1 << 3
+CONSUMER = b"orchestrator estop"
+
+HELD = "left to who holds it"
+OPENED = "open"
+
+Line = tuple[str, int, bool]  #: chip, line, active low
+
+
+def open_contactor(fd: int) -> str:
+    """Open the contactor on a requested line; OPENED, or why not."""
+    try:
+        fcntl.ioctl(fd, SET_VALUES, OPEN)
+    except OSError as error:
+        return error.strerror or str(error)
+    return OPENED
+
+
+def open_contactors(lines: Iterable[Line]) -> dict[str, str]:
+    """Open contactors whose lines nobody holds; what became of each. Lines that are held are left alone.
+
+    What was requested is given back at once: from then on it is the driver's again, as in a gateway without power.
+    """
+    return {f"{chip} line {line}": _request(chip, line, active_low=active_low) for chip, line, active_low in lines}
+
+
+def _request(chip: str, line: int, *, active_low: bool) -> str:
+    flags = OUTPUT | (ACTIVE_LOW if active_low else 0)
+    # An output without a value is requested inactive.
+    request = bytearray(REQUEST.pack(line, CONSUMER, flags, 0, 1, 0, 0))
+    try:
+        fd = os.open(chip, os.O_RDWR | os.O_CLOEXEC)
+        try:
+            fcntl.ioctl(fd, GET_LINE, request)
+        finally:
+            os.close(fd)
+    except OSError as error:
+        return HELD if error.errno == errno.EBUSY else error.strerror or str(error)
+    os.close(REQUEST.unpack(request)[-1])
+    return OPENED

@@ -1,0 +1,99 @@
+"""The whole service on bays behind contactors, in virtual time: it never locks itself out."""
+
+from collections.abc import Callable, Mapping
+
+import pytest
+
+from orchestrator.model import ControlMode, Request, State
+from orchestrator.service.bay import BayRunner
+from orchestrator.sim.presets import PACKS
+from tests.proof.play import POLICIES
+from tests.proof.virtual_rig import Nature
+from tests.proof.virtual_service import World, station, world
+
+S = State
+
+
+def played(
+    happenings: Mapping[float, Callable[[World], object]],
+    end_s: float,
+    soc_pct: float,
+    control: ControlMode = ControlMode.MANUAL,
+) -> list[tuple[State, bool]]:
+    """What becomes of the bay of the demo: each state with its contactor, closed or not, as often as it changes."""
+    course: list[tuple[State, bool]] = []
+
+    def look(_: BayRunner) -> None:
+        now = (made.decision().state, made.rigs[0].bay.connected)
+        if course[-1:] != [now]:
+            course.append(now)
+
+    pack = PACKS["demo"]()
+    pack.set_soc(soc_pct)
+    the_station = station([control], [POLICIES["demo"]], contactors=True)
+    with world(the_station, [Nature(pack, control)], end_s=end_s + 60.0) as made:
+        made.rigs[0].bay.connected = False  # nobody drives the line, and it has its pull-down
+        made.on_step = look
+        for t_s, happen in {**happenings, end_s: World.end}.items():
+            made.time.call_later(t_s, happen, made)
+        assert made.run() == 0
+        assert not made.rigs[0].bay.connected
+        return course
+
+
+def asks(request: Request) -> Callable[[World], object]:
+    return lambda on: on.ask(request)
+
+
+def deafens(on: World) -> None:
+    on.rigs[0].bay.charger.ignores_stop = True
+
+
+def mends(on: World) -> None:
+    on.rigs[0].bay.charger.ignores_stop = False
+
+
+def test_from_the_start_to_a_full_charge_and_back() -> None:
+    """From the bottom of the deep discharge, every state on the way; recharged after some of it was used."""
+    assert played({120.0: lambda on: on.rigs[0].bay.pack.set_soc(50.0)}, 150.0, soc_pct=-100.0) == [
+        (S.STARTING, False),
+        (S.OFFLINE, True),
+        (S.IDLE, True),
+        (S.QUALIFYING, True),
+        (S.PRECHARGE_PULSE, True),
+        (S.PRECHARGE_CONTINUOUS, True),
+        (S.CHARGING, True),
+        (S.STOPPING, True),
+        (S.FULL, True),
+        (S.QUALIFYING, True),
+        (S.CHARGING, True),
+        (S.STOPPING, True),
+        (S.FULL, True),
+        (S.IDLE, True),
+    ]
+
+
+@pytest.mark.parametrize("control", ControlMode)
+def test_a_charger_that_was_out_of_control_can_charge_again(control: ControlMode) -> None:
+    happenings: dict[float, Callable[[World], object]] = {
+        8.0: deafens,
+        9.0: asks(Request.STOP),
+        20.0: mends,
+        25.0: asks(Request.RESET),
+        26.0: asks(Request.START),
+    }
+    assert played(happenings, 40.0, 20.0, control) == [
+        (S.STARTING, False),
+        (S.OFFLINE, True),
+        (S.IDLE, True),
+        (S.QUALIFYING, True),
+        (S.CHARGING, True),
+        (S.STOPPING, True),
+        (S.UNCONTROLLABLE, False),
+        (S.TRIPPED, False),
+        (S.IDLE, True),
+        (S.QUALIFYING, True),
+        (S.CHARGING, True),
+        (S.STOPPING, True),
+        (S.IDLE, True),
+    ]
