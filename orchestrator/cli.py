@@ -109,7 +109,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     demo.set_defaults(run=_demo)
 
 
-SCHEMAS = ("policy", "station", "map")
+SCHEMAS = ("policy", "station", "map", "scenario")
 NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
