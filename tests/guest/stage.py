@@ -1,0 +1,121 @@
+"""A station in mid-charge on a CAN interface of the kernel, and what may be done to it."""
+
+import fcntl
+import json
+import socket
+import struct
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orchestrator.sim.client import PlantProcess
+from tests.guest.figures import FIGURES, Figure
+from tests.waiting import wait_until
+from tests.whole.station import Service, station_document
+
+SIOCSIFFLAGS, IFF_UP = 0x8914, 0x1  #: linux/sockios.h, linux/if.h
+#: The guest has one slow processor.
+CHARGING_S = 60.0
+#: 10 s without the fault, 10 s of backoff, then the bay qualifies anew.
+AGAIN_S = 60.0
+#: A pack so cold that a charge is on the lowest step, where a warm one's is on the highest.
+COLD_C = 5.0
+TOP_STEP, LOWEST_STEP = 4, 0
+
+
+def ip(*words: str) -> None:
+    """The technician's tool for interfaces."""
+    subprocess.run(["ip", *words], check=True, timeout=10)
+
+
+def switch(name: str, *, up: bool) -> None:
+    """`ip link set NAME up|down` without the 0.3 s that a program needs to start in the guest."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as any_socket:
+        request = struct.pack("16sh14x", name.encode(), IFF_UP if up else 0)
+        fcntl.ioctl(any_socket, SIOCSIFFLAGS, request)
+
+
+@contextmanager
+def vcan(name: str) -> Iterator[str]:
+    """A virtual CAN interface that is up."""
+    ip("link", "add", name, "type", "vcan")
+    ip("link", "set", name, "up")
+    try:
+        yield name
+    finally:
+        ip("link", "delete", name)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One bay: emulators and the service."""
+
+    plant: PlantProcess
+    service: Service
+
+    def charges(self) -> None:
+        """Wait for a steady charge with a warm pack."""
+        self.service.wait("CHARGING", timeout_s=CHARGING_S)
+        wait_until(lambda: self.plant.state()["current_a"] > 13, CHARGING_S, "a steady charge")
+        assert self.plant.state()["current_limit"] == TOP_STEP
+
+    def stopped_by(self, happen: Callable[[], object]) -> float:
+        """Let it happen, and wait for the charger's standby; the seconds until the first stop byte reached it."""
+        self.plant.inject("heal")  # from now on, the first stop is looked for
+        happened_s = time.monotonic()
+        happen()
+        wait_until(lambda: self.plant.state()["first_stop_s"], 10, "a stop")
+        wait_until(lambda: self.plant.state()["operation"] == 0, 10, "the charger's standby")
+        return float(self.plant.state()["first_stop_s"]) - happened_s
+
+    def charges_again(self, mended: Callable[[], object]) -> float:
+        """Mend what was broken, and wait for the next charge, which may know nothing but what is read from then on.
+
+        The pack has become cold meanwhile: an order by an old temperature would be seen. Returns the seconds.
+        """
+        self.plant.inject("under_temperature", value=COLD_C)
+        wait_until(lambda: self.plant.state()["temperature_c"] < COLD_C + 1, 10, "a cold pack")
+        guardian, seen = self.service.guardian, len(self.service.path_of("bay-1"))
+        mended_s = time.monotonic()
+        mended()
+        self.service.wait("CHARGING", timeout_s=AGAIN_S)
+        again_s = time.monotonic() - mended_s
+        wait_until(lambda: self.plant.state()["current_a"] > 1, 10, "a current")
+        assert self.plant.state()["current_limit"] == LOWEST_STEP
+        assert self.steps_ordered(mended_s) == {LOWEST_STEP}
+        assert "QUALIFYING" in self.service.path_of("bay-1")[seen:]
+        assert self.service.guardian == guardian
+        return again_s
+
+    def steps_ordered(self, since_s: float) -> set[int]:
+        """The current steps of the decisions since then, as the journal has them."""
+        decisions = self.service.journal("bay-1", "decision")
+        return {line["step"]["index"] for line in decisions if line["step"] and line["t"] >= since_s}
+
+
+def note(what: str, stop_s: float, again_s: float | None = None) -> None:
+    """Put it into the table of figures."""
+    FIGURES.append(Figure(what, stop_s, again_s))
+
+
+@contextmanager
+def station(directory: Path, ours: dict[str, Any], theirs: dict[str, Any] | None = None, *args: str) -> Iterator[Scene]:
+    """The emulators and the service, each on its own CAN settings where they differ."""
+    service = Service(directory, station_document(directory, [ours], 1))
+    with PlantProcess(directory, "--can", json.dumps(theirs or ours), *args) as plant:
+        try:
+            yield Scene(plant, service.start())
+        except BaseException:
+            print(service.log())
+            raise
+        finally:
+            service.close()
+
+
+def socketcan(channel: str) -> dict[str, Any]:
+    """How a station file names an interface of the kernel."""
+    return {"interface": "socketcan", "channel": channel, "bitrate": 250000}
