@@ -6,7 +6,7 @@ import socket
 import struct
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +18,11 @@ from tests.waiting import wait_until
 from tests.whole.station import Service, station_document
 
 SIOCSIFFLAGS, IFF_UP = 0x8914, 0x1  #: linux/sockios.h, linux/if.h
+RUN = ("-m", "orchestrator", "run")
 #: The guest has one slow processor.
 CHARGING_S = 60.0
+#: Who looks more often slows down what he looks at.
+LOOK_S = 0.1
 #: 10 s without the fault, 10 s of backoff, then the bay qualifies anew.
 AGAIN_S = 60.0
 #: A pack so cold that a charge is on the lowest step, where a warm one's is on the highest.
@@ -57,10 +60,14 @@ class Scene:
     plant: PlantProcess
     service: Service
 
+    def until(self, condition: Callable[[dict[str, Any]], object], what: str, timeout_s: float = 10.0) -> None:
+        """Wait until it is true of the charger and its pack as they are."""
+        wait_until(lambda: condition(self.plant.state()), timeout_s, what, LOOK_S)
+
     def charges(self) -> None:
         """Wait for a steady charge with a warm pack."""
         self.service.wait("CHARGING", timeout_s=CHARGING_S)
-        wait_until(lambda: self.plant.state()["current_a"] > 13, CHARGING_S, "a steady charge")
+        self.until(lambda truth: truth["current_a"] > 13, "a steady charge", CHARGING_S)
         assert self.plant.state()["current_limit"] == TOP_STEP
 
     def stopped_by(self, happen: Callable[[], object]) -> float:
@@ -68,8 +75,8 @@ class Scene:
         self.plant.inject("heal")  # from now on, the first stop is looked for
         happened_s = time.monotonic()
         happen()
-        wait_until(lambda: self.plant.state()["first_stop_s"], 10, "a stop")
-        wait_until(lambda: self.plant.state()["operation"] == 0, 10, "the charger's standby")
+        self.until(lambda truth: truth["first_stop_s"], "a stop")
+        self.until(lambda truth: truth["operation"] == 0, "the charger's standby")
         return float(self.plant.state()["first_stop_s"]) - happened_s
 
     def charges_again(self, mended: Callable[[], object]) -> float:
@@ -78,13 +85,13 @@ class Scene:
         The pack has become cold meanwhile: an order by an old temperature would be seen. Returns the seconds.
         """
         self.plant.inject("under_temperature", value=COLD_C)
-        wait_until(lambda: self.plant.state()["temperature_c"] < COLD_C + 1, 10, "a cold pack")
+        self.until(lambda truth: truth["temperature_c"] < COLD_C + 1, "a cold pack")
         guardian, seen = self.service.guardian, len(self.service.path_of("bay-1"))
         mended_s = time.monotonic()
         mended()
         self.service.wait("CHARGING", timeout_s=AGAIN_S)
         again_s = time.monotonic() - mended_s
-        wait_until(lambda: self.plant.state()["current_a"] > 1, 10, "a current")
+        self.until(lambda truth: truth["current_a"] > 1, "a current")
         assert self.plant.state()["current_limit"] == LOWEST_STEP
         assert self.steps_ordered(mended_s) == {LOWEST_STEP}
         assert "QUALIFYING" in self.service.path_of("bay-1")[seen:]
@@ -103,9 +110,15 @@ def note(what: str, stop_s: float, again_s: float | None = None) -> None:
 
 
 @contextmanager
-def station(directory: Path, ours: dict[str, Any], theirs: dict[str, Any] | None = None, *args: str) -> Iterator[Scene]:
-    """The emulators and the service, each on its own CAN settings where they differ."""
-    service = Service(directory, station_document(directory, [ours], 1))
+def station(
+    directory: Path,
+    ours: dict[str, Any],
+    theirs: dict[str, Any] | None = None,
+    *args: str,
+    run: Sequence[str] = RUN,
+) -> Iterator[Scene]:
+    """The emulators and the service, each on its own CAN settings where they differ; `run` starts the service."""
+    service = Service(directory, station_document(directory, [ours], 1), run)
     with PlantProcess(directory, "--can", json.dumps(theirs or ours), *args) as plant:
         try:
             yield Scene(plant, service.start())

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.guest.stage import note, socketcan, station, switch, vcan
+from tests.guest.stage import LOOK_S, note, socketcan, station, switch, vcan
 from tests.waiting import wait_until
 
 #: The kernel says at once that an interface is down; the rest is the guest's slow processor.
@@ -26,7 +26,6 @@ def test_an_interface_that_goes_down_and_comes_up(tmp_path: Path) -> None:
         scene.charges()
         stop_s = scene.stopped_by(lambda: switch("vcan0", up=False))
         assert stop_s < AT_ONCE_S
-        scene.service.wait("OFFLINE")
-        assert "the interface is down; bring it up" in scene.service.log()
+        wait_until(lambda: "the interface is down; bring it up" in scene.service.log(), every_s=LOOK_S)
         again_s = scene.charges_again(lambda: switch("vcan0", up=True))
         note("ip link set vcan0 down … up", stop_s, again_s)
