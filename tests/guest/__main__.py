@@ -13,10 +13,14 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.guest.kernel import Kernel, MissingError, find
+from tests.guest.kernel import CACHE, Kernel, MissingError, find
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 OUT = ROOT / "run" / "guest"
+#: What is installed in the guest, which has no network, by the machine's own Python: the technician's.
+WHEELS = CACHE / "wheels"
+PYTHON = "/usr/bin/python3"
+LIST = ROOT / "requirements" / "runtime.txt"
 #: A guest that has not ended by then hangs; what a test hangs in, pytest's own time-out shows.
 LIMIT_S = 1500
 MEMORY = "1G"
@@ -34,7 +38,7 @@ def boot(kernel: Kernel, command: Sequence[str], out: Path) -> int:
         "modules": [str(module) for module in kernel.modules],
         "checkout": str(ROOT),
         "command": shlex.join(command),
-        "variables": "GUEST=/mnt",
+        "variables": f"GUEST=/mnt PIP_NO_INDEX=1 PIP_CONFIG_FILE=/dev/null PIP_FIND_LINKS={WHEELS}",
     }
     (out / "job.json").write_text(json.dumps(job), encoding="utf-8")
     with tempfile.TemporaryDirectory(prefix="guest-") as scratch:
@@ -52,9 +56,30 @@ def boot(kernel: Kernel, command: Sequence[str], out: Path) -> int:
     return int(status.read_text()) if status.exists() else NOTHING
 
 
+def fetch_wheels() -> None:
+    """Download the locked libraries for the guest's Python, unless they are there."""
+    marker = WHEELS / LIST.name
+    if marker.exists() and marker.read_bytes() == LIST.read_bytes():
+        return
+    asked = subprocess.run(
+        [PYTHON, "-c", "import ensurepip, venv, sys; print('%d.%d' % sys.version_info[:2])"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if asked.returncode:
+        raise MissingError(f"{PYTHON} cannot make a virtual environment: sudo apt-get install python3-venv")
+    words = ["--quiet", "--require-hashes", "--only-binary", ":all:", "--python-version", asked.stdout.strip()]
+    command = [sys.executable, "-m", "pip", "download", *words, "--dest", str(WHEELS), "--requirement", str(LIST)]
+    if subprocess.run(command, check=False).returncode:
+        raise MissingError(f"pip cannot download what {LIST} names: is there a network?")
+    marker.write_bytes(LIST.read_bytes())
+
+
 def main(arguments: Sequence[str]) -> int:
     try:
         kernel = find()
+        fetch_wheels()
     except MissingError as missing:
         print(f"make test-guest: {missing}", file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""The unchanged controller, whose files are closed under it on SIGUSR1: `python -m tests.guest.closer WHICH FD STATION`.
+"""`python -m tests.guest.closer WHICH FD STATION`: the unchanged controller, whose files are closed on SIGUSR1.
 
 WHICH is `ports`, the serial ports, or `buses`, the CAN sockets.
 """

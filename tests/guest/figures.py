@@ -7,20 +7,24 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Figure:
-    """What was done in mid-charge, when the charger got its stop, and when it charged again (None: it must not)."""
+    """What was done in mid-charge, when the charger got its stop, and when that was over (None: it is not).
+
+    Over: it charges again, or, `held`, the service is back and waits for its operator with the charger verified.
+    """
 
     what: str
     stop_s: float
     again_s: float | None = None
+    held: bool = False
 
     @property
     def row(self) -> tuple[str, str, str]:
-        again = "–" if self.again_s is None else f"{self.again_s:.1f} s"
+        again = "–" if self.again_s is None else f"{self.again_s:.1f} s{' (held)' if self.held else ''}"
         return self.what, f"{self.stop_s * 1000:.0f} ms", again
 
 
 FIGURES: list[Figure] = []
-HEAD = ("what was done in mid-charge", "stop byte after", "charges again after")
+HEAD = ("what was done in mid-charge", "stop byte after", "charges again (held: may be started) after")
 
 
 def table() -> Iterator[str]:

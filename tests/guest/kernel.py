@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 PACKAGE = "user-mode-linux"
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "charging-station-orchestrator"
 #: In this order, since the later ones need the earlier ones.
 MODULES = (
     "fs/overlayfs/overlay",
@@ -43,16 +44,15 @@ def find() -> Kernel:
     for path, package in NEEDED.items():
         if not Path(path).exists():
             raise MissingError(f"the guest needs {path}: sudo apt-get install {package}")
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "charging-station-orchestrator"
-    unpacked = cache / PACKAGE
+    unpacked = CACHE / PACKAGE
     kernel = _below(Path("/")) or _below(unpacked)
     if kernel is None:
-        _download(cache, unpacked)
+        _download(unpacked)
         kernel = _below(unpacked)
     if kernel is None:
         raise MissingError(f"{unpacked} has no kernel with {', '.join(MODULES)}: remove it to have it fetched anew")
     large = LARGE_REGISTERS in Path("/proc/cpuinfo").read_text(encoding="ascii").split()
-    return replace(kernel, preload=_compiled(cache) if large else None)
+    return replace(kernel, preload=_compiled() if large else None)
 
 
 def _below(root: Path) -> Kernel | None:
@@ -64,26 +64,26 @@ def _below(root: Path) -> Kernel | None:
     return None
 
 
-def _download(cache: Path, target: Path) -> None:
+def _download(target: Path) -> None:
     if not (shutil.which("apt-get") and shutil.which("dpkg-deb")):
         raise MissingError(f"the package {PACKAGE} of Debian or Ubuntu is missing, and there is no apt-get to fetch it")
-    cache.mkdir(parents=True, exist_ok=True)
-    fetched = subprocess.run(["apt-get", "--quiet", "download", PACKAGE], cwd=cache, check=False)
-    packages = sorted(cache.glob(f"{PACKAGE}_*.deb"))
+    CACHE.mkdir(parents=True, exist_ok=True)
+    fetched = subprocess.run(["apt-get", "--quiet", "download", PACKAGE], cwd=CACHE, check=False)
+    packages = sorted(CACHE.glob(f"{PACKAGE}_*.deb"))
     if fetched.returncode or not packages:
         raise MissingError(
             f"apt-get cannot download {PACKAGE}: is there a network, and was apt-get update ever called? "
-            f"A copy that you put into {cache} is as good"
+            f"A copy that you put into {CACHE} is as good"
         )
     subprocess.run(["dpkg-deb", "--extract", packages[-1], target], check=True)
 
 
-def _compiled(cache: Path) -> Path:
+def _compiled() -> Path:
     compiler = shutil.which("cc")
     if compiler is None:
         raise MissingError("on this processor (AMX) the guest needs a C compiler: sudo apt-get install gcc libc6-dev")
-    library = cache / "xstate.so"
+    library = CACHE / "xstate.so"
     source = Path(__file__).with_name("xstate.c")
-    cache.mkdir(parents=True, exist_ok=True)
+    CACHE.mkdir(parents=True, exist_ok=True)
     subprocess.run([compiler, "-shared", "-fPIC", "-O2", "-o", library, source], check=True)
     return library

@@ -1,7 +1,7 @@
-"""A serial CAN adapter that can be pulled out: the kernel's slcan driver and the emulated BMU, each on a pty of its own.
+"""A serial CAN adapter that can be pulled out.
 
-Between the two ptys stands a relay, which is the adapter: it hands on the lines that both sides speak, and says what an
-adapter says by itself.
+The kernel's slcan driver and the emulated BMU are on a pty each. Between the two stands a relay, which is the adapter:
+it hands on the lines that both sides speak, and says what an adapter says by itself.
 """
 
 import fcntl

@@ -104,9 +104,9 @@ class Scene:
         return {line["step"]["index"] for line in decisions if line["step"] and line["t"] >= since_s}
 
 
-def note(what: str, stop_s: float, again_s: float | None = None) -> None:
+def note(what: str, stop_s: float, again_s: float | None = None, *, held: bool = False) -> None:
     """Put it into the table of figures."""
-    FIGURES.append(Figure(what, stop_s, again_s))
+    FIGURES.append(Figure(what, stop_s, again_s, held))
 
 
 @contextmanager

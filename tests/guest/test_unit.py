@@ -1,0 +1,104 @@
+"""The shipped unit under systemd, installed by the page: its drill, and whatever guardian and controller may die of."""
+
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from orchestrator.errors import ServiceError
+from tests.guest import page
+from tests.guest.installed import installed
+from tests.guest.stage import AGAIN_S, CHARGING_S, LOOK_S, Scene, note
+from tests.waiting import wait_until
+
+UNIT = "/etc/systemd/system/orchestrator.service"
+#: Whom a signal is sent to: their process ids, from the scene.
+WHOM: dict[str, Callable[[Scene], list[int]]] = {
+    "controller": lambda bay: [bay.service.controller],
+    "guardian": lambda bay: [bay.service.guardian],
+    "guardian and controller": lambda bay: [bay.service.guardian, bay.service.controller],
+}
+#: What the guest's slow processor adds; a Python starts there in half a second and more.
+SLACK_S = 1.0
+#: (signal, whom) → the seconds that the design allows until the stop: the guardian's 0.5 s for a controller that hangs,
+#: the controller's 2 s for such a guardian, systemd's 3 s (WatchdogSec) for both; and the start of `estop`.
+ALLOWED_S = {
+    (signal.SIGKILL, "controller"): 0.0,
+    (signal.SIGKILL, "guardian"): 0.5,
+    (signal.SIGKILL, "guardian and controller"): 0.5,
+    (signal.SIGSTOP, "controller"): 0.6,
+    (signal.SIGSTOP, "guardian"): 2.1,
+    (signal.SIGSTOP, "guardian and controller"): 3.5,
+}
+
+
+@pytest.fixture(name="bay", scope="module")
+def _bay() -> Iterator[Scene]:
+    with installed() as scene:
+        yield scene
+
+
+def test_systemd_has_nothing_to_say_against_the_unit(bay: Scene) -> None:
+    done = subprocess.run(["systemd-analyze", "verify", UNIT], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+
+
+def test_little_is_exposed(bay: Scene) -> None:
+    said = page.run("systemd-analyze security --no-pager orchestrator")
+    assert float(said.rpartition(": ")[2].split()[0]) <= 1.5
+
+
+@pytest.mark.parametrize(("number", "whom"), ALLOWED_S)
+def test_the_chargers_are_stopped_whoever_dies_or_hangs(bay: Scene, number: signal.Signals, whom: str) -> None:
+    charge(bay)
+    guardian, victims = bay.service.guardian, WHOM[whom](bay)
+
+    def happen() -> None:
+        for victim in victims:
+            os.kill(victim, number)
+
+    happened_s = time.monotonic()
+    stop_s = bay.stopped_by(happen)
+    assert stop_s < ALLOWED_S[number, whom] + SLACK_S
+    wait_until(lambda: bay.service.guardian not in (0, guardian), AGAIN_S, "a new service", LOOK_S)
+    held(bay)
+    note(f"{number.name} {whom}", stop_s, time.monotonic() - happened_s, held=True)
+
+
+@pytest.mark.parametrize("command", page.drill())
+def test_the_drill_of_the_page(bay: Scene, command: str) -> None:
+    charge(bay)
+    stop_s = bay.stopped_by(lambda: page.run(command))
+    note(command, stop_s)
+    if command.startswith("sudo systemctl stop"):
+        assert page.run("systemctl show --property Result --value orchestrator").strip() == "success"
+        page.run("sudo systemctl start orchestrator")
+    else:
+        held(bay)
+
+
+def charge(bay: Scene) -> None:
+    """What the operator says, and a charge."""
+    wait_until(lambda: answers(bay), AGAIN_S, "the service", LOOK_S)
+    wait_until(lambda: not bay.service.ask("start", "bay-1")["bay-1"], AGAIN_S, "a start that is accepted", LOOK_S)
+    bay.service.wait("CHARGING", timeout_s=CHARGING_S)
+    bay.until(lambda truth: truth["current_a"] > 1, "a current")
+
+
+def held(bay: Scene) -> None:
+    """The service is there (again), has verified the charger's standby, and waits for its operator."""
+    wait_until(lambda: answers(bay), AGAIN_S, "the service", LOOK_S)
+    found = bay.service.wait("SUSPENDED", timeout_s=AGAIN_S)["bay-1"]
+    assert re.search(r"start( to go on)?$", found["reason"]), found["reason"]
+    assert bay.plant.state()["operation"] == 0
+
+
+def answers(bay: Scene) -> bool:
+    try:
+        return bool(bay.service.status())
+    except ServiceError:
+        return False
