@@ -22,7 +22,7 @@ WHEELS = CACHE / "wheels"
 PYTHON = "/usr/bin/python3"
 LIST = ROOT / "requirements" / "runtime.txt"
 #: A guest that has not ended by then hangs; what a test hangs in, pytest's own time-out shows.
-LIMIT_S = 1500
+LIMIT_S = 2400
 MEMORY = "1G"
 PYTEST = ("-m", "pytest", "-p", "no:cacheprovider", "--color=no", "--timeout=300", "-v")
 #: The guest gave no answer.

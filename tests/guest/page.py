@@ -49,9 +49,9 @@ def provide_sudo() -> None:
 
 
 def run(command: str, timeout_s: float = 240.0) -> str:
-    """Type it after a login, in the checkout; what it says. AssertionError with all that where it does not end well."""
+    """Type it in the checkout; what it says. AssertionError with all that where it does not end well."""
     done = subprocess.run(
-        ["bash", "-lc", command], cwd=ROOT, capture_output=True, text=True, timeout=timeout_s, check=False
+        ["bash", "-c", command], cwd=ROOT, capture_output=True, text=True, timeout=timeout_s, check=False
     )
     assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
     return done.stdout + done.stderr

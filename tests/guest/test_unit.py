@@ -16,6 +16,8 @@ from tests.guest.stage import AGAIN_S, CHARGING_S, LOOK_S, Scene, note
 from tests.waiting import wait_until
 
 UNIT = "/etc/systemd/system/orchestrator.service"
+#: What the technician's shell does when he logs in.
+LOGIN = ". /etc/profile.d/orchestrator.sh"
 #: Whom a signal is sent to: their process ids, from the scene.
 WHOM: dict[str, Callable[[Scene], list[int]]] = {
     "controller": lambda bay: [bay.service.controller],
@@ -52,7 +54,7 @@ def test_little_is_exposed(bay: Scene) -> None:
     assert float(said.rpartition(": ")[2].split()[0]) <= 1.5
 
 
-@pytest.mark.parametrize(("number", "whom"), ALLOWED_S)
+@pytest.mark.parametrize(("number", "whom"), ALLOWED_S, ids=lambda value: getattr(value, "name", value))
 def test_the_chargers_are_stopped_whoever_dies_or_hangs(bay: Scene, number: signal.Signals, whom: str) -> None:
     charge(bay)
     guardian, victims = bay.service.guardian, WHOM[whom](bay)
@@ -72,7 +74,7 @@ def test_the_chargers_are_stopped_whoever_dies_or_hangs(bay: Scene, number: sign
 @pytest.mark.parametrize("command", page.drill())
 def test_the_drill_of_the_page(bay: Scene, command: str) -> None:
     charge(bay)
-    stop_s = bay.stopped_by(lambda: page.run(command))
+    stop_s = bay.stopped_by(lambda: page.run(f"{LOGIN} && {command}"))
     note(command, stop_s)
     if command.startswith("sudo systemctl stop"):
         assert page.run("systemctl show --property Result --value orchestrator").strip() == "success"
@@ -92,7 +94,7 @@ def charge(bay: Scene) -> None:
 def held(bay: Scene) -> None:
     """The service is there (again), has verified the charger's standby, and waits for its operator."""
     wait_until(lambda: answers(bay), AGAIN_S, "the service", LOOK_S)
-    found = bay.service.wait("SUSPENDED", timeout_s=AGAIN_S)["bay-1"]
+    found = bay.service.wait("IDLE", timeout_s=AGAIN_S)["bay-1"]
     assert re.search(r"start( to go on)?$", found["reason"]), found["reason"]
     assert bay.plant.state()["operation"] == 0
 

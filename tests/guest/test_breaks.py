@@ -1,9 +1,12 @@
-"""Serial adapters that come back under another name, and files that are closed under the running service."""
+"""Serial adapters that come back under another name, and what may break inside of the running service."""
 
 import os
 import signal
 from pathlib import Path
 
+import pytest
+
+from orchestrator.service.guardian import ACTED, SILENCE_S
 from tests.guest.stage import LOOK_S, note, socketcan, station, vcan
 from tests.waiting import wait_until
 
@@ -13,13 +16,8 @@ REOPENED_S = 2.0
 GUARD = """
 import sys
 from orchestrator.service.guardian import guard
-sys.exit(guard(sys.argv[2:], ("-m", "tests.guest.closer", sys.argv[1])))
+sys.exit(guard(sys.argv[2:], ("-m", "tests.guest.breaker", sys.argv[1])))
 """
-
-
-def closing(which: str) -> tuple[str, ...]:
-    """How the service is started so that its files can be closed from outside."""
-    return "-c", GUARD, which
 
 
 def test_a_serial_adapter_that_comes_back_under_another_number(tmp_path: Path) -> None:
@@ -43,20 +41,31 @@ def test_a_serial_adapter_that_comes_back_under_another_number(tmp_path: Path) -
                 os.close(fd)
 
 
-def test_a_port_that_is_closed_under_the_service(tmp_path: Path) -> None:
-    with vcan("vcan0"), station(tmp_path, socketcan("vcan0"), run=closing("ports")) as scene:
-        scene.charges()
-        stop_s = scene.stopped_by(lambda: os.kill(scene.service.controller, signal.SIGUSR1))
-        assert stop_s < REOPENED_S
-        again_s = scene.charges_again(lambda: None)
-        note("serial port closed under the service", stop_s, again_s)
-
-
-def test_a_bus_that_is_closed_under_the_service(tmp_path: Path) -> None:
-    with vcan("vcan0"), station(tmp_path, socketcan("vcan0"), run=closing("buses")) as scene:
+@pytest.mark.parametrize(
+    ("what", "reason"),
+    {
+        "serial ports are closed": "the adapter was unplugged",
+        "CAN sockets are closed": "CAN bus can0",
+        "CAN threads fail": "internal error: MemoryError()",
+    }.items(),
+)
+def test_the_service_mends_what_breaks_in_it(tmp_path: Path, what: str, reason: str) -> None:
+    with vcan("vcan0"), station(tmp_path, socketcan("vcan0"), run=("-c", GUARD, what)) as scene:
         scene.charges()
         stop_s = scene.stopped_by(lambda: os.kill(scene.service.controller, signal.SIGUSR1))
         assert stop_s < AT_ONCE_S
-        wait_until(lambda: "→ STOPPING: CAN bus can0" in scene.service.log(), what="the reason", every_s=LOOK_S)
+        wait_until(lambda: reason in scene.service.log(), what="the reason", every_s=LOOK_S)
         again_s = scene.charges_again(lambda: None)
-        note("CAN socket closed under the service", stop_s, again_s)
+        note(what, stop_s, again_s)
+
+
+def test_a_thread_that_ends_stops_the_heartbeats(tmp_path: Path) -> None:
+    """It cannot be mended: the guardian stops the chargers and ends, for systemd to start anew."""
+    what = "CAN threads end"
+    with vcan("vcan0"), station(tmp_path, socketcan("vcan0"), run=("-c", GUARD, what)) as scene:
+        scene.charges()
+        stop_s = scene.stopped_by(lambda: os.kill(scene.service.controller, signal.SIGUSR1))
+        assert stop_s < SILENCE_S + AT_ONCE_S
+        assert scene.service.ended() == ACTED
+        assert "guardian: the controller hangs: stopping the chargers" in scene.service.log()
+        note(what, stop_s)
