@@ -83,6 +83,7 @@ def main(arguments: Sequence[str]) -> int:
     except MissingError as missing:
         print(f"make test-guest: {missing}", file=sys.stderr)
         return 2
+    print(f"load of this machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} processors (above, times mean nothing)")
     chosen = arguments or [str(Path(__file__).parent)]
     return boot(kernel, [sys.executable, *PYTEST, *chosen], OUT)
 

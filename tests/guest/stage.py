@@ -32,7 +32,7 @@ TOP_STEP, LOWEST_STEP = 4, 0
 
 def ip(*words: str) -> None:
     """The technician's tool for interfaces."""
-    subprocess.run(["ip", *words], check=True, timeout=10)
+    subprocess.run(["ip", *words], check=True, timeout=60)
 
 
 def switch(name: str, *, up: bool) -> None:
@@ -46,8 +46,8 @@ def switch(name: str, *, up: bool) -> None:
 def vcan(name: str) -> Iterator[str]:
     """A virtual CAN interface that is up."""
     ip("link", "add", name, "type", "vcan")
-    ip("link", "set", name, "up")
     try:
+        switch(name, up=True)
         yield name
     finally:
         ip("link", "delete", name)
