@@ -79,21 +79,25 @@ class Scene:
         self.until(lambda truth: truth["operation"] == 0, "the charger's standby")
         return float(self.plant.state()["first_stop_s"]) - happened_s
 
-    def charges_again(self, mended: Callable[[], object]) -> float:
-        """Mend what was broken, and wait for the next charge, which may know nothing but what is read from then on.
+    def charges_again(self, mend: Callable[[], object] | None = None) -> float:
+        """Mend what was broken (None: it mends itself), and wait for the next charge; the seconds until then.
 
-        The pack has become cold meanwhile: an order by an old temperature would be seen. Returns the seconds.
+        That may know nothing but what is read from then on: before it is mended the pack becomes cold, so that an order
+        by an old temperature would be seen.
         """
-        self.plant.inject("under_temperature", value=COLD_C)
-        self.until(lambda truth: truth["temperature_c"] < COLD_C + 1, "a cold pack")
         guardian, seen = self.service.guardian, len(self.service.path_of("bay-1"))
+        if mend is not None:
+            self.plant.inject("under_temperature", value=COLD_C)
+            self.until(lambda truth: truth["temperature_c"] < COLD_C + 1, "a cold pack")
         mended_s = time.monotonic()
-        mended()
+        if mend is not None:
+            mend()
         self.service.wait("CHARGING", timeout_s=AGAIN_S)
         again_s = time.monotonic() - mended_s
         self.until(lambda truth: truth["current_a"] > 1, "a current")
-        assert self.plant.state()["current_limit"] == LOWEST_STEP
-        assert self.steps_ordered(mended_s) == {LOWEST_STEP}
+        if mend is not None:
+            assert self.plant.state()["current_limit"] == LOWEST_STEP
+            assert self.steps_ordered(mended_s) == {LOWEST_STEP}
         assert "QUALIFYING" in self.service.path_of("bay-1")[seen:]
         assert self.service.guardian == guardian
         return again_s
