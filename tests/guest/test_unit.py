@@ -24,17 +24,18 @@ WHOM: dict[str, Callable[[Scene], list[int]]] = {
     "guardian": lambda bay: [bay.service.guardian],
     "guardian and controller": lambda bay: [bay.service.guardian, bay.service.controller],
 }
-#: What the guest's slow processor adds; a Python starts there in half a second and more.
+#: What the guest's slow processor adds, and until its `estop` has started (1.7 s where the host has other work, too).
 SLACK_S = 1.0
-#: (signal, whom) → the seconds that the design allows until the stop: the guardian's 0.5 s for a controller that hangs,
-#: the controller's 2 s for such a guardian, systemd's 3 s (WatchdogSec) for both; and the start of `estop`.
+START_S = 2.5
+#: (signal, whom) → the seconds allowed until the stop. By the design: the guardian's 0.5 s for a controller that hangs,
+#: the controller's 2 s for such a guardian, systemd's 3 s (WatchdogSec) for both; then, where nobody is left, `estop`.
 ALLOWED_S = {
     (signal.SIGKILL, "controller"): 0.0,
-    (signal.SIGKILL, "guardian"): 0.5,
-    (signal.SIGKILL, "guardian and controller"): 0.5,
+    (signal.SIGKILL, "guardian"): START_S,
+    (signal.SIGKILL, "guardian and controller"): START_S,
     (signal.SIGSTOP, "controller"): 0.6,
     (signal.SIGSTOP, "guardian"): 2.1,
-    (signal.SIGSTOP, "guardian and controller"): 3.5,
+    (signal.SIGSTOP, "guardian and controller"): 3.0 + START_S,
 }
 #: Then the controller itself has verified its chargers, and ended orderly: what it charged, the next run charges again.
 VERIFIED = (signal.SIGSTOP, "guardian")
