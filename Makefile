@@ -3,19 +3,22 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format campaign soak bench lock clean
+.PHONY: help demo test test-guest check format campaign soak bench lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
 
 help:  ## show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
 
 demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, about a minute
 	$(BIN)/orchestrator demo $(ARGS)
 
 test: .venv/dev.stamp  ## all tests; ARGS='tests/core -k taper' chooses some
 	$(BIN)/python -m pytest $(ARGS)
+
+test-guest: .venv/dev.stamp  ## the tests that need a kernel with SocketCAN and systemd, in a User Mode Linux
+	$(BIN)/python -m tests.guest $(ARGS)
 
 check: .venv/dev.stamp  ## format, lint, types, import rules, tests with branch coverage
 	$(BIN)/ruff format --check .

@@ -5,10 +5,12 @@ from collections.abc import Callable
 from threading import Event
 
 
-def wait_until(condition: Callable[[], object], timeout_s: float = 5.0, what: str = "the condition") -> None:
-    """Return as soon as `condition()` is true; fail the test when it is not within `timeout_s` seconds."""
+def wait_until(
+    condition: Callable[[], object], timeout_s: float = 5.0, what: str = "the condition", every_s: float = 0.005
+) -> None:
+    """Return as soon as `condition()`, asked each `every_s`, is true; fail the test if it is not within `timeout_s`."""
     deadline_s = time.monotonic() + timeout_s
     pause = Event()
     while not condition():
-        assert time.monotonic() < deadline_s, f"{what} did not come true within {timeout_s} s"
-        pause.wait(0.005)
+        assert time.monotonic() < deadline_s, f"{what} did not come true within {timeout_s:g} s"
+        pause.wait(every_s)

@@ -3,7 +3,7 @@
 Theory of operation. One thread owns the port. The control loop leaves it a standing order and the evidence for it (a
 grant); the thread repeats the order until the control loop, seeing the read-back, leaves another. `Schedule` says whose
 turn it is, `Dialogue` what an answer is, the interlock what may go out. A stop wakes the thread at once. Whatever
-breaks, the thread lives on: it reopens the port every second and begins with a stop, without being told.
+breaks, the thread lives on: it reopens the port, then once a second, and begins with a stop, without being told.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,10 @@ MISSES_UNTIL_SILENT = 5
 LATE_UNTIL_SILENT = 3
 #: Without a turn for so long the loop hangs: a write may take 0.2 s, a poll 0.12 s.
 STALL_S = 0.5
+#: A port is opened at most this often …
 REOPEN_S = 1.0
+#: … and one that just failed after this pause: the guardian must let go of it first, and its charger is running.
+LET_GO_S = 0.1
 #: Longer than a whole stop takes: operation 0 follows one slot behind rest 0.
 CLOSE_S = 1.0
 #: More reads than this find no end of old input: then somebody is sending without a pause.
@@ -255,6 +258,6 @@ class ChargerPort:
     def _drop_line(self) -> None:
         line, self._line = self._line, None
         if line is not None:
-            self._open_at_s = self._clock() + REOPEN_S
+            self._open_at_s = max(self._open_at_s, self._clock() + LET_GO_S)
             with suppress(Exception):  # whatever its close has to say, the line is not used any more
                 line.close()

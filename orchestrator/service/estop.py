@@ -26,6 +26,9 @@ Exit status 0: every charger was verified to stand by; 1: not every one; 2: used
 """
 DEFAULT_STATION = "station.yaml"
 Contactors = tuple[tuple[str, int, bool], ...]  #: chip, line, active low
+#: What systemd says to ExecStopPost= (systemd.exec, $SERVICE_RESULT) when its watchdog has killed the guardian: who
+#: still holds the ports is its controller, frozen as well, and is killed only afterwards.
+FROZEN = "watchdog"
 #: How long the proof of standby is waited for.
 VERIFY_S = 3.0
 
@@ -53,6 +56,8 @@ class Options:
                 self.socket, taking = word, ""
             else:
                 self.stations.append(word)
+        if os.environ.get("SERVICE_RESULT") == FROZEN:
+            self.leave_held = False
         if len(self.stations) + bool(self.ports) > 1:
             self.wrong = "name one station file, or ports"
         elif taking == "--socket" or (taking == "--port" and not self.ports):

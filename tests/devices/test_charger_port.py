@@ -1,6 +1,7 @@
 """A charger's port over a real pty, with a charger that shares nothing with the product, on good lines and bad."""
 
 import fcntl
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -11,7 +12,7 @@ import pytest
 
 from orchestrator.config.station import ChargerConfig, Limits
 from orchestrator.devices import line_quality
-from orchestrator.devices.charger import ChargerPort, Line
+from orchestrator.devices.charger import REOPEN_S, ChargerPort, Line
 from orchestrator.interlock import Grant
 from orchestrator.keys import Range
 from orchestrator.link.serial import SerialLine
@@ -483,11 +484,29 @@ def test_opening_is_tried_once_a_second(pty: Pty, charger: FakeCharger) -> None:
         bench.wait_online()
         pty.unplug()
         bench.wait_problem("unplugged")
-        lost_s = time.monotonic()
         opened = len(tried_s)
         wait_until(lambda: len(tried_s) > opened)
-    assert 0.9 < tried_s[1] - tried_s[0] < 1.5
-    assert 0.9 < tried_s[opened] - lost_s < 1.5
+    for one in (1, opened):
+        assert 0.9 < tried_s[one] - tried_s[one - 1] < 1.5
+
+
+def test_a_port_that_fails_after_a_while_is_opened_at_once_and_its_charger_stopped(
+    pty: Pty, charger: FakeCharger
+) -> None:
+    lines: list[SerialLine] = []
+
+    def open_line() -> Line:
+        lines.append(SerialLine.open(pty.path))
+        return lines[-1]
+
+    with running(pty.path, open_line=open_line) as bench:
+        bench.wait_online()
+        served_s = time.monotonic() + REOPEN_S
+        wait_until(lambda: time.monotonic() > served_s, what="a second of service")
+        stops, failed_s = charger.orders.count(REST_STOP), time.monotonic()
+        os.close(lines[-1].fileno())
+        wait_until(lambda: charger.orders.count(REST_STOP) > stops, what="a stop")
+        assert time.monotonic() - failed_s < 0.5 * REOPEN_S
 
 
 def test_a_port_that_someone_else_holds_is_taken_once_it_is_free(pty: Pty, charger: FakeCharger) -> None:

@@ -238,6 +238,12 @@ def test_a_service_that_is_frozen_as_a_whole_and_then_dead(station: Station) -> 
     service.start()
     charging(station, 1, 2)
     os.killpg(service.guardian, signal.SIGSTOP)
+    left = estop(str(service.file), "--leave-held", SERVICE_RESULT="success")
+    assert left.stdout.count("left alone: a service holds this port") == 4
+    assert plant.state(1)["operation"] == 1
+    by_systemd = estop(str(service.file), "--leave-held", SERVICE_RESULT="watchdog")
+    assert (by_systemd.returncode, by_systemd.stdout.count("standby verified")) == (0, 4)
+    assert not any(plant.state(bay)["operation"] for bay in (1, 2, 3, 4))
     frozen = estop(str(service.file))
     assert frozen.returncode == 0
     assert frozen.stdout.count("standby verified") == 4
