@@ -13,6 +13,7 @@ from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.interlock import Grant, grant
 from orchestrator.model import (
+    ENERGISED,
     STOP,
     BatteryLink,
     BatteryReading,
@@ -85,6 +86,7 @@ class BayRunner:
         self._memory = memory
         self._kept: Kept | None = None
         self._ending = ""
+        self._waits = ""  # why the next run has to wait for an operator
         self._offered: Bay | None = None  # with a policy that is not in force yet
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
@@ -101,9 +103,14 @@ class BayRunner:
         decision = self.decision
         return decision is not None and decision.state in VERIFIED and decision.command is None
 
-    def end(self, why: str) -> None:
-        """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it."""
+    def end(self, why: str, *, orderly: bool = True) -> None:
+        """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it.
+
+        Unless it is not `orderly` and ends a charge: that one waits for an operator, as after any other failure (G3).
+        """
         self._ending = f"the service ends: {why}"
+        if not orderly and self.decision is not None and self.decision.state in ENERGISED:
+            self._waits = f"the last run ended in mid-charge: {why}; start to go on"
 
     def offer(self, bay: Bay | None) -> str:
         """Take another policy over at the next standby; what will come of it. From any thread.
@@ -222,7 +229,7 @@ class BayRunner:
     def _keep(self) -> None:
         kept = Kept.of(self._memory)
         if self._ending and self._kept is not None:  # as it was before
-            kept = replace(kept, hold=self._kept.hold)
+            kept = replace(kept, hold=self._waits or self._kept.hold)
         if kept != self._kept:
             self._kept = kept
             self._journal.keep(self.name, kept)

@@ -153,7 +153,7 @@ class Supervisor:
     def _end(self) -> int:
         """Stop every bay, wait until each charger is verified, close everything."""
         for bay in self._bays:
-            bay.end(self._ending)
+            bay.end(self._ending, orderly=not self._lost)
         end_s = monotonic() + STOP_S
         for bay in self._bays:
             self._run(bay)

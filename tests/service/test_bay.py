@@ -115,6 +115,22 @@ def test_the_stop_at_the_end_is_no_operators(bench: Bench) -> None:
     assert session[1]["result"] == "the service ends: SIGTERM"
 
 
+def test_what_was_charging_when_the_guardian_died_waits_for_an_operator(bench: Bench) -> None:
+    bench.charging()
+    bench.bay.end("the guardian has died", orderly=False)
+    bench.step(10)
+    assert bench.bay.verified
+    hold = "the last run ended in mid-charge: the guardian has died; start to go on"
+    assert bench.journal._kept == {"bay-1": Kept(hold=hold)}
+
+
+def test_what_was_not_charging_when_the_guardian_died_waits_for_nobody(bench: Bench) -> None:
+    bench.until(State.QUALIFYING)
+    bench.bay.end("the guardian has died", orderly=False)
+    bench.step(10)
+    assert bench.journal._kept == {"bay-1": Kept()}
+
+
 def test_the_stop_at_the_end_does_not_undo_an_operators(bench: Bench) -> None:
     bench.charging()
     bench.ask(Request.STOP)
