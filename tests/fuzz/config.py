@@ -2,7 +2,6 @@
 
 import os
 import re
-import tempfile
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -10,12 +9,11 @@ from zlib import crc32
 
 from orchestrator.config import load, ports
 from orchestrator.config.reader import MAX_FINDINGS
-from orchestrator.config.yamltree import MAX_FINDINGS as MAX_YAML_FINDINGS
 from orchestrator.config.station import Station
+from orchestrator.config.yamltree import MAX_FINDINGS as MAX_YAML_FINDINGS
 from orchestrator.errors import ConfigError, Finding
-from tests.fuzz.target import Target
+from tests.fuzz.target import Target, kind_of_word, scratch
 
-TESTS = Path(__file__).resolve().parent.parent / "config"
 MAX_TEXT = 6000  #: characters of a finding: room for a path of 4096 bytes, and all keys of a record
 #: A token of our files: a comment, a text in quotes, a word or number, one character, an indented line's beginning.
 TOKEN = re.compile(rb"\n *(?:- )?|#[^\n]*|\"[^\"\n]*\"|'[^'\n]*'|[\w./-]+|.", re.DOTALL)
@@ -65,7 +63,7 @@ OPTIONAL = [
     b"\ntpdos: [{number: 1, objects: [0x6000]}]\n",
 ]  # fmt: skip
 
-DIRECTORY = Path(tempfile.mkdtemp(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+DIRECTORY = scratch()
 FILE = DIRECTORY / "file.yaml"
 LOADERS: tuple[Callable[[Path], object], ...] = (load.load_policy, load.load_map, load.load_station)
 for name, text in (("policy.yaml", POLICY), ("map.yaml", MAP)):
@@ -110,19 +108,11 @@ def _is_shown_well(finding: Finding, lines: list[bytes]) -> None:
         assert finding.column <= max(map(len, lines)) + 1, shown
 
 
-SHORT = 250  #: bytes of a broken file that is quick
-BROKEN = [path.read_bytes() for path in sorted((TESTS / "broken").glob("*.yaml"))]
-
-def kind(token: bytes) -> object:
-    """Words and texts are alike, blanks are alike, and each other character is like itself."""
-    return b"w" if re.match(rb"[\w\"'./+-]", token) else b" " if token.isspace() else token[:1]
-
-
 TARGET = Target(
     one,
     TOKEN.findall,
-    kind,
-    [STATION, POLICY, MAP, *(broken for broken in BROKEN if len(broken) <= SHORT)],
+    kind_of_word,
+    [STATION, POLICY, MAP],
     [
         *OPTIONAL,
         *(b"\n" + b" " * spaces for spaces in (0, 2, 4, 6)), b"\n  - ", b"\n- ", b"\n---\n", b"\n...\n", b"%YAML 1.1\n",
@@ -138,7 +128,7 @@ TARGET = Target(
         b"\xf0\x9f\x94\x8b", b"\xed\xa0\x80", b"\r\n", b"\r", b"\0",
     ],
     ["orchestrator/config/*"],
-    max_bytes=640,
+    max_bytes=800,
     limit_s=2.0,
     blind=0.1,  # most of these are no YAML at all
 )  # fmt: skip

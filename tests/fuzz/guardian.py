@@ -2,13 +2,11 @@
 
 import os
 import socket
-import tempfile
 from array import array
-from pathlib import Path
 
 from orchestrator.service.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
 from orchestrator.service.laststop import first_stop
-from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
+from tests.fuzz.target import Target, cut_records, kind_of_record, record, records, scratch
 
 #: What an event is: any message without and with a descriptor, a port's name with one, with three and without, a port
 #: that is given up, a heartbeat, the end.
@@ -16,7 +14,7 @@ RAW, RAW_FD, HOLD, HOLD_3, NAME, GIVE_UP, LIVE, END = range(8)
 BEGINS = {HOLD: PORT, HOLD_3: PORT, NAME: PORT, GIVE_UP: DROP, LIVE: BEAT, END: DONE, RAW: b"", RAW_FD: b""}
 DESCRIPTORS = {RAW_FD: 1, HOLD: 1, HOLD_3: 3}
 #: Names are taken for files of this directory, and none is there.
-DIRECTORY = tempfile.mkdtemp(prefix="fuzz-").encode() + b"/"
+DIRECTORY = bytes(scratch()) + b"/"
 NULL = os.open(os.devnull, os.O_RDWR)
 
 

@@ -1,17 +1,15 @@
 """The file of what outlives the process, after whatever a disk or a person has done to it."""
 
 import json
-import tempfile
-from pathlib import Path
 
 from orchestrator.core.faults import ROW
 from orchestrator.core.memory import Memory
 from orchestrator.service import control
 from orchestrator.service.kept import FILE, Kept, read_kept, write_kept
-from tests.fuzz.control import TOKEN, kind
-from tests.fuzz.target import Target
+from tests.fuzz.control import TOKEN
+from tests.fuzz.target import Target, kind_of_word, scratch
 
-DIRECTORY = Path(tempfile.mkdtemp(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+DIRECTORY = scratch()
 BAYS = ("bay-1", "bay-2")
 NOW_S = 50.0
 
@@ -46,7 +44,7 @@ _WHOLE = {
 TARGET = Target(
     one,
     TOKEN.findall,
-    kind,
+    kind_of_word,
     [json.dumps(_WHOLE).encode(), json.dumps(_WHOLE, indent=1).encode(), b'{"bay-1": {"running": false}}', b"{}", b""],
     [
         *(f'"{word}"'.encode() for word in (*BAYS, "running", "hold", "paused", "faults", "bmu_silent", "of the future")),
