@@ -26,3 +26,5 @@ rm -f requirements/*.txt
 lock runtime.txt pyproject.toml --build-deps-for=editable
 lock demo.txt pyproject.toml --build-deps-for=editable --extra=demo --constraint=requirements/runtime.txt
 lock dev.txt requirements/dev.in
+# No part of that row: what only some machines can install.
+lock fuzz.txt requirements/fuzz.in --constraint=requirements/dev.txt

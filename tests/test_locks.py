@@ -1,4 +1,4 @@
-"""The locked lists: exact, hashed, the same everywhere, and each a part of the next."""
+"""The locked lists: exact, hashed, the same everywhere, and each a part of the next, but for the fuzzer's own."""
 
 import re
 import tomllib
@@ -11,6 +11,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 LISTS = ("runtime", "demo", "dev")
+ALL = (*LISTS, "fuzz")
 
 #: What a locked list consists of. Options, addresses and paths do not match.
 LINE = re.compile(r"#.*|[a-z0-9-]+(\[[a-z0-9,-]+\])?==[0-9][0-9a-z.]* \\|    --hash=sha256:[0-9a-f]{64}( \\)?|")
@@ -34,13 +35,13 @@ def names(requirements: Iterable[str]) -> set[str]:
     return {re.split(r"[<>=~! ]", text)[0].lower() for text in requirements}
 
 
-@pytest.mark.parametrize("name", LISTS)
+@pytest.mark.parametrize("name", ALL)
 def test_a_list_has_versions_and_hashes_only(name: str) -> None:
     assert [line for line in lines(name) if not LINE.fullmatch(line)] == []
     assert [line for line in lines(name) if "/" in line] == []
 
 
-@pytest.mark.parametrize("name", LISTS)
+@pytest.mark.parametrize("name", ALL)
 def test_every_version_has_a_hash(name: str) -> None:
     text = lines(name)
     numbers = [number for number, line in enumerate(text) if "==" in line]
@@ -58,8 +59,9 @@ def test_the_lists_have_all_that_is_asked_for() -> None:
     built, project = asked["build-system"]["requires"], asked["project"]
     assert names(project["dependencies"]) | names(built) <= set(pins("runtime"))
     assert names(project["optional-dependencies"]["demo"]) <= set(pins("demo"))
-    tools = (ROOT / "requirements" / "dev.in").read_text(encoding="utf-8").splitlines()
-    assert names(line for line in tools if line[0] not in "#-") <= set(pins("dev"))
+    for tools in ("dev", "fuzz"):
+        lines_in = (ROOT / "requirements" / f"{tools}.in").read_text(encoding="utf-8").splitlines()
+        assert names(line for line in lines_in if line[0] not in "#-") <= set(pins(tools))
 
 
 def test_what_is_asked_for_with_an_extra_is_pinned_with_it() -> None:

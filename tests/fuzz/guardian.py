@@ -3,6 +3,7 @@
 import os
 import socket
 from array import array
+from pathlib import Path
 
 from orchestrator.service.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
 from orchestrator.service.laststop import first_stop
@@ -46,7 +47,7 @@ def _send(theirs: socket.socket, kind: int, content: bytes) -> None:
 
 
 def _descriptors() -> int:
-    return len(os.listdir("/proc/self/fd"))
+    return sum(1 for _ in Path("/proc/self/fd").iterdir())
 
 
 TARGET = Target(
@@ -58,9 +59,10 @@ TARGET = Target(
         record(NAME, b"ttyS2") + record(LIVE) * 3,
     ],
     [
-        record(LIVE), record(END), record(HOLD, b"ttyS1"), record(HOLD_3, b"ttyS1"), record(NAME, b"a\0b"), record(HOLD),
-        record(NAME, b"\xff\xfe"), record(GIVE_UP, b"ttyS1"), record(RAW), record(RAW, b"?"), record(RAW_FD), record(RAW_FD, b"B"),
-        record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"), record(NAME, b"x" * 31),
+        record(LIVE), record(END), record(HOLD, b"ttyS1"), record(HOLD_3, b"ttyS1"), record(NAME, b"a\0b"),
+        record(HOLD), record(NAME, b"\xff\xfe"), record(GIVE_UP, b"ttyS1"), record(RAW), record(RAW, b"?"),
+        record(RAW_FD), record(RAW_FD, b"B"), record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"),
+        record(NAME, b"x" * 31),
     ],
     ["orchestrator/service/guardian.py", "orchestrator/service/laststop.py"],
     max_bytes=128,

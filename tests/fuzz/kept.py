@@ -47,9 +47,9 @@ TARGET = Target(
     kind_of_word,
     [json.dumps(_WHOLE).encode(), json.dumps(_WHOLE, indent=1).encode(), b'{"bay-1": {"running": false}}', b"{}", b""],
     [
-        *(f'"{word}"'.encode() for word in (*BAYS, "running", "hold", "paused", "faults", "bmu_silent", "of the future")),
-        b"null", b"true", b"false", b"0", b"1", b"NaN", b'""', b'"\\ud800"', b'"\\u0000"', b"{", b"}", b"[", b"]", b", ", b": ",
-        b"[" * 1200, b'{"bay-1":' * 300, b"9" * 5000, b"\xff", b"\xef\xbb\xbf", b"\0",
+        *(f'"{word}"'.encode() for word in (*BAYS, "running", "hold", "paused", "faults", "bmu_silent", "of later")),
+        b"null", b"true", b"false", b"0", b"1", b"NaN", b'""', b'"\\ud800"', b'"\\u0000"', b"{", b"}", b"[", b"]",
+        b", ", b": ", b"[" * 1200, b'{"bay-1":' * 300, b"9" * 5000, b"\xff", b"\xef\xbb\xbf", b"\0",
     ],
     ["orchestrator/service/kept.py"],
     max_bytes=6000,

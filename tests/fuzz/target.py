@@ -69,7 +69,7 @@ def kind_of_record(piece: bytes) -> object:
 
 
 def kind_of_word(token: bytes) -> object:
-    """Numbers are alike, names of files are alike, other words and texts are, and each other character is like itself."""
+    """Numbers are alike, names of files are, other words and texts are; each other character is like itself."""
     if not re.match(rb"[\w\"'./+-]", token):
         return token[:1]
     if b"/" in token or b".yaml" in token:
