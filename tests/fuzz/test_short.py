@@ -27,6 +27,7 @@ from orchestrator.service.kept import Kept
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz import __main__ as runner
 from tests.fuzz.__main__ import NAMES, main, the_target, unguided
+from tests.fuzz.config import STATION
 from tests.fuzz.target import Target, changed
 from tests.fuzz.watch import MAX_GROWTH_MIB, MIB, GrowthError, SlowError, Watch
 
@@ -71,6 +72,7 @@ def test_nothing_is_found(name: str) -> None:
 ONCE = (
     ("config", b'%YAML 1.' + b"1" * 5000 + b"\n---\npolicy: p\n"),
     ("config", b'policy: "\\UFFFFFFFF"\n'),
+    ("config", STATION.replace(b"/dev/x", b"/dev/my port")),
     ("control", b'{"verb": "start", "bays": ["bay-1", "bay-1"]}\n'),
     ("control", b'{"verb": "stop", "bays": [null]}\n'),
     ("kept", b"[" * 5000),
