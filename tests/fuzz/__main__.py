@@ -6,6 +6,7 @@ again; a directory stands for the files in it.
 """
 
 import argparse
+import os
 import re
 import signal
 import subprocess
@@ -18,10 +19,11 @@ from importlib import import_module
 from pathlib import Path
 from random import Random
 from resource import RUSAGE_SELF, getrusage
+from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import Any
 
-from tests.fuzz.target import Target, changed
+from tests.fuzz.target import MEMORY, Target, changed
 from tests.fuzz.watch import Watch
 from tests.proof.report import say
 
@@ -132,13 +134,15 @@ def long_form(name: str, runs: int, guided_runs: int, minutes: float, seed: int)
 
 def _part(name: str, how: str, runs: int, minutes: float, seed: int) -> int:
     log, began_s = WORK / name / f"{how}.log", time.monotonic()
-    with log.open("wb") as file:
+    # libFuzzer ends its process at once, so what the targets write goes with this directory.
+    with log.open("wb") as file, TemporaryDirectory(prefix="fuzz-", dir=MEMORY) as directory:
         command = [sys.executable, "-m", "tests.fuzz", name, "--how", how, f"--runs={runs}"]
         command += [f"--minutes={minutes}", f"--seed={seed}"]
-        status = subprocess.run(command, cwd=ROOT, stdout=file, stderr=file, check=False).returncode
+        environment = os.environ | {"TMPDIR": directory}
+        done = subprocess.run(command, cwd=ROOT, env=environment, stdout=file, stderr=file, check=False)
     took_s = time.monotonic() - began_s
     said = log.read_text(encoding="utf-8", errors="replace")
-    if status:
+    if done.returncode:
         say("\n".join(said.splitlines()[-40:]))
         say(f"{name}, {how}: FOUND something; all of it is in {log}")
         return 1

@@ -18,13 +18,14 @@ TRIES = 4  #: to find a piece that has others of its kind: most characters have 
 
 Cut = Callable[[bytes], list[bytes]]
 
-MEMORY = Path("/dev/shm")
+#: Where files are in memory, if there is such a place.
+MEMORY = "/dev/shm" if Path("/dev/shm").is_dir() else None
 _SCRATCH: list[tempfile.TemporaryDirectory[str]] = []
 
 
 def scratch() -> Path:
-    """A directory, in memory where there is such a place, that goes with the process."""
-    _SCRATCH.append(tempfile.TemporaryDirectory(prefix="fuzz-", dir=MEMORY if MEMORY.is_dir() else None))
+    """A directory that goes with the process."""
+    _SCRATCH.append(tempfile.TemporaryDirectory(prefix="fuzz-"))
     return Path(_SCRATCH[-1].name)
 
 
