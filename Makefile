@@ -3,7 +3,7 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-guest check format campaign soak bench lock clean
+.PHONY: help demo test test-guest check format campaign fuzz soak bench lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
@@ -40,6 +40,9 @@ campaign: .venv/dev.stamp  ## every proof in its long form, in minutes: state ×
 soak: .venv/dev.stamp  ## 30 simulated days and a real hour on lines that lose frames; ARGS='--days 2 --minutes 5' less
 	$(BIN)/python -m tests.proof.soak $(ARGS)
 
+fuzz: .venv/fuzz.stamp  ## hours of hostile bytes at every door; ARGS='charger --runs 100000' chooses
+	$(BIN)/python -m tests.fuzz $(ARGS)
+
 lock:  ## choose the dependencies' versions anew: requirements/*.txt
 	PYTHON='$(PYTHON)' sh requirements/lock.sh
 
@@ -47,6 +50,7 @@ clean:  ## remove everything that the other targets made
 	rm -rf .venv build dist *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.venv/demo.stamp .venv/dev.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
+.venv/fuzz.stamp: .venv/dev.stamp
+.venv/demo.stamp .venv/dev.stamp .venv/fuzz.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
 	PYTHON='$(PYTHON)' sh requirements/install.sh $*
 	touch $@

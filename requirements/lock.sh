@@ -28,4 +28,6 @@ for extra in demo gpio workbench; do
     lock "$extra.txt" pyproject.toml --build-deps-for=editable --extra="$extra" --constraint=requirements/runtime.txt
 done
 lock dev.txt requirements/dev.in
+# No part of that row: what only its own command needs.
 lock reference.txt requirements/reference.in --constraint=requirements/dev.txt
+lock fuzz.txt requirements/fuzz.in --constraint=requirements/dev.txt

@@ -1,4 +1,4 @@
-"""The locked lists: exact, hashed, the same everywhere, and each a part of the next."""
+"""The locked lists: exact, hashed, the same everywhere, and each a part of the next, but for the fuzzer's own."""
 
 import re
 import tomllib
@@ -10,7 +10,11 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTS = ("runtime", "demo", "gpio", "dev")
+#: runtime is a part of each of the others, and all are a part of dev.
+LISTS = ("runtime", "demo", "gpio", "workbench", "dev")
+EXTRAS = ("demo", "gpio", "workbench")
+OWN = ("fuzz", "mutation", "reference")  #: what only its own command needs
+ALL = (*LISTS, *OWN)
 
 #: What a locked list consists of. Options, addresses and paths do not match.
 LINE = re.compile(r"#.*|[a-z0-9-]+(\[[a-z0-9,-]+\])?==[0-9][0-9a-z.]* \\|    --hash=sha256:[0-9a-f]{64}( \\)?|")
@@ -34,13 +38,13 @@ def names(requirements: Iterable[str]) -> set[str]:
     return {re.split(r"[<>=~! ]", text)[0].lower() for text in requirements}
 
 
-@pytest.mark.parametrize("name", LISTS)
+@pytest.mark.parametrize("name", ALL)
 def test_a_list_has_versions_and_hashes_only(name: str) -> None:
     assert [line for line in lines(name) if not LINE.fullmatch(line)] == []
     assert [line for line in lines(name) if "/" in line] == []
 
 
-@pytest.mark.parametrize("name", LISTS)
+@pytest.mark.parametrize("name", ALL)
 def test_every_version_has_a_hash(name: str) -> None:
     text = lines(name)
     numbers = [number for number, line in enumerate(text) if "==" in line]
@@ -49,19 +53,19 @@ def test_every_version_has_a_hash(name: str) -> None:
 
 
 def test_each_list_is_a_part_of_the_next() -> None:
-    runtime, demo, gpio, dev = (pins(name).items() for name in LISTS)
-    assert runtime <= demo <= dev
-    assert runtime <= gpio <= dev
+    runtime, *extras, dev = (pins(name).items() for name in LISTS)
+    assert all(runtime <= extra <= dev for extra in extras)
 
 
 def test_the_lists_have_all_that_is_asked_for() -> None:
     asked = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     built, project = asked["build-system"]["requires"], asked["project"]
     assert names(project["dependencies"]) | names(built) <= set(pins("runtime"))
-    for extra in ("demo", "gpio"):
+    for extra in EXTRAS:
         assert names(project["optional-dependencies"][extra]) <= set(pins(extra))
-    tools = (ROOT / "requirements" / "dev.in").read_text(encoding="utf-8").splitlines()
-    assert names(line for line in tools if line[0] not in "#-") <= set(pins("dev"))
+    for tools in ("dev", *OWN):
+        lines_in = (ROOT / "requirements" / f"{tools}.in").read_text(encoding="utf-8").splitlines()
+        assert names(line for line in lines_in if line[0] not in "#-") <= set(pins(tools))
 
 
 def test_what_is_asked_for_with_an_extra_is_pinned_with_it() -> None:

@@ -6,6 +6,8 @@ again; a directory stands for the files in it.
 """
 
 import argparse
+import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,20 +19,25 @@ from importlib import import_module
 from pathlib import Path
 from random import Random
 from resource import RUSAGE_SELF, getrusage
+from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import Any
 
-from tests.fuzz.target import Target, changed
+from tests.fuzz.target import MEMORY, Target, changed
 from tests.fuzz.watch import Watch
 from tests.proof.report import say
 
-NAMES = ("charger", "bmu", "config", "control", "kept", "guardian")
+NAMES = ("charger", "bmu", "config", "control", "clients", "kept", "guardian")
 ROOT = Path(__file__).resolve().parent.parent.parent
 WORK = ROOT / "build" / "fuzz"
-#: After this an input hangs, whatever the machine does besides.
-TIMEOUT_S = 20
+#: After this an input hangs, even on a machine that stood still. What computes for ever is noticed sooner (`Watch`).
+TIMEOUT_S = 600
 #: MiB that the whole process may have; Python, coverage and corpus are in it.
 RSS_MIB = 512
+
+
+#: What both parts say at their end, in libFuzzer's words or ours.
+INPUTS, PEAK_MIB = re.compile(r"(?:units|inputs): +(\d+)"), re.compile(r"peak(?:_rss_mb)?: +(\d+)")
 
 
 def the_target(name: str) -> Target:
@@ -41,7 +48,7 @@ def the_target(name: str) -> Target:
 # --- in a process of its own: one of these ---------------------------------------------------------------------------
 
 
-def guided(name: str, runs: int, seed: int) -> None:
+def guided(name: str, runs: int, minutes: float, seed: int) -> None:
     """Inputs by atheris, each one that reaches new code is kept. libFuzzer ends the process."""
     atheris: Any = import_module("atheris")  # only `make fuzz` installs it
     with atheris.instrument_imports(include=["orchestrator"]):
@@ -54,19 +61,21 @@ def guided(name: str, runs: int, seed: int) -> None:
         return changed(target, data, random)[:max_size]
 
     options = [
-        f"-runs={runs}", f"-seed={seed}", f"-max_len={target.max_bytes}", f"-timeout={TIMEOUT_S}",
-        f"-rss_limit_mb={RSS_MIB}", f"-artifact_prefix={WORK / name}/", "-print_final_stats=1", str(corpus(name)),
+        f"-runs={runs}", f"-max_total_time={minutes * 60:.0f}", f"-seed={seed}", f"-max_len={target.max_bytes}",
+        f"-timeout={TIMEOUT_S}", f"-rss_limit_mb={RSS_MIB}", f"-artifact_prefix={WORK / name}/",
+        "-print_final_stats=1", str(corpus(name)),
     ]  # fmt: skip
     atheris.Setup([name, *options], Watch(target).one, custom_mutator=mutated)
     atheris.Fuzz()
 
 
-def unguided(name: str, runs: int, seed: int) -> int:
+def unguided(name: str, runs: int, minutes: float, seed: int) -> int:
     """Changed inputs of the corpus, at the product's own speed."""
     target, random = the_target(name), Random(seed)
     watch, known = Watch(target), [path.read_bytes() for path in sorted(corpus(name).iterdir())]
-    signal.signal(signal.SIGALRM, _hangs)
-    for _ in range(runs):
+    signal.signal(signal.SIGALRM, _waits)
+    end_s = time.monotonic() + 60 * minutes
+    while watch.inputs < runs and time.monotonic() < end_s:
         data = changed(target, random.choice(known), random)
         signal.alarm(TIMEOUT_S)
         try:
@@ -76,12 +85,13 @@ def unguided(name: str, runs: int, seed: int) -> int:
             found.write_bytes(data)
             say(f"{traceback.format_exc()}in {found}")
             return 1
-    signal.alarm(0)
-    say(f"peak {getrusage(RUSAGE_SELF).ru_maxrss // 1024} MiB")
+        finally:
+            signal.alarm(0)
+    say(f"inputs: {watch.inputs}\npeak: {getrusage(RUSAGE_SELF).ru_maxrss // 1024}")
     return 0
 
 
-def _hangs(_number: int, _frame: FrameType | None) -> None:
+def _waits(_number: int, _frame: FrameType | None) -> None:
     raise TimeoutError(f"no end within {TIMEOUT_S} s")
 
 
@@ -107,34 +117,38 @@ def corpus(name: str) -> Path:
     return WORK / name / "corpus"
 
 
-def long_form(name: str, runs: int, guided_runs: int, seed: int) -> int:
-    """Both halves for one target, and what its inputs have reached; 1 if something was found."""
+def long_form(name: str, runs: int, guided_runs: int, minutes: float, seed: int) -> int:
+    """Both parts for one target, and what its inputs have reached; 1 if something was found."""
     corpus(name).mkdir(parents=True, exist_ok=True)
     for number, data in enumerate(the_target(name).seeds):
         (corpus(name) / f"seed-{number:03}").write_bytes(data)
     led = min(runs, guided_runs)
-    status = _part(name, "guided", led, seed) or _part(name, "unguided", runs - led, seed)
+    status = 0
+    for how, number in (("guided", led), ("unguided", runs - led)):
+        if number and not status:
+            status = _part(name, how, number, minutes, seed)
     say(f"{name}: {len(list(corpus(name).iterdir()))} inputs kept; together they reach:")
     _covered(name)
     return status
 
 
-def _part(name: str, how: str, runs: int, seed: int) -> int:
+def _part(name: str, how: str, runs: int, minutes: float, seed: int) -> int:
     log, began_s = WORK / name / f"{how}.log", time.monotonic()
-    with log.open("wb") as file:
-        command = [sys.executable, "-m", "tests.fuzz", name, "--how", how, "--runs", str(runs), "--seed", str(seed)]
-        status = subprocess.run(command, cwd=ROOT, stdout=file, stderr=file, check=False).returncode
+    # libFuzzer ends its process at once, so what the targets write goes with this directory.
+    with log.open("wb") as file, TemporaryDirectory(prefix="fuzz-", dir=MEMORY) as directory:
+        command = [sys.executable, "-m", "tests.fuzz", name, "--how", how, f"--runs={runs}"]
+        command += [f"--minutes={minutes}", f"--seed={seed}"]
+        environment = os.environ | {"TMPDIR": directory}
+        done = subprocess.run(command, cwd=ROOT, env=environment, stdout=file, stderr=file, check=False)
     took_s = time.monotonic() - began_s
-    said = log.read_text(encoding="utf-8", errors="replace").splitlines()
-    peak = next((line for line in reversed(said) if "peak" in line), "").replace("stat::peak_rss_mb:", "peak")
-    if status:
-        say("\n".join(said[-40:]))
+    said = log.read_text(encoding="utf-8", errors="replace")
+    if done.returncode:
+        say("\n".join(said.splitlines()[-40:]))
         say(f"{name}, {how}: FOUND something; all of it is in {log}")
-    else:
-        say(
-            f"{name}, {how}: {runs:,} inputs in {took_s:,.0f} s, {runs / took_s:,.0f} a second, {' '.join(peak.split())}"
-        )
-    return 1 if status else 0
+        return 1
+    inputs, peak_mib = (int(pattern.findall(said)[-1]) for pattern in (INPUTS, PEAK_MIB))
+    say(f"{name}, {how}: {inputs:,} inputs in {took_s:,.0f} s, {inputs / took_s:,.0f} a second, peak {peak_mib} MiB")
+    return 0
 
 
 def _covered(name: str) -> None:
@@ -155,18 +169,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("target", nargs="?", choices=(*NAMES, "all"), default="all")
     parser.add_argument("file", nargs="*", type=Path, help="give these to the target again")
     parser.add_argument("--runs", type=int, default=1_000_000, help="inputs for each target (default: %(default)s)")
-    parser.add_argument("--guided", type=int, default=50_000, help="of these by atheris (default: %(default)s)")
+    parser.add_argument("--guided", type=int, default=20_000, help="of these by atheris (default: %(default)s)")
+    parser.add_argument("--minutes", type=float, default=60.0, help="of each part at most (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of chance (default: %(default)s)")
     parser.add_argument("--how", choices=("guided", "unguided"), help=argparse.SUPPRESS)
     arguments = parser.parse_args(argv)
     if arguments.file:
         return replay(arguments.target, arguments.file)
     if arguments.how == "guided":
-        guided(arguments.target, arguments.runs, arguments.seed)
+        guided(arguments.target, arguments.runs, arguments.minutes, arguments.seed)
     if arguments.how == "unguided":
-        return unguided(arguments.target, arguments.runs, arguments.seed)
+        return unguided(arguments.target, arguments.runs, arguments.minutes, arguments.seed)
     chosen = NAMES if arguments.target == "all" else (arguments.target,)
-    return max(long_form(name, arguments.runs, arguments.guided, arguments.seed) for name in chosen)
+    options = (arguments.runs, arguments.guided, arguments.minutes, arguments.seed)
+    return max(long_form(name, *options) for name in chosen)
 
 
 if __name__ == "__main__":

@@ -12,8 +12,8 @@ from tests.fuzz.target import Target, cut_records, kind_of_record, record, recor
 from tests.protocol.reference import frames_in, good_frame_at
 from tests.protocol.vectors import CHARGER
 
-#: What an event is: bytes as they are, the same with all that makes a frame around them, a question, the end of its time,
-#: a status reply, an error frame, an answer to the emergency stop's question, and a frame for a request of any kinds.
+#: What an event is: bytes as they are, the same with all that makes a frame around them, a question, the end of its
+#: time, a status reply, an error frame, an answer to the emergency stop's question, and one to a request of any kinds.
 HEAR, FRAMED, ASK, GIVE_UP, STATUS, ERROR, STANDBY, KINDS = range(8)
 HEADS = {STATUS: b"\x03\x90", ERROR: b"\x1f", STANDBY: b"\x03\x90", KINDS: b"\x03\x90", FRAMED: b"", HEAR: b""}
 POLL_S = 0.2
@@ -131,17 +131,19 @@ def _story(wire: bytes) -> bytes:
 _VALUES = bytes.fromhex("1393 0907 0001 0001 0002 0004 0000 0001")
 
 TARGET = Target(
-    one,
-    cut_records,
-    kind_of_record,
-    [*(_story(vector.wire) for vector in CHARGER), record(ASK) + record(STATUS, _VALUES), record(STANDBY) + record(ERROR)],
+    one, cut_records, kind_of_record,
+    [
+        *(_story(vector.wire) for vector in CHARGER), record(ASK) + record(STATUS, _VALUES),
+        record(STANDBY) + record(ERROR),
+    ],
     [
         record(ASK), record(GIVE_UP), record(STATUS, _VALUES), record(STATUS, b"\xff" * 20), record(STANDBY),
-        record(STANDBY, b"\0\x32"), record(STANDBY, b"\0\x33"), record(STANDBY, b"\0\0\0\0\0\1"), record(ERROR, b"\x0f"),
-        record(FRAMED, b"\x03\x90" + bytes(12)), record(FRAMED, b"\x02\x90\x01\x01"), record(FRAMED, b"\xaf\xfa\xaf\xa0"),
-        record(HEAR, b"\xaf"), record(HEAR, b"\xaf\xfa"), record(HEAR, b"\xaf\xfa\x90"), record(HEAR, b"\xaf\xfa\x90\x23"),
-        record(HEAR, b"\xaf\xfa\x90\x03"), record(HEAR, b"\xaf\xfa\x90\x24"), record(HEAR, b"\xaf\xa0"),
-        record(HEAR, b"\xaf\xaf\xfa"), record(HEAR, bytes(31)), record(KINDS, b"\xff\xff" + _VALUES),
+        record(STANDBY, b"\0\x32"), record(STANDBY, b"\0\x33"), record(STANDBY, b"\0\0\0\0\0\1"),
+        record(ERROR, b"\x0f"), record(FRAMED, b"\x03\x90" + bytes(12)), record(FRAMED, b"\x02\x90\x01\x01"),
+        record(FRAMED, b"\xaf\xfa\xaf\xa0"), record(HEAR, b"\xaf"), record(HEAR, b"\xaf\xfa"),
+        record(HEAR, b"\xaf\xfa\x90"), record(HEAR, b"\xaf\xfa\x90\x23"), record(HEAR, b"\xaf\xfa\x90\x03"),
+        record(HEAR, b"\xaf\xfa\x90\x24"), record(HEAR, b"\xaf\xa0"), record(HEAR, b"\xaf\xaf\xfa"),
+        record(HEAR, bytes(31)), record(KINDS, b"\xff\xff" + _VALUES),
     ],
     ["orchestrator/protocol/frame.py", "orchestrator/protocol/charger.py", "orchestrator/protocol/standby.py",
      "orchestrator/devices/dialogue.py"],

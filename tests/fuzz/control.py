@@ -3,9 +3,7 @@
 import json
 import re
 import socket
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from time import monotonic
 from typing import Any
 
@@ -14,7 +12,7 @@ from orchestrator.model import Request
 from orchestrator.service import control
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.supervisor import Supervisor
-from tests.fuzz.target import Target
+from tests.fuzz.target import Target, kind_of_word, scratch
 
 #: Of an answer: two bays' status, or an error with a name of as many bytes as a request may have, escaped.
 MAX_ANSWER = 32 * 1024
@@ -49,7 +47,7 @@ class Loop:
 
 def _service() -> tuple[Supervisor, Loop]:
     """A service whose threads do not run: its devices are silent, and its answers are its own."""
-    directory = Path(tempfile.mkdtemp(prefix="fuzz-"))
+    directory = scratch()
     bays = "\n  - ".join(BAY % (name, name, 16 + number) for number, name in enumerate(BAYS))
     (directory / "station.yaml").write_text(STATION.replace("&", bays), encoding="utf-8")
     ours, _theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -77,7 +75,7 @@ def one(data: bytes) -> None:
     said: dict[str, Any] = json.loads(line)
     assert said["ok"] in (True, False)
     if said["ok"]:
-        _is_what_was_asked(control.parse_request(data), said)
+        _is_what_was_asked(control.parse_request(data[: control.MAX_REQUEST]), said)
     else:
         assert said["error"] and not said["error"].startswith("internal"), said["error"]
     for bay in SUPERVISOR._bays:
@@ -101,25 +99,20 @@ TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|[\w.+-]+|\s+|.', re.DOTALL)
 VERBS = ("status", *Request)
 
 
-def kind(token: bytes) -> object:
-    """Words and texts are alike, blanks are alike, and each other character is like itself."""
-    return b"w" if re.match(rb"[\w\"'./+-]", token) else b" " if token.isspace() else token[:1]
-
-
 TARGET = Target(
     one,
     TOKEN.findall,
-    kind,
+    kind_of_word,
     [
         *(json.dumps({"verb": verb, "bays": ["bay-1"]}).encode() + b"\n" for verb in VERBS),
         *(json.dumps({"verb": verb, "bay": "bay-2"}).encode() + b"\n" for verb in VERBS),
         b'{"verb": "stop"}\n', b"{}\n", b"[]\n", b'{"verb": "status", "bay": null}\n{"verb": "stop"}\n',
     ],
     [
-        *(f'"{word}"'.encode() for word in ("verb", "bay", "bays", *BAYS, *VERBS)), b"null", b"true", b"NaN", b"-Infinity",
-        b"1e999", b"-0", b"9" * 300, b'"\\ud800"', b'"\\u0000"', b'"\\n"', b'"\xf0\x9f\x94\x8b"', b'""', b"\n", b", ", b": ",
-        b"{", b"}", b"[", b"]", b"[" * 1200, b"]" * 1200, b'{"a":' * 300, b"\xff", b"\xef\xbb\xbf", b"\0", b" " * 4096, b'"bay-1", ',
-        b'"' + b"\\u0001" * 600 + b'"', b"\\", b'"',
+        *(f'"{word}"'.encode() for word in ("verb", "bay", "bays", *BAYS, *VERBS)), b"null", b"true", b"NaN",
+        b"-Infinity", b"1e999", b"-0", b"9" * 300, b'"\\ud800"', b'"\\u0000"', b'"\\n"', b'"\xf0\x9f\x94\x8b"', b'""',
+        b"\n", b", ", b": ", b"{", b"}", b"[", b"]", b"[" * 1200, b"]" * 1200, b'{"a":' * 300, b"\xff", b"\xef\xbb\xbf",
+        b"\0", b" " * 4096, b'"bay-1", ', b'"' + b"\\u0001" * 600 + b'"', b"\\", b'"',
     ],
     ["orchestrator/service/control.py", "orchestrator/service/supervisor.py", "orchestrator/service/status.py"],
     max_bytes=control.MAX_REQUEST + 64,

@@ -2,12 +2,12 @@
 
 import os
 import socket
-import tempfile
 from array import array
+from pathlib import Path
 
 from orchestrator.service.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
 from orchestrator.service.laststop import first_stop
-from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
+from tests.fuzz.target import Target, cut_records, kind_of_record, record, records, scratch
 
 #: What an event is: any message without and with a descriptor, a port's name with one, with three and without, a port
 #: that is given up, a heartbeat, the end.
@@ -15,7 +15,7 @@ RAW, RAW_FD, HOLD, HOLD_3, NAME, GIVE_UP, LIVE, END = range(8)
 BEGINS = {HOLD: PORT, HOLD_3: PORT, NAME: PORT, GIVE_UP: DROP, LIVE: BEAT, END: DONE, RAW: b"", RAW_FD: b""}
 DESCRIPTORS = {RAW_FD: 1, HOLD: 1, HOLD_3: 3}
 #: Names are taken for files of this directory, and none is there.
-DIRECTORY = tempfile.mkdtemp(prefix="fuzz-").encode() + b"/"
+DIRECTORY = bytes(scratch()) + b"/"
 NULL = os.open(os.devnull, os.O_RDWR)
 
 
@@ -47,7 +47,7 @@ def _send(theirs: socket.socket, kind: int, content: bytes) -> None:
 
 
 def _descriptors() -> int:
-    return len(os.listdir("/proc/self/fd"))
+    return sum(1 for _ in Path("/proc/self/fd").iterdir())
 
 
 TARGET = Target(
@@ -59,9 +59,10 @@ TARGET = Target(
         record(NAME, b"ttyS2") + record(LIVE) * 3,
     ],
     [
-        record(LIVE), record(END), record(HOLD, b"ttyS1"), record(HOLD_3, b"ttyS1"), record(NAME, b"a\0b"), record(HOLD),
-        record(NAME, b"\xff\xfe"), record(GIVE_UP, b"ttyS1"), record(RAW), record(RAW, b"?"), record(RAW_FD), record(RAW_FD, b"B"),
-        record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"), record(NAME, b"x" * 31),
+        record(LIVE), record(END), record(HOLD, b"ttyS1"), record(HOLD_3, b"ttyS1"), record(NAME, b"a\0b"),
+        record(HOLD), record(NAME, b"\xff\xfe"), record(GIVE_UP, b"ttyS1"), record(RAW), record(RAW, b"?"),
+        record(RAW_FD), record(RAW_FD, b"B"), record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"),
+        record(NAME, b"x" * 31),
     ],
     ["orchestrator/service/guardian.py", "orchestrator/service/laststop.py"],
     max_bytes=128,

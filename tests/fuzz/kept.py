@@ -1,17 +1,15 @@
 """The file of what outlives the process, after whatever a disk or a person has done to it."""
 
 import json
-import tempfile
-from pathlib import Path
 
 from orchestrator.core.faults import ROW
 from orchestrator.core.memory import Memory
 from orchestrator.service import control
 from orchestrator.service.kept import FILE, Kept, read_kept, write_kept
-from tests.fuzz.control import TOKEN, kind
-from tests.fuzz.target import Target
+from tests.fuzz.control import TOKEN
+from tests.fuzz.target import Target, kind_of_word, scratch
 
-DIRECTORY = Path(tempfile.mkdtemp(prefix="fuzz-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+DIRECTORY = scratch()
 BAYS = ("bay-1", "bay-2")
 NOW_S = 50.0
 
@@ -46,12 +44,12 @@ _WHOLE = {
 TARGET = Target(
     one,
     TOKEN.findall,
-    kind,
+    kind_of_word,
     [json.dumps(_WHOLE).encode(), json.dumps(_WHOLE, indent=1).encode(), b'{"bay-1": {"running": false}}', b"{}", b""],
     [
-        *(f'"{word}"'.encode() for word in (*BAYS, "running", "hold", "paused", "faults", "bmu_silent", "of the future")),
-        b"null", b"true", b"false", b"0", b"1", b"NaN", b'""', b'"\\ud800"', b'"\\u0000"', b"{", b"}", b"[", b"]", b", ", b": ",
-        b"[" * 1200, b'{"bay-1":' * 300, b"9" * 5000, b"\xff", b"\xef\xbb\xbf", b"\0",
+        *(f'"{word}"'.encode() for word in (*BAYS, "running", "hold", "paused", "faults", "bmu_silent", "of later")),
+        b"null", b"true", b"false", b"0", b"1", b"NaN", b'""', b'"\\ud800"', b'"\\u0000"', b"{", b"}", b"[", b"]",
+        b", ", b": ", b"[" * 1200, b'{"bay-1":' * 300, b"9" * 5000, b"\xff", b"\xef\xbb\xbf", b"\0",
     ],
     ["orchestrator/service/kept.py"],
     max_bytes=6000,

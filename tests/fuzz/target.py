@@ -4,15 +4,29 @@ An input is bytes, whatever the target makes of them, so that a crash is a file.
 `make test` and from atheris, which looks at the coverage, in `make fuzz`.
 """
 
+import re
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from random import Random
 
 #: Of all changes, the share that puts one piece in the place of another of its kind: what is changed stays well-formed.
-ALIKE = 0.6
+ALIKE = 0.75
+TRIES = 4  #: to find a piece that has others of its kind: most characters have none
 
 Cut = Callable[[bytes], list[bytes]]
+
+#: Where files are in memory, if there is such a place.
+MEMORY = "/dev/shm" if Path("/dev/shm").is_dir() else None
+_SCRATCH: list[tempfile.TemporaryDirectory[str]] = []
+
+
+def scratch() -> Path:
+    """A directory that goes with the process."""
+    _SCRATCH.append(tempfile.TemporaryDirectory(prefix="fuzz-"))
+    return Path(_SCRATCH[-1].name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +69,15 @@ def kind_of_record(piece: bytes) -> object:
     return piece[:1] and piece[0] >> 5
 
 
+def kind_of_word(token: bytes) -> object:
+    """Numbers are alike, names of files are, other words and texts are; each other character is like itself."""
+    if not re.match(rb"[\w\"'./+-]", token):
+        return token[:1]
+    if b"/" in token or b".yaml" in token:
+        return b"/"
+    return b"0" if re.match(rb"[-+.]?\d", token) else b"w"
+
+
 def changed(target: Target, data: bytes, random: Random) -> bytes:
     """The input with some of its pieces changed."""
     pieces = target.cut(data) or [b""]
@@ -64,11 +87,10 @@ def changed(target: Target, data: bytes, random: Random) -> bytes:
 
 
 def _change(target: Target, pieces: list[bytes], random: Random) -> None:
-    at = random.randrange(len(pieces))
-    alike = _by_kind(target).get(target.kind(pieces[at]))
-    if alike and random.random() < ALIKE:
-        pieces[at] = random.choice(alike)
+    if random.random() < ALIKE:
+        _exchange(target, pieces, random)
         return
+    at = random.randrange(len(pieces))
     end = min(len(pieces), at + random.choice((1, 1, 1, 2, 5)))
     other = _cut(target.cut, random.choice(target.seeds))
     begin = random.randrange(len(other) + 1)
@@ -81,6 +103,14 @@ def _change(target: Target, pieces: list[bytes], random: Random) -> None:
         other[begin : begin + random.choice((1, 1, 3, 8))],
         [*pieces[at:end], *random.sample(pieces, min(3, len(pieces)))],
     )) or [b""]  # fmt: skip
+
+
+def _exchange(target: Target, pieces: list[bytes], random: Random) -> None:
+    for at in random.choices(range(len(pieces)), k=TRIES):
+        alike = _by_kind(target).get(target.kind(pieces[at]), ())
+        if len(alike) > 1:
+            pieces[at] = random.choice(alike)
+            return
 
 
 @cache
