@@ -3,7 +3,7 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format bench lock clean
+.PHONY: help demo test check format bench mutation lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
@@ -31,13 +31,16 @@ format: .venv/dev.stamp  ## rewrite the files as `make check` wants them
 bench: .venv/demo.stamp  ## measure reaction times, memory and CPU beside a naive controller
 	$(BIN)/python -m benchmarks $(ARGS)
 
+mutation: .venv/mutation.stamp  ## see that the tests notice every small break; ARGS='orchestrator.protocol.*' chooses
+	$(BIN)/python -m tests.mutation $(ARGS)
+
 lock:  ## choose the dependencies' versions anew: requirements/*.txt
 	PYTHON='$(PYTHON)' sh requirements/lock.sh
 
 clean:  ## remove everything that the other targets made
-	rm -rf .venv build dist *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv build dist mutants *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.venv/demo.stamp .venv/dev.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
+.venv/demo.stamp .venv/dev.stamp .venv/mutation.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
 	PYTHON='$(PYTHON)' sh requirements/install.sh $*
 	touch $@

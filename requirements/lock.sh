@@ -26,3 +26,4 @@ rm -f requirements/*.txt
 lock runtime.txt pyproject.toml --build-deps-for=editable
 lock demo.txt pyproject.toml --build-deps-for=editable --extra=demo --constraint=requirements/runtime.txt
 lock dev.txt requirements/dev.in
+lock mutation.txt requirements/mutation.in

@@ -10,7 +10,7 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTS = ("runtime", "demo", "dev")
+LISTS = ("runtime", "demo", "dev", "mutation")
 
 #: What a locked list consists of. Options, addresses and paths do not match.
 LINE = re.compile(r"#.*|[a-z0-9-]+(\[[a-z0-9,-]+\])?==[0-9][0-9a-z.]* \\|    --hash=sha256:[0-9a-f]{64}( \\)?|")
@@ -49,8 +49,8 @@ def test_every_version_has_a_hash(name: str) -> None:
 
 
 def test_each_list_is_a_part_of_the_next() -> None:
-    runtime, demo, dev = (pins(name).items() for name in LISTS)
-    assert runtime <= demo <= dev
+    runtime, demo, dev, mutation = (pins(name).items() for name in LISTS)
+    assert runtime <= demo <= dev <= mutation
 
 
 def test_the_lists_have_all_that_is_asked_for() -> None:
@@ -58,8 +58,9 @@ def test_the_lists_have_all_that_is_asked_for() -> None:
     built, project = asked["build-system"]["requires"], asked["project"]
     assert names(project["dependencies"]) | names(built) <= set(pins("runtime"))
     assert names(project["optional-dependencies"]["demo"]) <= set(pins("demo"))
-    tools = (ROOT / "requirements" / "dev.in").read_text(encoding="utf-8").splitlines()
-    assert names(line for line in tools if line[0] not in "#-") <= set(pins("dev"))
+    for name in ("dev", "mutation"):
+        tools = (ROOT / "requirements" / f"{name}.in").read_text(encoding="utf-8").splitlines()
+        assert names(line for line in tools if line[0] not in "#-") <= set(pins(name))
 
 
 def test_what_is_asked_for_with_an_extra_is_pinned_with_it() -> None:
