@@ -49,14 +49,13 @@ _PUSHED: dict[int, tuple[str, dict[int, str]]] = {
     Push.PRECHARGE: ("precharge function", {0: "off", 1: "pulse", 2: "continuous"}),
 }
 _RESTS = {0: "stop: to standby, whatever it is doing", 1: "resume: from standby back to normal"}
-_UNITS = {"v": "V", "a": "A", "c": "°C"}
+_UNITS = {"v": " V", "a": " A", "c": " °C"}
 
 
 def _words(name: str, value: float) -> str:
     if isinstance(value, IntEnum):
         return f"{value} ({value.name.lower().replace('_', ' ')})"
-    unit = _UNITS.get(name.rpartition("_")[2], "")
-    return f"{value} {unit}".rstrip()
+    return f"{value}{_UNITS.get(name.rpartition('_')[2], '')}"
 
 
 def error_names(bits: int) -> list[str]:
