@@ -132,6 +132,15 @@ def test_a_whole_frame_that_is_not_as_documented_says_so(
     assert told.text.endswith(f"! {problem}")
 
 
+def test_data_without_a_meaning_is_shown_in_rows_of_eight() -> None:
+    told = of(0x44, bytes(range(17)))
+    assert [line[2:].rstrip() for line in told.text.splitlines()[6:-3]] == [
+        "data      00 01 02 03 04 05 06 07",
+        "          08 09 0A 0B 0C 0D 0E 0F",
+        "          10",
+    ]
+
+
 # --- which values a reply holds --------------------------------------------------------------------------------------
 
 SHORT_REPLY = "AF FA 90 09 03 90 13 93 09 07 00 03 E5 AF A0"
@@ -254,6 +263,32 @@ def test_a_bad_frame_says_what_is_wrong_with_it(text: str, lines: list[str]) -> 
     assert not any(one.ok for one in told)
     for line in lines:
         assert line in everything
+
+
+def test_what_has_no_sensible_length_is_told_byte_by_byte() -> None:
+    (told,) = explain("AF FA 90 FF 10 91 01 02 03 04 05 06 07 08 09")
+    assert told.text == dedent("""\
+            byte 0: not a good frame: length 0xFF, expected 0x03 … 0x23
+              start     AF FA
+              address   90
+              length    FF
+              command   10
+              order     91
+              rest      01 02 03 04 05 06 07 08
+              rest      09""")
+    assert told.facts == {
+        "offset": 0,
+        "hex": "AF FA 90 FF 10 91 01 02 03 04 05 06 07 08 09",
+        "frame": True,
+        "valid": False,
+        "problems": ["length 0xFF, expected 0x03 … 0x23"],
+    }
+
+
+def test_a_damaged_reply_is_decoded_by_its_kinds_all_the_same() -> None:
+    told = only(f"{SHORT_REPLY[:-8]}E6 AF A0", (3, 4))
+    assert "13 93  voltage 50.11 V" in told.text
+    assert not told.ok
 
 
 def test_garbage_between_frames_is_shown_where_it_stands() -> None:
