@@ -3,7 +3,7 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-guest check format campaign fuzz soak bench lock clean
+.PHONY: help demo test test-guest check format campaign fuzz mutation soak bench lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
@@ -43,14 +43,18 @@ soak: .venv/dev.stamp  ## 30 simulated days and a real hour on lines that lose f
 fuzz: .venv/fuzz.stamp  ## hours of hostile bytes at every door; ARGS='charger --runs 100000' chooses
 	$(BIN)/python -m tests.fuzz $(ARGS)
 
+mutation: .venv/mutation.stamp  ## see that the tests notice every small break; ARGS='orchestrator.protocol.*' chooses
+	$(BIN)/python -m tests.mutation $(ARGS)
+
 lock:  ## choose the dependencies' versions anew: requirements/*.txt
 	PYTHON='$(PYTHON)' sh requirements/lock.sh
 
 clean:  ## remove everything that the other targets made
-	rm -rf .venv build dist *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv build dist mutants *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.venv/fuzz.stamp: .venv/dev.stamp
-.venv/demo.stamp .venv/dev.stamp .venv/fuzz.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
+# What its own command needs comes on top of the rest.
+.venv/fuzz.stamp .venv/mutation.stamp: .venv/dev.stamp
+.venv/demo.stamp .venv/dev.stamp .venv/fuzz.stamp .venv/mutation.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
 	PYTHON='$(PYTHON)' sh requirements/install.sh $*
 	touch $@

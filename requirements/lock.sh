@@ -29,5 +29,6 @@ for extra in demo gpio workbench; do
 done
 lock dev.txt requirements/dev.in
 # No part of that row: what only its own command needs.
-lock reference.txt requirements/reference.in --constraint=requirements/dev.txt
-lock fuzz.txt requirements/fuzz.in --constraint=requirements/dev.txt
+for tool in fuzz mutation reference; do
+    lock "$tool.txt" "requirements/$tool.in"
+done

@@ -215,7 +215,7 @@ def parse_status(frame: Frame, kinds: Kinds, t_s: float) -> ChargerReading:
 
     A value outside its documented list is None and has its sentence in `illegal`. ProtocolError as in `parse_values`.
     """
-    if any(needed & ~asked for needed, asked in zip(STATUS_KINDS, kinds, strict=True)):
+    if STATUS_KINDS[0] & ~kinds[0] or STATUS_KINDS[1] & ~kinds[1]:
         raise ValueError(f"kinds {kinds[0]:#04x} {kinds[1]:#04x} do not fill a reading")
     values = parse_values(frame, *kinds)
     illegal = tuple(value for value in values.values() if isinstance(value, str))

@@ -101,8 +101,7 @@ def _bad(at: int, data: bytes, piece: bytes, kinds: Kinds | None) -> Explained:
         rows, decoded, notes = _fields(piece, _frame(piece), kinds)
         facts |= decoded
     else:
-        parts = (piece[:2], piece[2:3], piece[3:4], piece[4:5], piece[5:6])
-        rows = [(name, part, "") for name, part in zip(_HEAD, parts, strict=True) if part]
+        rows = [(name, piece[begin:end], "") for name, begin, end in _HEAD if piece[begin:end]]
         rows += [("rest", piece[cut : cut + 8], "") for cut in range(6, len(piece), 8)]
     notes += _hints(data[at : at + MAX_FRAME], piece)
     facts["problems"] = [reason, *notes]
@@ -122,7 +121,7 @@ def _hints(ahead: bytes, piece: bytes) -> list[str]:
     ]
 
 
-_HEAD = ("start", "address", "length", "command", "order")
+_HEAD = (("start", 0, 2), ("address", 2, 3), ("length", 3, 4), ("command", 4, 5), ("order", 5, 6))
 Row = tuple[str, bytes, str]
 
 

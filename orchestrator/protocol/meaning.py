@@ -25,10 +25,6 @@ class Meaning:
     facts: dict[str, object] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
 
-    def raw(self, data: bytes) -> None:
-        """Data of which no more is known."""
-        self.rows += [(data[at : at + 8], "") for at in range(0, len(data), 8)]
-
 
 #: What each command is called, and who sends it.
 NAMES: dict[int, tuple[str, str]] = {
@@ -49,14 +45,18 @@ _PUSHED: dict[int, tuple[str, dict[int, str]]] = {
     Push.PRECHARGE: ("precharge function", {0: "off", 1: "pulse", 2: "continuous"}),
 }
 _RESTS = {0: "stop: to standby, whatever it is doing", 1: "resume: from standby back to normal"}
-_UNITS = {"v": "V", "a": "A", "c": "°C"}
+_UNITS = {"v": " V", "a": " A", "c": " °C"}
+
+
+def _raw(data: bytes) -> list[tuple[bytes, str]]:
+    """Rows of data of which no more is known."""
+    return [(data[at : at + 8], "") for at in range(0, len(data), 8)]
 
 
 def _words(name: str, value: float) -> str:
     if isinstance(value, IntEnum):
         return f"{value} ({value.name.lower().replace('_', ' ')})"
-    unit = _UNITS.get(name.rpartition("_")[2], "")
-    return f"{value} {unit}".rstrip()
+    return f"{value}{_UNITS.get(name.rpartition('_')[2], '')}"
 
 
 def error_names(bits: int) -> list[str]:
@@ -121,8 +121,8 @@ def _status_reply(frame: Frame, kinds: Kinds | None) -> Meaning:
 def _raw_reply(frame: Frame, kinds: Kinds | None) -> Meaning:
     """The words of a reply that does not fit the kinds, or whose kinds nobody knows."""
     count = len(frame.data)
-    meaning = Meaning(facts={"words": [int.from_bytes(frame.data[at : at + 2]) for at in range(0, count, 2)]})
-    meaning.raw(frame.data)
+    words = [int.from_bytes(frame.data[at : at + 2]) for at in range(0, count, 2)]
+    meaning = Meaning(_raw(frame.data), {"words": words})
     if kinds is not None:
         expected = 2 * len(status_values(*kinds))
         meaning.problems.append(
@@ -174,8 +174,7 @@ def meaning_of(frame: Frame, kinds: Kinds | None) -> Meaning:
     size, decode = _DATA.get(frame.command, (None, None))
     if decode is not None and size in (None, len(frame.data)):
         return decode(frame, kinds)
-    meaning = Meaning()
-    meaning.raw(frame.data)
+    meaning = Meaning(_raw(frame.data))
     if decode is None:
         meaning.problems.append(f"command 0x{frame.command:02X} is not documented")
     else:

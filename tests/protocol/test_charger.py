@@ -229,7 +229,7 @@ def test_what_is_no_answer_to_the_request_is_refused_with_both_sides(frame: Fram
 
 @pytest.mark.parametrize("kinds", [(0x03, 0x04), (0x13, 0x0F), (0x12, 0x1F)])
 def test_kinds_that_leave_a_reading_unfilled_are_our_mistake(kinds: tuple[int, int]) -> None:
-    with pytest.raises(ValueError, match="do not fill a reading"):
+    with pytest.raises(ValueError, match=f"kinds 0x{kinds[0]:02x} 0x{kinds[1]:02x} do not fill a reading"):
         parse_status(reply(1), kinds, 0.0)
 
 

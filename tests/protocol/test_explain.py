@@ -90,6 +90,7 @@ def test_what_is_sent_is_decoded(command: int, data: bytes, decoded: dict[str, o
         (0x01, b"\x03\x04", "03     kind 1: voltage, current"),
         (0x01, b"\x03\x04", "04     kind 2: charge mode"),
         (0x01, b"\x00\x1f", "00     kind 1: none"),
+        (0x01, b"\x00\x03", "03     kind 2: operation, current limit"),
         (0x01, b"\x01\x00", "00     kind 2: none"),
         (0x02, b"\x01\x00", "00     0: stop"),
         (0x02, b"\x02\x04", "02     push: current limit"),
@@ -131,13 +132,22 @@ def test_a_whole_frame_that_is_not_as_documented_says_so(
     assert told.text.endswith(f"! {problem}")
 
 
+def test_data_without_a_meaning_is_shown_in_rows_of_eight() -> None:
+    told = of(0x44, bytes(range(17)))
+    assert [line[2:].rstrip() for line in told.text.splitlines()[6:-3]] == [
+        "data      00 01 02 03 04 05 06 07",
+        "          08 09 0A 0B 0C 0D 0E 0F",
+        "          10",
+    ]
+
+
 # --- which values a reply holds --------------------------------------------------------------------------------------
 
 SHORT_REPLY = "AF FA 90 09 03 90 13 93 09 07 00 03 E5 AF A0"
 
 
 def test_a_reply_of_the_services_own_length_is_taken_for_its_kinds() -> None:
-    told = of(0x03, bytes.fromhex("13930907000100010004000400020001"))
+    told = of(0x03, bytes.fromhex("13930907000100010004000200020001"))
     assert told.facts["decoded"] == {
         "kind1": 0x13,
         "kind2": 0x1F,
@@ -146,17 +156,40 @@ def test_a_reply_of_the_services_own_length_is_taken_for_its_kinds() -> None:
         "control_mode": 1,
         "operation": 1,
         "current_limit": 4,
-        "charge_mode": 4,
+        "charge_mode": 2,
         "precharge": 2,
         "connection": 1,
     }
-    assert "taken for the kinds 0x13 0x1F that the service asks for" in told.text
+    assert [line[12:] for line in told.text.splitlines()[6:-2]] == [
+        "13 93  voltage 50.11 V",
+        "09 07  current 23.11 A",
+        "00 01  control mode 1 (manual)",
+        "00 01  operation 1 (running)",
+        "00 04  current limit 4",
+        "00 02  charge mode 2 (battery recovery)",
+        "00 02  precharge function 2 (continuous)",
+        "00 01  battery connection 1 (normal)",
+        "       taken for the kinds 0x13 0x1F that the service asks for",
+    ]
 
 
-def test_a_reply_to_nobody_knows_what_is_shown_as_words() -> None:
-    told = only(SHORT_REPLY)
-    assert (told.ok, told.facts["decoded"]) == (True, {"words": [5011, 2311, 3]})
-    assert "give the kinds of its request" in told.text
+def test_a_value_that_is_not_documented_is_none_to_a_program() -> None:
+    told = of(0x03, b"\x00\x09", kinds=(0, 4))
+    assert told.facts["decoded"] == {"kind1": 0, "kind2": 4, "charge_mode": None}
+    assert "  data      00 09  charge mode 9 (documented: 1 … 8)\n" in told.text
+
+
+@pytest.mark.parametrize(
+    ("data", "words", "line"),
+    [("1393 0907 0003", [5011, 2311, 3], "13 93 09 07 00 03"), ("1393 0907", [5011, 2311], "13 93 09 07")],
+)
+def test_a_reply_to_nobody_knows_what_is_shown_as_words(data: str, words: list[int], line: str) -> None:
+    told = of(0x03, bytes.fromhex(data))
+    assert (told.ok, told.facts["decoded"]) == (True, {"words": words})
+    assert [row[12:] for row in told.text.splitlines()[6:-2]] == [
+        line,
+        " " * len(line) + "  a reply does not say which values it holds: give the kinds of its request",
+    ]
 
 
 def test_a_reply_is_decoded_by_the_request_before_it() -> None:
@@ -230,6 +263,32 @@ def test_a_bad_frame_says_what_is_wrong_with_it(text: str, lines: list[str]) -> 
     assert not any(one.ok for one in told)
     for line in lines:
         assert line in everything
+
+
+def test_what_has_no_sensible_length_is_told_byte_by_byte() -> None:
+    (told,) = explain("AF FA 90 FF 10 91 01 02 03 04 05 06 07 08 09")
+    assert told.text == dedent("""\
+            byte 0: not a good frame: length 0xFF, expected 0x03 … 0x23
+              start     AF FA
+              address   90
+              length    FF
+              command   10
+              order     91
+              rest      01 02 03 04 05 06 07 08
+              rest      09""")
+    assert told.facts == {
+        "offset": 0,
+        "hex": "AF FA 90 FF 10 91 01 02 03 04 05 06 07 08 09",
+        "frame": True,
+        "valid": False,
+        "problems": ["length 0xFF, expected 0x03 … 0x23"],
+    }
+
+
+def test_a_damaged_reply_is_decoded_by_its_kinds_all_the_same() -> None:
+    told = only(f"{SHORT_REPLY[:-8]}E6 AF A0", (3, 4))
+    assert "13 93  voltage 50.11 V" in told.text
+    assert not told.ok
 
 
 def test_garbage_between_frames_is_shown_where_it_stands() -> None:

@@ -97,6 +97,13 @@ def test_a_frame_that_cannot_be_sent_cannot_be_made(command: int, order: int, da
         Frame(command, order, data)
 
 
+@pytest.mark.parametrize("data", [b"", bytes(MAX_DATA)])
+def test_the_smallest_and_the_largest_frame_are_good(data: bytes) -> None:
+    wire = Frame(0x03, ADDRESS, data).encode()
+    assert declared_size(wire) == len(wire) == len(data) + 9
+    assert why_bad(wire) == ""
+
+
 # --- damage ----------------------------------------------------------------------------------------------------------
 
 DAMAGE = [
@@ -133,6 +140,13 @@ def test_nothing_is_said_before_anything_was_wrong() -> None:
     decoder = FrameDecoder()
     decoder.feed(RUN)
     assert (decoder.last_reject, decoder.bad_frames, decoder.skipped_bytes) == ("", 0, 0)
+
+
+@pytest.mark.parametrize("head", ["AF FA 91", "AF FA 90 02", "AF FA 90 24"])
+def test_a_start_with_a_wrong_address_or_length_is_not_waited_for(head: str) -> None:
+    decoder = FrameDecoder()
+    assert decoder.feed(bytes.fromhex(head)) == []
+    assert (decoder.pending, decoder.bad_frames) == (0, 1)
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,10 @@ def test_each_page(data: str, expected: dict[str, object]) -> None:
     assert values(data) == expected
 
 
+def test_a_page_is_of_no_known_time_and_so_never_fresh() -> None:
+    assert parse_page(0x10, bytes.fromhex("70 01 40 09 F8 FF 05 00"))["voltage_v"] == Measurement(23.68, 0.0)
+
+
 def test_what_cannot_be_is_told() -> None:
     assert values("70 02 00 00 00 00 8C 64")["soc_pct"] == "soc_pct 140 is outside 0 … 100 (raw 0x8C)"
 

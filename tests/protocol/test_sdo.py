@@ -97,6 +97,20 @@ def test_a_value_comes_back_in_its_declared_size(index: int, sub: int, size: int
     assert parse_reply(answer) == SdoValue(index, sub, value, size)
 
 
+@pytest.mark.parametrize(
+    ("wire", "value", "size"),
+    [
+        ("4F 02 18 01 FF AA BB CC", 0xFF, 1),
+        ("4B 05 18 01 E8 03 BB CC", 1000, 2),
+        ("43 05 18 01 01 02 03 04", 0x04030201, 4),
+    ],
+)
+def test_what_stands_behind_a_short_value_means_nothing(wire: str, value: int, size: int) -> None:
+    reply = parse_reply(bytes.fromhex(wire))
+    assert isinstance(reply, SdoValue)
+    assert (reply.value, reply.size) == (value, size)
+
+
 def test_cob_ids_and_nmt() -> None:
     assert (request_cob_id(1), reply_cob_id(127), heartbeat_cob_id(0x10)) == (0x601, 0x5FF, 0x710)
     assert [tpdo_cob_id(number, 0x10) for number in (1, 2, 3, 4)] == [0x190, 0x290, 0x390, 0x490]

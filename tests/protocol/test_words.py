@@ -64,6 +64,12 @@ def test_a_value_outside_its_range_is_a_sentence_and_its_neighbours_stay() -> No
     }
 
 
+@pytest.mark.parametrize(("width", "raw"), [(1, "1"), (8, "01"), (9, "001"), (12, "001"), (13, "0001"), (16, "0001")])
+def test_raw_bits_are_shown_with_all_their_digits(width: int, raw: str) -> None:
+    narrow = entry(bits("status", 0, width, range=Range(2, 3)))
+    assert decode_word(narrow, 1, 4, 0.0) == {"status": f"status 1 is outside 2 … 3 (raw 0x{raw})"}
+
+
 def test_both_ends_of_a_range_belong_to_it() -> None:
     assert decode_word(VOLTS_AMPS, 0x1770_E890, 4, 0.0) == {
         "voltage_v": Measurement(60, 0.0),

@@ -1,0 +1,53 @@
+"""Break the product in every small way, one at a time, and see that a test notices: `python -m tests.mutation`.
+
+mutmut makes the mutants and tries them; pyproject.toml says of what, and with which tests. What it finds goes to
+docs/mutation.md, in which the reasons of those that live are kept by hand. Arguments choose some mutants, as
+`orchestrator.protocol.frame.*`; without any, those are tried that are new or whose function has changed.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from tests.mutation.mutants import Mutant
+from tests.mutation.page import GOAL_PCT, page, reasons, score
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+MUTANTS = ROOT / "mutants"
+PAGE = ROOT / "docs" / "mutation.md"
+
+
+def main(patterns: Sequence[str]) -> int:
+    """Try them and write the page; 1 if too many live, or one without a reason."""
+    _mutmut("run", "--max-children", "1", *patterns)
+    mutants = list(_mutants())
+    known = reasons(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
+    PAGE.write_text(page(mutants, known), encoding="utf-8")
+    unexplained = [mutant for mutant in mutants if mutant.lives and mutant.key not in known]
+    for mutant in unexplained:
+        print(f"no reason in {PAGE.name}: {mutant.key}")
+    print(f"{score(mutants):.1f} % of {len(mutants)} mutants killed; {len(unexplained)} live without a reason")
+    return int(score(mutants) < GOAL_PCT or bool(unexplained))
+
+
+def _mutants() -> Iterator[Mutant]:
+    """All that were tried, by module and in the order of the source."""
+    for file in sorted(MUTANTS.rglob("*.py.meta")):
+        module = str(file.relative_to(MUTANTS)).removesuffix(".meta")
+        meta = json.loads(file.read_text(encoding="utf-8"))
+        for name, code in meta["exit_code_by_key"].items():
+            mutant = Mutant(module, name, code, meta["durations_by_key"].get(name, 0.0))
+            yield mutant.shown(_mutmut("show", name)) if mutant.lives else mutant
+
+
+def _mutmut(*arguments: str) -> str:
+    """Its output, of `run` on the terminal."""
+    command = [str(Path(sys.executable).with_name("mutmut")), *arguments]
+    done = subprocess.run(command, cwd=ROOT, check=True, text=True, stdout=None if "run" in arguments else -1)
+    return done.stdout or ""
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,53 @@
+"""A mutant, as mutmut's files and its `show` tell of it."""
+
+import re
+from dataclasses import dataclass, replace
+from typing import Self
+
+#: mutmut's exit codes: 1 and 3 are pytest's, the rest stand for a processor or a clock that ran out.
+KILLED = (1, 3)
+TIMED_OUT = (-24, 24, 36, 152, 255)
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One small change of one function, and what became of it."""
+
+    module: str  #: "orchestrator/protocol/frame.py"
+    name: str  #: as mutmut calls it; the numbers change with the function
+    exit_code: int | None  #: None where it was not tried yet
+    seconds: float
+    was: str = ""
+    became: str = ""
+
+    @property
+    def killed(self) -> bool:
+        """A test failed."""
+        return self.exit_code in KILLED
+
+    @property
+    def timed_out(self) -> bool:
+        """The tests did not come to an end, which a person would notice, too."""
+        return self.exit_code in TIMED_OUT
+
+    @property
+    def lives(self) -> bool:
+        """No test noticed it, or none reaches it."""
+        return not self.killed and not self.timed_out
+
+    @property
+    def function(self) -> str:
+        """ "FrameDecoder._hunt"."""
+        mangled = self.name.rpartition(".")[2].rpartition("__mutmut_")[0]
+        return re.sub("^x_?", "", mangled).strip("ǁ").replace("ǁ", ".")
+
+    @property
+    def key(self) -> tuple[str, str, str, str]:
+        """What it is known by from one run to the next."""
+        return self.module, self.function, self.was, self.became
+
+    def shown(self, diff: str) -> Self:
+        """With the lines that were changed, out of a unified diff."""
+        lines = [line for line in diff.splitlines() if line[:1] in ("-", "+") and line[:3] not in ("---", "+++")]
+        was, became = (" ".join(line[1:].strip() for line in lines if line[0] == sign) for sign in "-+")
+        return replace(self, was=was, became=became)

@@ -1,0 +1,68 @@
+"""docs/mutation.md: the score of each module, and a table of the mutants that live, with the reasons written there."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+
+from tests.mutation.mutants import Mutant
+
+GOAL_PCT = 95.0
+Reasons = Mapping[tuple[str, str, str, str], str]
+
+HEAD = """\
+# Would a test notice?
+
+`make mutation` breaks the product in every small way that [mutmut](https://mutmut.readthedocs.io) knows, one at a time
+(a `<` to `<=`, an `and` to `or`, a number by one, an argument to None, a text to another), and runs the quick tests
+that reach the broken function. A mutant that no test notices lives: either a test is missing, or the change changes
+nothing. At least 95 % must die, and each one that lives needs a reason below. What is mutated are the bodies of
+functions and methods, not the tables and constants of a module, nor functions with a decorator (a property, say).
+
+`make mutation ARGS='orchestrator.protocol.frame.*'` tries some again. The command writes this page and keeps the
+reasons; `?` stands where there is none yet. A mutant that times out counts as killed: it hung the test.
+"""
+
+
+def score(mutants: Sequence[Mutant]) -> float:
+    """How many were killed, in percent."""
+    return 100 * sum(not mutant.lives for mutant in mutants) / max(1, len(mutants))
+
+
+def page(mutants: Sequence[Mutant], known: Reasons) -> str:
+    """The whole page."""
+    lines = [HEAD, *_scores(mutants), "", "## The ones that live", "", *_living(mutants, known)]
+    return "\n".join(lines) + "\n"
+
+
+def _scores(mutants: Sequence[Mutant]) -> Iterator[str]:
+    yield "| module | mutants | killed | timed out | live | % killed | seconds |"
+    yield "| --- | --: | --: | --: | --: | --: | --: |"
+    for module, some in groupby(mutants, lambda mutant: mutant.module):
+        yield _score_row(f"`{module}`", list(some))
+    yield _score_row("all", mutants)
+
+
+def _score_row(title: str, mutants: Sequence[Mutant]) -> str:
+    killed, timed_out, live = (
+        sum(getattr(mutant, fate) for mutant in mutants) for fate in ("killed", "timed_out", "lives")
+    )
+    seconds = sum(mutant.seconds for mutant in mutants)
+    return f"| {title} | {len(mutants)} | {killed} | {timed_out} | {live} | {score(mutants):.1f} | {seconds:.0f} |"
+
+
+def _living(mutants: Iterable[Mutant], known: Reasons) -> Iterator[str]:
+    yield "| module | function | was | became | why it lives |"
+    yield "| --- | --- | --- | --- | --- |"
+    for key in dict.fromkeys(mutant.key for mutant in mutants if mutant.lives):
+        yield "| " + " | ".join([*(_code(cell) for cell in key), known.get(key, "?")]) + " |"
+
+
+def _code(text: str) -> str:
+    return f"`` {text} ``".replace("|", "\\|")
+
+
+def reasons(text: str) -> Reasons:
+    """Those that somebody wrote into the page."""
+    rows = (re.split(r" (?<!\\)\| ", line[2:-2]) for line in text.splitlines() if line.startswith("| ``"))
+    found = {tuple(cell[3:-3].replace("\\|", "|") for cell in cells[:4]): cells[4] for cells in rows}
+    return {(key[0], key[1], key[2], key[3]): why for key, why in found.items() if why != "?"}

@@ -1,0 +1,44 @@
+"""What the tests do otherwise while they try mutants: `pytest -p tests.mutation.plugin`, as mutmut calls it.
+
+- Hypothesis does not shrink an example that fails, which takes longer than all else, and tries the same examples for
+  each mutant.
+- The quick tests come first: the first one that fails ends a mutant's trial.
+- Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
+"""
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, settings
+
+settings.register_profile(
+    "mutation",
+    phases=(Phase.explicit, Phase.generate),
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=(HealthCheck.too_slow,),
+)
+settings.load_profile("mutation")
+
+#: File of tests → the module that they start as a process.
+ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/service/guardian.py"}
+STATS = Path("mutmut-stats.json")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    seconds = json.loads(STATS.read_text(encoding="utf-8"))["duration_by_test"] if STATS.exists() else {}
+    items.sort(key=lambda item: seconds.get(item.nodeid, 0.0))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    module = ELSEWHERE.get(item.nodeid.partition("::")[0])
+    if module and os.environ.get("MUTANT_UNDER_TEST") == "stats":
+        from mutmut.state import state  # only mutmut itself sets that variable
+
+        mutants = json.loads(Path(f"{module}.meta").read_text(encoding="utf-8"))["exit_code_by_key"]
+        state()._stats |= {name.rpartition("__mutmut_")[0] for name in mutants}
