@@ -3,13 +3,13 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check format bench lock clean
+.PHONY: help demo test check format bench reference lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
 
 help:  ## show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, about a minute
 	$(BIN)/orchestrator demo $(ARGS)
@@ -31,6 +31,9 @@ format: .venv/dev.stamp  ## rewrite the files as `make check` wants them
 bench: .venv/demo.stamp  ## measure reaction times, memory and CPU beside a naive controller
 	$(BIN)/python -m benchmarks $(ARGS)
 
+reference: .venv/reference.stamp  ## check the simulated battery against PyBaMM's, and both speeds
+	$(BIN)/python -m benchmarks.reference $(ARGS)
+
 lock:  ## choose the dependencies' versions anew: requirements/*.txt
 	PYTHON='$(PYTHON)' sh requirements/lock.sh
 
@@ -38,6 +41,6 @@ clean:  ## remove everything that the other targets made
 	rm -rf .venv build dist *.egg-info .coverage .coverage.* .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-.venv/demo.stamp .venv/dev.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
+.venv/demo.stamp .venv/dev.stamp .venv/reference.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
 	PYTHON='$(PYTHON)' sh requirements/install.sh $*
 	touch $@

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Make .venv, or keep it, and install a locked list and this checkout into it:  install.sh runtime|demo|dev
+# Make .venv, or keep it, and install a locked list and this checkout into it:  install.sh runtime|demo|workbench|dev|reference
 # $PYTHON chooses the Python. Run by the Makefile, which calls this only when there is something to do.
 set -eu
 cd "$(dirname "$0")/.."

@@ -10,7 +10,7 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTS = ("runtime", "demo", "dev")
+LISTS = ("runtime", "demo", "workbench", "dev", "reference")
 
 #: What a locked list consists of. Options, addresses and paths do not match.
 LINE = re.compile(r"#.*|[a-z0-9-]+(\[[a-z0-9,-]+\])?==[0-9][0-9a-z.]* \\|    --hash=sha256:[0-9a-f]{64}( \\)?|")
@@ -49,15 +49,18 @@ def test_every_version_has_a_hash(name: str) -> None:
 
 
 def test_each_list_is_a_part_of_the_next() -> None:
-    runtime, demo, dev = (pins(name).items() for name in LISTS)
+    runtime, demo, workbench, dev, reference = (pins(name).items() for name in LISTS)
     assert runtime <= demo <= dev
+    assert runtime <= workbench <= dev
+    assert workbench <= reference
 
 
 def test_the_lists_have_all_that_is_asked_for() -> None:
     asked = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     built, project = asked["build-system"]["requires"], asked["project"]
     assert names(project["dependencies"]) | names(built) <= set(pins("runtime"))
-    assert names(project["optional-dependencies"]["demo"]) <= set(pins("demo"))
+    for extra in ("demo", "workbench"):
+        assert names(project["optional-dependencies"][extra]) <= set(pins(extra))
     tools = (ROOT / "requirements" / "dev.in").read_text(encoding="utf-8").splitlines()
     assert names(line for line in tools if line[0] not in "#-") <= set(pins("dev"))
 

@@ -2,8 +2,9 @@
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -110,7 +111,8 @@ def cores(jobs: int | None = None) -> Executor:
     return ProcessPoolExecutor(jobs or len(os.sched_getaffinity(0)), mp_context=get_context("spawn"))
 
 
-def cluster(address: str) -> Executor:
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
     """The workers of a Dask cluster. Raises ClusterError if there is none at that address, or no Dask here."""
     try:
         from distributed import Client  # noqa: PLC0415 - an extra of its own, for those who have a cluster
@@ -119,10 +121,11 @@ def cluster(address: str) -> Executor:
             "--dask needs the package distributed: pip install 'charging-station-orchestrator[dask]'"
         ) from None
     try:
-        executor: Executor = Client(address, timeout=CONNECT_S).get_executor()
+        client = Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]  # it has no annotations
     except (OSError, ValueError) as error:
         raise ClusterError(f"--dask {address}: no cluster answers there: {error}") from None
-    return executor
+    with client:
+        yield client.get_executor()  # type: ignore[no-untyped-call]  # as above
 
 
 def rows(sweep: Sweep) -> list[list[str]]:

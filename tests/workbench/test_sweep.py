@@ -68,7 +68,8 @@ def test_a_sweep_becomes_a_picture_and_a_file_of_numbers(swept: Sweep, tmp_path:
 
 
 def test_a_cluster_finds_what_the_cores_find(swept: Sweep) -> None:
-    with LocalCluster(n_workers=1, processes=False, dashboard_address=None) as local:
+    one_worker = {"n_workers": 1, "processes": False, "dashboard_address": None}
+    with LocalCluster(**one_worker) as local:  # type: ignore[no-untyped-call]  # it has no annotations
         address = local.scheduler_address
         with cluster(address) as pool:
             found = played("li-ion-48v", "deep-discharge", [FINISH, STEP], pool, lambda *_: None)
@@ -77,8 +78,8 @@ def test_a_cluster_finds_what_the_cores_find(swept: Sweep) -> None:
 
 def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("orchestrator.workbench.sweep.CONNECT_S", 0.2)
-    with pytest.raises(ClusterError, match="no cluster answers there"):
-        cluster("tcp://127.0.0.1:9")
+    with pytest.raises(ClusterError, match="no cluster answers there"), cluster("tcp://127.0.0.1:9"):
+        pass
 
 
 def test_it_says_how_far_it_is() -> None:
