@@ -35,7 +35,7 @@ def same(leaps: Run, ticks: Run) -> None:
         assert leapt.from_s == pytest.approx(ticked.from_s, abs=SAME_S), (leapt, ticked)
         assert leapt.faults == ticked.faults
     assert leaps.charged_ah == pytest.approx(ticks.charged_ah, rel=1e-4)
-    assert leaps.steps < ticks.steps / 3
+    assert leaps.steps < ticks.steps / 2  # even where most of the time is spent in pulses
 
 
 @pytest.mark.timeout(600)  # tens of thousands of steps, on a machine that may be busy
