@@ -20,7 +20,7 @@ COSTS: tuple[tuple[str, Callable[[Figures], float | None]], ...] = (
 )
 #: So many points can still be told apart by their labels.
 MAX_LABELS = 15
-MARKERS = "os^Dv"
+MARKERS = "os^Dv<>PX*"
 
 
 def save_tradeoff(sweep: Sweep, path: Path) -> None:

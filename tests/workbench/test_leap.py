@@ -81,7 +81,7 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(simulation, "step", recorded)
     last = []
-    for max_leap in (240, 1):
+    for max_leap in (simulation.MAX_LEAP, 1):
         memories.clear()
         Simulation(load_policy("li-ion-48v"), scenario(0.25), max_leap).run(lambda _: None)
         last.append((memories[-1], len(memories)))

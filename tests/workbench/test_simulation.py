@@ -35,9 +35,9 @@ def test_a_shipped_scenario_is_played_to_its_end_and_charges(name: str) -> None:
             assert m.temperature_c in limits.temperature_c
 
 
-def test_the_moments_are_in_order_and_a_minute_apart_at_most() -> None:
+def test_the_moments_are_in_order_and_two_minutes_apart_at_most() -> None:
     times = [m.t_s for m in simulate(POLICY, scenario(1.0)).trail.moments]
-    assert all(0 < later - earlier <= 60 for earlier, later in pairwise(times))
+    assert all(0 < later - earlier <= 120 for earlier, later in pairwise(times))
 
 
 def test_the_spans_join_without_a_gap() -> None:
