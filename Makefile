@@ -3,7 +3,7 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-guest check format campaign fuzz mutation soak bench lock clean
+.PHONY: help demo test test-guest check format campaign fuzz mutation soak bench reference lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
@@ -46,6 +46,9 @@ fuzz: .venv/fuzz.stamp  ## hours of hostile bytes at every door; ARGS='charger -
 mutation: .venv/mutation.stamp  ## see that the tests notice every small break; ARGS='orchestrator.protocol.*' chooses
 	$(BIN)/python -m tests.mutation $(ARGS)
 
+reference: .venv/reference.stamp  ## check the simulated battery against PyBaMM's, and both speeds
+	$(BIN)/python -m benchmarks.reference $(ARGS)
+
 lock:  ## choose the dependencies' versions anew: requirements/*.txt
 	PYTHON='$(PYTHON)' sh requirements/lock.sh
 
@@ -54,7 +57,7 @@ clean:  ## remove everything that the other targets made
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # What its own command needs comes on top of the rest.
-.venv/fuzz.stamp .venv/mutation.stamp: .venv/dev.stamp
-.venv/demo.stamp .venv/dev.stamp .venv/fuzz.stamp .venv/mutation.stamp: .venv/%.stamp: requirements/%.txt $(SETUP)
+.venv/fuzz.stamp .venv/mutation.stamp .venv/reference.stamp: .venv/dev.stamp
+.venv/%.stamp: requirements/%.txt $(SETUP)
 	PYTHON='$(PYTHON)' sh requirements/install.sh $*
 	touch $@

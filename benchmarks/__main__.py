@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from benchmarks import decoding, footprint, laststop, latency, reaction, startup, stepping
+from benchmarks import decoding, footprint, laststop, latency, reaction, simulating, startup, stepping
 from benchmarks.effort import Effort
 from benchmarks.report import Result, machine, table, write_json
 
@@ -18,6 +18,7 @@ PARTS: Mapping[str, Callable[[Effort], Iterator[Result]]] = {
     "footprint": footprint.measure,
     "step": stepping.measure,
     "decoder": decoding.measure,
+    "simulate": simulating.measure,
 }
 
 

@@ -15,7 +15,12 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 @pytest.mark.parametrize(
-    ("part", "row"), [("step", "step(), charging"), ("decoder", "decoder, clean frames, one a read")]
+    ("part", "row"),
+    [
+        ("step", "step(), charging"),
+        ("decoder", "decoder, clean frames, one a read"),
+        ("simulate", "simulate, a charge of 4 h"),
+    ],
 )
 def test_a_quick_part_prints_a_table_and_writes_the_figures(part: str, row: str, tmp_path: Path) -> None:
     figures = tmp_path / "figures.json"

@@ -48,6 +48,9 @@ def files(folder: Path, pattern: str) -> dict[str, bytes]:
 def test_every_module_is_inside(installed: Path) -> None:
     assert files(installed / "orchestrator", "*.py") == files(ROOT / "orchestrator", "*.py")
     assert (installed / "orchestrator" / "py.typed").exists()
+    pages = files(installed / "orchestrator", "*.html")
+    assert pages == files(ROOT / "orchestrator", "*.html")
+    assert pages, "the workbench's page"
 
 
 @pytest.mark.parametrize("folder", ["policies", "configs"])

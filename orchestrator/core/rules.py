@@ -37,3 +37,18 @@ class Rules:
             steps_a=bay.charger.steps_a,
             top_step=max(allowed, default=0),
         )
+
+    @property
+    def hottest_at(self) -> str:
+        """`FILE:LINE` of what says how warm a pack may be: the policy, or the station if its limit is lower."""
+        return self._at(policy_is_stricter=self.policy.pack.temperature_c.high <= self.bay.limits.temperature_c.high)
+
+    @property
+    def coldest_at(self) -> str:
+        """The same for how cold it may be."""
+        return self._at(policy_is_stricter=self.policy.pack.temperature_c.low >= self.bay.limits.temperature_c.low)
+
+    def _at(self, *, policy_is_stricter: bool) -> str:
+        if policy_is_stricter:
+            return self.policy.source.at("pack.temperature_c")
+        return self.bay.source.at("limits.temperature_c")

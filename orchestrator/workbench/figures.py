@@ -70,11 +70,14 @@ def _full_h(visit: Visit, stay: Sequence[Moment]) -> float | None:
 def _high_voltage_h(visit: Visit, stay: Sequence[Moment], scenario: Scenario) -> float:
     battery = scenario.batteries[visit.battery]
     high_v = HIGH_CELL_V[battery.cells] * battery.cells_in_series
-    return sum(
-        (now.t_s - before.t_s) / 3600
-        for before, now in pairwise(stay)
-        if now.voltage_v is not None and now.voltage_v >= high_v
-    )
+    return sum(_above_s(before, now, high_v) for before, now in pairwise(stay)) / 3600
+
+
+def _above_s(before: Moment, now: Moment, high_v: float) -> float:
+    """How long the voltage, straight between the two, was that high."""
+    low, high = sorted((before.voltage_v or 0.0, now.voltage_v or 0.0))
+    share = 1.0 if low >= high_v else max(high - high_v, 0.0) / (high - low) if high > low else 0.0
+    return (now.t_s - before.t_s) * share
 
 
 def _stopped(span: Span, spans: Sequence[Span]) -> bool:

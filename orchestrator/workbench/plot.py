@@ -47,7 +47,7 @@ PANELS: tuple[tuple[str, Callable[[Moment], float | None]], ...] = (
 HEIGHTS = (3.0, 2.4, 2.4, 2.4, 1.3)
 WIDTH_IN = 12.0
 #: Rules that have room in the picture, of all policies and of each; characters of one; a rule that is worth telling.
-MAX_RULES, MIN_RULES, MAX_CHARACTERS, TELLING_SHARE = 16, 5, 150, 0.001
+MAX_RULES, MIN_RULES, MAX_CHARACTERS, TELLING_SHARE = 16, 5, 190, 0.001
 #: A stretch of the band that has room for a number or a state's name, as a share of the whole.
 NUMBER_SHARE, NAME_SHARE = 0.012, 0.08
 

@@ -20,8 +20,8 @@ from orchestrator.workbench.leap import Outline, brought_up, outline
 from orchestrator.workbench.plant import Plant
 from orchestrator.workbench.trail import Trail
 
-#: The longest leap, in ticks: a minute, so that a curve drawn through the moments is one.
-MAX_LEAP = round(60 / TICK_S)
+#: The longest leap, in ticks: two minutes, so that a curve drawn through the moments is one.
+MAX_LEAP = round(120 / TICK_S)
 #: After so many moments `watch` is called.
 WATCH_EVERY = 100
 

@@ -2,14 +2,15 @@
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from multiprocessing import get_context
 
-from orchestrator.config.load import load_policy, load_scenario
+from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Scenario
 from orchestrator.errors import OrchestratorError, UsageError
 from orchestrator.workbench.figures import ROWS, Figures, figures
@@ -77,23 +78,23 @@ class Sweep:
 
 
 def played(
-    policy: str, scenario: str, axes: Sequence[Axis], pool: Executor, watch: Callable[[str, float], None]
+    policy: str, scenario: Scenario, axes: Sequence[Axis], pool: Executor, watch: Callable[[str, float], None]
 ) -> Sweep:
-    """Every combination of the axes' values, played in the pool.
+    """Every combination of the axes' values, played in the pool; the policy is a shipped name or a path.
 
     `watch` is called with the policy's name and the share that is done. Raises ConfigError for what is wrong in the
-    files as they are, UnsuitableError for a policy that is not for the scenario, UsageError for too many points.
+    policy as it is, UnsuitableError for a policy that is not for the scenario, UsageError for too many points.
     """
     combinations = list(product(*(one.values for one in axes)))
     if len(combinations) > MAX_POINTS:
         raise UsageError(f"--sweep: {len(combinations)} combinations; at most {MAX_POINTS} at a time")
-    what_happens, as_it_is = load_scenario(scenario), load_policy(policy)
-    rules_of(as_it_is, what_happens)
+    as_it_is = load_policy(policy)
+    rules_of(as_it_is, scenario)
     points = []
-    for point in pool.map(partial(_try, policy, what_happens, tuple(axes)), combinations, chunksize=CHUNK):
+    for point in pool.map(partial(_try, policy, scenario, tuple(axes)), combinations, chunksize=CHUNK):
         points.append(point)
         watch(as_it_is.policy, len(points) / len(combinations))
-    return Sweep(as_it_is.policy, what_happens.scenario, tuple(axes), tuple(points))
+    return Sweep(as_it_is.policy, scenario.scenario, tuple(axes), tuple(points))
 
 
 def _try(policy: str, scenario: Scenario, axes: tuple[Axis, ...], values: tuple[str, ...]) -> Point:
@@ -110,7 +111,8 @@ def cores(jobs: int | None = None) -> Executor:
     return ProcessPoolExecutor(jobs or len(os.sched_getaffinity(0)), mp_context=get_context("spawn"))
 
 
-def cluster(address: str) -> Executor:
+@contextmanager
+def cluster(address: str) -> Iterator[Executor]:
     """The workers of a Dask cluster. Raises ClusterError if there is none at that address, or no Dask here."""
     try:
         from distributed import Client  # noqa: PLC0415 - an extra of its own, for those who have a cluster
@@ -119,10 +121,11 @@ def cluster(address: str) -> Executor:
             "--dask needs the package distributed: pip install 'charging-station-orchestrator[dask]'"
         ) from None
     try:
-        executor: Executor = Client(address, timeout=CONNECT_S).get_executor()
+        client = Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]  # it has no annotations
     except (OSError, ValueError) as error:
         raise ClusterError(f"--dask {address}: no cluster answers there: {error}") from None
-    return executor
+    with client:
+        yield client.get_executor()  # type: ignore[no-untyped-call]  # as above
 
 
 def rows(sweep: Sweep) -> list[list[str]]:

@@ -20,7 +20,7 @@ COSTS: tuple[tuple[str, Callable[[Figures], float | None]], ...] = (
 )
 #: So many points can still be told apart by their labels.
 MAX_LABELS = 15
-MARKERS = "os^Dv"
+MARKERS = "os^Dv<>PX*"
 
 
 def save_tradeoff(sweep: Sweep, path: Path) -> None:
@@ -46,23 +46,23 @@ def _scatter(
     ax: Axes, sweep: Sweep, known: Sequence[Point], cost: Callable[[Figures], float | None], colours: Normalize
 ) -> None:
     """Colour for the first key, the form of the marker for the second."""
-    places = {point: (_value(point, lambda f: f.full_h), _value(point, cost)) for point in known}
+    places = {point.values: (_value(point, lambda f: f.full_h), _value(point, cost)) for point in known}
     seconds = sweep.axes[1].values if len(sweep.axes) > 1 else ("",)
     for second, marker in zip(seconds, cycle(MARKERS), strict=False):
         same = [point for point in known if len(sweep.axes) < 2 or point.values[1] == second]
         ax.scatter(
-            *_columns(places[point] for point in same),
+            *_columns(places[point.values] for point in same),
             c=[float(point.values[0]) for point in same],
             norm=colours,
             marker=marker,
             s=42,
             label=f"{sweep.axes[1].name} = {second}" if second else None,
         )
-    rings = _columns(places[point] for point in best(known))
+    rings = _columns(places[point.values] for point in best(known))
     ax.scatter(*rings, s=120, facecolors="none", edgecolors="#d55e00", label="no other one is better in all three")
     if len(known) <= MAX_LABELS:
-        for point, place in places.items():
-            ax.annotate(", ".join(point.values), place, xytext=(7, 4), textcoords="offset points", size=8)
+        for values, place in places.items():
+            ax.annotate(", ".join(values), place, xytext=(7, 4), textcoords="offset points", size=8)
     ax.legend(loc="best", frameon=False, fontsize=8)
 
 

@@ -57,14 +57,15 @@ def _simulate(arguments: argparse.Namespace) -> int:
 
 
 def _sweep(arguments: argparse.Namespace) -> int:
+    from orchestrator.config.load import load_scenario
     from orchestrator.workbench.figures import aligned
     from orchestrator.workbench.sweep import axis, cluster, cores, played, rows
 
     if len(arguments.policy) != 1:
         raise UsageError("--sweep: name one policy")
-    axes = [axis(text) for text in arguments.sweep]
+    axes, scenario = [axis(text) for text in arguments.sweep], load_scenario(arguments.scenario)
     with cluster(arguments.dask) if arguments.dask else cores(arguments.jobs) as pool:
-        done = played(arguments.policy[0], arguments.scenario, axes, pool, _progress())
+        done = played(arguments.policy[0], scenario, axes, pool, _progress())
     print(aligned(rows(done)))
     if arguments.out is not None:
         print("", *_present().save_sweep(done, arguments.out), sep="\n")

@@ -1,10 +1,13 @@
 """The files that travel with the program: right, complete, and saying what the README says of them."""
 
+import re
 from pathlib import Path
 
 import pytest
 
-from orchestrator.config.load import check, load_map, load_policy, load_station
+from orchestrator.config.load import check, load_map, load_policy, load_scenario, load_station
+from orchestrator.config.scenario import Ask, BatteryModel, ChargerModel, Scenario, SensorFault, Visit, Weather
+from orchestrator.config.schema import slots
 from orchestrator.config.shipped import shipped_dir, shipped_names
 from orchestrator.keys import Range
 from orchestrator.model import ControlMode
@@ -13,17 +16,20 @@ from orchestrator.protocol.objects import Evidence, ObjectMap
 POLICIES = ("lfp-48v", "li-ion-24v", "li-ion-48v", "long-life-48v")
 MAPS = ("tabos", "tabos-lsb")
 STATIONS = ("one-bay", "two-bays-rs485")
+SCENARIOS = ("aged-pack", "agv-day", "cold-morning", "deep-discharge", "faulty-sensor", "hot-afternoon")
 
 
 def test_the_shipped_names_are_these() -> None:
     assert shipped_names("policies") == POLICIES
     assert shipped_names("configs/maps") == MAPS
     assert shipped_names("configs/stations") == STATIONS
+    assert shipped_names("configs/scenarios") == SCENARIOS
 
 
 def test_all_shipped_files_pass_the_check() -> None:
-    files = [path for folder in ("policies", "configs/maps", "configs/stations") for path in _files(folder)]
-    assert len(files) == len(POLICIES) + len(MAPS) + len(STATIONS)
+    folders = ("policies", "configs/maps", "configs/stations", "configs/scenarios")
+    files = [path for folder in folders for path in _files(folder)]
+    assert len(files) == len(POLICIES) + len(MAPS) + len(STATIONS) + len(SCENARIOS)
     assert check(files) == []
 
 
@@ -36,6 +42,19 @@ def test_a_policy_is_called_as_its_file(name: str) -> None:
     policy = load_policy(name)
     assert policy.policy == name
     assert policy.source.file == f"policies/{name}.yaml"
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_scenario_is_called_as_its_file(name: str) -> None:
+    assert load_scenario(name).scenario == name
+
+
+def test_one_scenario_shows_every_key() -> None:
+    """Where keys are explained, none is left out, be it in a comment."""
+    text = (shipped_dir() / "configs/scenarios/cold-morning.yaml").read_text(encoding="utf-8")
+    for record in (Scenario, ChargerModel, BatteryModel, Weather, Visit, SensorFault, Ask):
+        for name in slots(record):
+            assert re.search(rf"\b{name}\b", text), name
 
 
 @pytest.mark.parametrize("name", POLICIES)

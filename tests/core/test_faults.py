@@ -2,16 +2,18 @@
 
 import inspect
 import re
+from dataclasses import replace
 
 import pytest
 
 from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
+from orchestrator.keys import Range, Source
 from orchestrator.model import ENERGISED, STOP, Effect, Request, State
 from tests.core.bays import IN, running_at_the_start
 from tests.core.fault_scenes import SCENES, Scene
-from tests.core.world import TICK_S, World
+from tests.core.world import TICK_S, World, bay
 
 # --- the table itself -------------------------------------------------------------------------------------------------
 
@@ -247,3 +249,22 @@ def test_only_a_stop_that_is_due_stops() -> None:
     world.run(3600, dt_s=1.0)
     assert world.is_in(State.CHARGING)
     assert all(decision.faults == () for decision in world.decisions)
+
+
+@pytest.mark.parametrize(
+    ("limits", "celsius", "place"),
+    [
+        (Range(0, 45), 46.0, "policies/li-ion-48v.yaml:16"),
+        (Range(0, 40), 41.0, "station.yaml:7"),
+        (Range(0, 45), -1.0, "policies/li-ion-48v.yaml:16"),
+        (Range(5, 45), 4.0, "station.yaml:7"),
+    ],
+)
+def test_a_pause_for_the_temperature_names_the_line_of_the_stricter_limit(
+    limits: Range, celsius: float, place: str
+) -> None:
+    source = Source("station.yaml", {"limits.temperature_c": 7})
+    the_bay = replace(bay(), limits=replace(bay().limits, temperature_c=limits), source=source)
+    world = World(the_bay, temperature_c=celsius)
+    world.until(State.SUSPENDED)
+    assert f"({place})" in world.decision.reason

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+from orchestrator.config.shipped import shipped_names
 from orchestrator.core.faults import FAULTS
 from orchestrator.workbench.diagram import diagram, mermaid
 from tests.docs.catalogue import CATALOGUE
@@ -46,3 +47,8 @@ def test_the_places_that_are_named_are_there() -> None:
     assert len(places) > 10
     missing = [place for place in places if not ((ROOT / "orchestrator" / place).exists() or (ROOT / place).exists())]
     assert missing == []
+
+
+def test_the_page_of_the_simulator_names_every_scenario_that_ships() -> None:
+    written = (DOCS / "simulate.md").read_text(encoding="utf-8")
+    assert [name for name in shipped_names("configs/scenarios") if f"| `{name}` |" not in written] == []

@@ -21,7 +21,7 @@ def test_a_table_comes_out(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_files_are_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main((*RUN, "long-life-48v", "--out", str(tmp_path))) == 0
+    assert main(("simulate", "long-life-48v", *RUN[1:], "--out", str(tmp_path))) == 0
     assert capsys.readouterr().out.splitlines()[-2:] == [
         f"{tmp_path}/deep-discharge.html",
         f"{tmp_path}/deep-discharge.png",
@@ -43,7 +43,7 @@ def test_a_sweep_is_played(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         (("simulate", "li-ion-48v", "--scenario", "agv-days"), 1, "did you mean agv-day?"),
         (("simulate", "li-ion-24v", "--scenario", "agv-day"), 1, "is for 7 cells in series"),
         ((*RUN, "--sweep", "finish.soc_pct"), 2, "write KEY=FROM..TO:COUNT"),
-        ((*RUN, "lfp-48v", "--sweep", "finish.soc_pct=90..100:2"), 2, "name one policy"),
+        (("simulate", "lfp-48v", *RUN[1:], "--sweep", "finish.soc_pct=90..100:2"), 2, "name one policy"),
         ((*RUN, "--sweep", "finish.sco_pct=90..100:2", "--jobs", "1"), 1, ""),
     ],
 )

@@ -33,10 +33,10 @@ def test_a_charge_with_everything_in_it() -> None:
         moment(0.5),
         moment(1.0, celsius=31.5),
         moment(1.5, State.SUSPENDED),
-        moment(2.0, volts=53.2),
-        moment(2.5, volts=53.4),
+        moment(2.0, volts=53.1),
+        moment(2.5, volts=53.5),
         moment(3.0, State.FULL, volts=53.4),
-        moment(4.0, State.FULL, volts=52.0),
+        moment(4.0, State.FULL, volts=53.2),
     ]
     spans = [
         span(0, 0.5, State.CHARGING, 4),
@@ -50,7 +50,7 @@ def test_a_charge_with_everything_in_it() -> None:
     found = figures(run(moments, spans))
     assert (found.policy, found.visits, found.full, found.full_h) == ("li-ion-48v", 1, 1, 3.0)
     assert (found.left_pct, found.peak_c, found.charged_ah, found.charged_wh) == (54.0, 31.5, 12.0, 600.0)
-    assert found.high_voltage_h == pytest.approx(1.0)  # 13 × 4.1 V is 53.3 V: from 2.0 to 3.0
+    assert found.high_voltage_h == pytest.approx(1.25)  # 13 × 4.1 V is 53.3 V: from 2.25 to 3.5
     assert (found.stops, found.step_changes) == (1, 1)
     assert found.faults == {"status_limit": 1, "over_temperature": 1}
     assert found.state_h[State.CHARGING] == pytest.approx(2.49)
@@ -64,7 +64,8 @@ def test_time_to_full_is_of_each_battery_from_its_arrival() -> None:
     found = figures(
         run(moments, [span(0, 3, State.IDLE)], 3.0, visits=visits, batteries={"a": battery(), "b": battery()})
     )
-    assert (found.visits, found.full, found.full_h) == (3, 2, pytest.approx(0.625))
+    assert (found.visits, found.full) == (3, 2)
+    assert found.full_h == pytest.approx(0.625)
 
 
 def test_nothing_charged_has_dashes() -> None:

@@ -35,7 +35,7 @@ def same(leaps: Run, ticks: Run) -> None:
         assert leapt.from_s == pytest.approx(ticked.from_s, abs=SAME_S), (leapt, ticked)
         assert leapt.faults == ticked.faults
     assert leaps.charged_ah == pytest.approx(ticks.charged_ah, rel=1e-4)
-    assert leaps.steps < ticks.steps / 3
+    assert leaps.steps < ticks.steps / 2  # even where most of the time is spent in pulses
 
 
 @pytest.mark.timeout(600)  # tens of thousands of steps, on a machine that may be busy
@@ -81,7 +81,7 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(simulation, "step", recorded)
     last = []
-    for max_leap in (240, 1):
+    for max_leap in (simulation.MAX_LEAP, 1):
         memories.clear()
         Simulation(load_policy("li-ion-48v"), scenario(0.25), max_leap).run(lambda _: None)
         last.append((memories[-1], len(memories)))
@@ -90,7 +90,7 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
     assert leapt.state is ticked.state is State.CHARGING
     assert leapt.session is not None
     assert ticked.session is not None
-    assert leapt.session.charged_ah == pytest.approx(ticked.session.charged_ah, rel=1e-5)
+    assert leapt.session.charged_ah == pytest.approx(ticked.session.charged_ah, abs=14 * TICK_S / 3600)
     assert leapt.session.charged_wh == pytest.approx(ticked.session.charged_wh, rel=1e-3)
     assert leapt.session.energised_s == ticked.session.energised_s
     assert [t_s for t_s, _ in leapt.warmth] == [t_s for t_s, _ in ticked.warmth]

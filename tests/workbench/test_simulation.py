@@ -35,9 +35,9 @@ def test_a_shipped_scenario_is_played_to_its_end_and_charges(name: str) -> None:
             assert m.temperature_c in limits.temperature_c
 
 
-def test_the_moments_are_in_order_and_a_minute_apart_at_most() -> None:
+def test_the_moments_are_in_order_and_two_minutes_apart_at_most() -> None:
     times = [m.t_s for m in simulate(POLICY, scenario(1.0)).trail.moments]
-    assert all(0 < later - earlier <= 60 for earlier, later in pairwise(times))
+    assert all(0 < later - earlier <= 120 for earlier, later in pairwise(times))
 
 
 def test_the_spans_join_without_a_gap() -> None:
@@ -65,7 +65,8 @@ def test_batteries_come_and_go_and_keep_their_charge() -> None:
     empty = [m for m in moments if 360 < m.t_s <= 720]
     assert all(m.soc_pct is None and m.current_a == 0 for m in empty)
     second = next(m for m in moments if m.t_s > 720)
-    assert (second.soc_pct, second.temperature_c) == (pytest.approx(60, abs=0.01), pytest.approx(30, abs=0.01))
+    assert second.soc_pct == pytest.approx(60, abs=0.01)
+    assert second.temperature_c == pytest.approx(30, abs=0.01)
     back = next(m for m in moments if m.t_s > 1440)
     assert back.soc_pct == pytest.approx(left.soc_pct - 20, abs=0.01)
 
@@ -101,7 +102,8 @@ def test_an_operator_asks_in_time() -> None:
     run = simulate(POLICY, scenario(0.3, operator=asks))
     assert states(run) == [State.CHARGING, State.SUSPENDED, State.CHARGING]
     paused = next(span for span in run.trail.spans if span.state is State.SUSPENDED)
-    assert (paused.from_s, paused.to_s) == (pytest.approx(360, abs=2), pytest.approx(720, abs=1))
+    assert paused.from_s == pytest.approx(360, abs=2)
+    assert paused.to_s == pytest.approx(720, abs=1)
 
 
 def test_a_policy_for_other_cells_is_refused_with_both_lines() -> None:

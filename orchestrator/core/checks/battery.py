@@ -106,15 +106,18 @@ def over_temperature(f: Facts) -> str | None:
     again = high - HEAT_HYSTERESIS_K
     if f.temperature_c is None or f.temperature_c < (again if "over_temperature" in f.raised else high):
         return None
-    return f"the pack has {f.temperature_c:.1f} °C, the limit is {high:g} °C; it charges again below {again:g} °C"
+    limit = f"the limit is {high:g} °C ({f.rules.hottest_at})"
+    return f"the pack has {f.temperature_c:.1f} °C, {limit}; it charges again below {again:g} °C"
 
 
 def hot_trip(f: Facts) -> str | None:
     """FAULTS B10, where cooling down is not enough."""
-    limit = f.rules.policy.faults.temperature_trip_c
+    policy = f.rules.policy
+    limit = policy.faults.temperature_trip_c
     if f.temperature_c is None or f.temperature_c < limit:
         return None
-    return f"the pack has {f.temperature_c:.1f} °C, at or above {limit:g} °C"
+    at = policy.source.at("faults.temperature_trip_c")
+    return f"the pack has {f.temperature_c:.1f} °C, at or above {limit:g} °C ({at})"
 
 
 def under_temperature(f: Facts) -> str | None:
@@ -123,7 +126,8 @@ def under_temperature(f: Facts) -> str | None:
     again = low + COLD_HYSTERESIS_K
     if f.temperature_c is None or f.temperature_c >= (again if "under_temperature" in f.raised else low):
         return None
-    return f"the pack has {f.temperature_c:.1f} °C, the limit is {low:g} °C; it charges again at {again:g} °C"
+    limit = f"the limit is {low:g} °C ({f.rules.coldest_at})"
+    return f"the pack has {f.temperature_c:.1f} °C, {limit}; it charges again at {again:g} °C"
 
 
 def runaway(f: Facts) -> str | None:

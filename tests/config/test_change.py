@@ -1,0 +1,51 @@
+"""Other values in place of what a file says: read, checked and located like what is written."""
+
+import pytest
+
+from orchestrator.config.load import load_policy
+from orchestrator.errors import ConfigError
+
+
+def test_a_value_is_read_as_if_it_stood_there() -> None:
+    policy = load_policy("li-ion-48v", changes={"finish.soc_pct": "99", "pack.voltage_v[1]": "55"})
+    assert policy.finish.soc_pct == 99
+    assert policy.pack.voltage_v.high == 55
+    assert load_policy("li-ion-48v").finish.soc_pct == 100
+
+
+def test_rows_of_a_table_are_counted_from_0() -> None:
+    changes = {"current.soc_pct[0].to": "70", "current.soc_pct[1].from": "70", "current.soc_pct[1].step": "1"}
+    table = load_policy("li-ion-48v", changes=changes).current.soc_pct
+    assert table is not None
+    assert [(row.from_, row.to, row.step) for row in table] == [(0, 70, 4), (70, 100, 1)]
+
+
+def test_a_key_that_is_left_out_is_added_with_its_group() -> None:
+    changes = {"faults.amps_differ_a": "0.5", "start.soc_below_pct": "50"}
+    policy = load_policy("lfp-48v", changes=changes)
+    assert (policy.faults.amps_differ_a, policy.start.soc_below_pct) == (0.5, 50)
+
+
+def test_lines_stay_those_of_the_file() -> None:
+    policy = load_policy("li-ion-48v", changes={"finish.soc_pct": "99"})
+    assert policy.source.at("finish.soc_pct") == load_policy("li-ion-48v").source.at("finish.soc_pct")
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "says"),
+    [
+        ("finish.soc_pct", "101", "policies/li-ion-48v.yaml:55:12: error: finish.soc_pct: 101 % is too high"),
+        ("finish.soc_pct", "99 %", "only the number, without a unit"),
+        ("finish.sco_pct", "99", "unknown key 'sco_pct' in finish; did you mean soc_pct?"),
+        ("current.soc_pct[0].to", "80", "current.soc_pct[1].from: 90 leaves a gap"),
+        ("current.soc_pct[2].to", "80", "current.soc_pct[2].to: there is no row [2]; the first one is [0]"),
+        ("current[0]", "80", "current[0]: there is no row [0]"),
+        ("finish", "80", "finish is not one value: name a key below it"),
+        ("finish.soc_pct.to", "80", "finish.soc_pct.to: there is no to"),
+        ("", "80", " is not one value"),
+    ],
+)
+def test_what_may_not_stand_there_is_a_finding(path: str, text: str, says: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_policy("li-ion-48v", changes={path: text})
+    assert says in str(caught.value)
