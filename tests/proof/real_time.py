@@ -3,8 +3,8 @@
 Batteries come, are charged and leave; now and then something breaks in mid-charge, is found out, mended and reset.
 The emulated station says what is true, the service's own journal what it made of it.
 
-To be run on a quiet machine: what goes through a pty goes through a thread of the kernel that no priority reaches. Where
-that waits for half a second, the service stops, its guardian ends it, and it is started anew, which is counted.
+To be run on a quiet machine: what goes through a pty goes through a thread of the kernel that no priority reaches. If
+that has to wait for half a second, the service stops, its guardian ends it, and it is started anew, which is counted.
 """
 
 import json

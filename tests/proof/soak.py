@@ -97,8 +97,9 @@ def _flatness(samples: Sequence[Sample]) -> str:
     def by_quarters(field: str) -> str:
         return " ".join(f"{statistics.median(getattr(x, field) for x in quarter):g}" for quarter in quarters if quarter)
 
+    lived_s = samples[-1].t_s - samples[0].t_s
     return (
-        f"{samples[-1].t_s - samples[0].t_s:.0f} s by quarters: {by_quarters('mib')} MiB; {by_quarters('descriptors')} descriptors; "
+        f"{lived_s:.0f} s by quarters: {by_quarters('mib')} MiB; {by_quarters('descriptors')} descriptors; "
         f"{by_quarters('threads')} threads"
     )
 
