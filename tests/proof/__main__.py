@@ -1,7 +1,7 @@
 """The campaign: every proof on the whole service in virtual time, in its long form, one after the other.
 
-    python -m tests.proof                 all of them
-    python -m tests.proof grid calls      only these two
+    python -m tests.proof                 grid, scripts, calls
+    python -m tests.proof core            only this one, which takes longer than those together
 
 Each has a main of its own, with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`, `exploring`.
 """
@@ -23,6 +23,9 @@ PARTS: Mapping[str, tuple[str, Callable[[Sequence[str]], int]]] = {
 }
 
 
+USUAL = ("grid", "scripts", "calls")
+
+
 def cpu_s() -> float:
     """What this process and those that it has waited for have used of a core."""
     used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
@@ -33,7 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Those parts, in this order; 1 if any of them found something."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
-    chosen = parser.parse_args(argv).parts or list(PARTS)
+    chosen = parser.parse_args(argv).parts or USUAL
     if unknown := set(chosen) - set(PARTS):
         parser.error(f"no part {', '.join(sorted(unknown))}: there are {', '.join(PARTS)}")
     began_s = time.monotonic()

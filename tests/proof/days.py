@@ -162,6 +162,8 @@ class Days:
             self.lived.false_latches.append(said)
         if self._state in ENERGISED:
             self.lived.false_stops.append(said)
+        if self._tell:
+            say(f"life {self._script.seed}, in {self._state}: {said}")
 
     def _because(self, t_s: float) -> str:
         at = bisect_right(self._due, (t_s, 0.0, "")) - 1

@@ -2,6 +2,9 @@
 
 Batteries come, are charged and leave; now and then something breaks in mid-charge, is found out, mended and reset.
 The emulated station says what is true, the service's own journal what it made of it.
+
+To be run on a quiet machine: what goes through a pty goes through a thread of the kernel that no priority reaches. If
+that has to wait for half a second, the service stops, its guardian ends it, and it is started anew, which is counted.
 """
 
 import json
@@ -45,6 +48,7 @@ NOBODY: dict[str, Any] = {"state": "", "reason": "", "alarm": False, "command": 
 class Sample:
     """One process at one time."""
 
+    pid: int
     t_s: float
     mib: float
     descriptors: int
@@ -237,7 +241,7 @@ def _sample_of(pid: int, t_s: float) -> Sample:
     process = Path(f"/proc/{pid}")
     pages = int((process / "statm").read_text(encoding="utf-8").split()[1])
     mib = round(pages * os.sysconf("SC_PAGE_SIZE") / 2**20, 2)
-    return Sample(t_s, mib, len(list((process / "fd").iterdir())), len(list((process / "task").iterdir())))
+    return Sample(pid, t_s, mib, len(list((process / "fd").iterdir())), len(list((process / "task").iterdir())))
 
 
 def live(minutes: float, seed: int = 1) -> Real:

@@ -82,7 +82,13 @@ def told_of_real(real: Real, minutes: float) -> Iterator[str]:
     yield from _listed("restarts by the guardian", real.restarts)
     yield from _listed("other oddities", real.odd)
     for name, samples in real.samples.items():
-        yield f"{name:10} {_flatness(samples)}"
+        yield f"{name:10} {_flatness(longest(samples))}"
+
+
+def longest(samples: Sequence[Sample]) -> list[Sample]:
+    """Of the process that lived longest."""
+    pid, _ = Counter(sample.pid for sample in samples).most_common(1)[0]
+    return [sample for sample in samples if sample.pid == pid]
 
 
 def _flatness(samples: Sequence[Sample]) -> str:
@@ -91,8 +97,9 @@ def _flatness(samples: Sequence[Sample]) -> str:
     def by_quarters(field: str) -> str:
         return " ".join(f"{statistics.median(getattr(x, field) for x in quarter):g}" for quarter in quarters if quarter)
 
+    lived_s = samples[-1].t_s - samples[0].t_s
     return (
-        f"by quarters: {by_quarters('mib')} MiB; {by_quarters('descriptors')} descriptors; "
+        f"{lived_s:.0f} s by quarters: {by_quarters('mib')} MiB; {by_quarters('descriptors')} descriptors; "
         f"{by_quarters('threads')} threads"
     )
 
@@ -112,7 +119,8 @@ def grown(lives: Sequence[Lived], real: Real | None) -> list[str]:
     wrong = [
         f"a life grew from {x.mib[0]:.1f} to {x.mib[-1]:.1f} MiB" for x in lives if x.mib[-1] > x.mib[0] + FLAT_MIB
     ]
-    for name, samples in (real.samples if real else {}).items():
+    for name, every in (real.samples if real else {}).items():
+        samples = longest(every)
         second, last = samples[len(samples) // 4 : len(samples) // 2], samples[-len(samples) // 4 :]
         if second and statistics.median(x.mib for x in last) > statistics.median(x.mib for x in second) + FLAT_MIB:
             wrong.append(f"the {name} grew from {second[0].mib:.1f} to {last[-1].mib:.1f} MiB")

@@ -14,8 +14,8 @@ from orchestrator.core.rules import Rules
 from orchestrator.devices import charger as charger_module
 from orchestrator.devices import dialogue as dialogue_module
 from orchestrator.model import State
-from tests.proof.campaign import kinds, play_seed, smallest, table
-from tests.proof.play import play
+from tests.proof.campaign import kinds, play_seed, smallest, table, unseen
+from tests.proof.play import Injected, play
 from tests.proof.script import BaySetup, Happening, Script
 
 Patch = pytest.MonkeyPatch
@@ -106,3 +106,14 @@ def test_a_bug_is_seen_and_its_script_made_small(name: str, monkeypatch: Patch) 
     assert len(small.bays) == 1
     assert small.bays[0].line == "real"
     assert small.end_s < script.end_s
+
+
+def test_what_was_there_for_long_and_changed_nothing_is_unseen() -> None:
+    injected = [
+        Injected("frozen_temperature", 8.0, lasted_s=9.0),
+        Injected("frozen_temperature", 8.0, lasted_s=1.0),
+        Injected("bmu_silent", 8.0, fault="bmu_silent", lasted_s=9.0),
+        Injected("bmu_reboot", 8.0, verified=True, lasted_s=9.0),
+    ]
+    assert [unseen(one) for one in injected] == [True, False, False, False]
+    assert table(injected)[-2].split()[:4] == ["frozen_temperature", "2", "0", "1"]

@@ -92,7 +92,7 @@ def test_the_days_are_shared_out() -> None:
 
 
 def samples(*mib: float) -> list[Sample]:
-    return [Sample(10.0 * at, one, 11, 5) for at, one in enumerate(mib)]
+    return [Sample(7, 10.0 * at, one, 11, 5) for at, one in enumerate(mib)]
 
 
 def test_memory_that_grows_is_found_and_memory_that_settles_is_not() -> None:
@@ -101,6 +101,7 @@ def test_memory_that_grows_is_found_and_memory_that_settles_is_not() -> None:
     assert grown([growing], None) == ["a life grew from 37.0 to 39.0 MiB"]
     settles = Real(samples={"controller": samples(30.0, 33.0, 33.1, 33.1, 33.2, 33.2, 33.1, 33.2)})
     climbs = Real(samples={"controller": samples(30.0, 33.0, 33.5, 34.0, 34.5, 35.0, 35.5, 36.0)})
+    settles.samples["controller"].append(Sample(8, 80.0, 99.0, 11, 5))  # of another one, that was started in its place
     assert not grown([], settles)
     assert grown([], climbs) == ["the controller grew from 33.5 to 36.0 MiB"]
 
