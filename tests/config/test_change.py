@@ -34,7 +34,7 @@ def test_lines_stay_those_of_the_file() -> None:
 @pytest.mark.parametrize(
     ("path", "text", "says"),
     [
-        ("finish.soc_pct", "101", "policies/li-ion-48v.yaml:55:12: error: finish.soc_pct: 101 % is too high"),
+        ("finish.soc_pct", "101", "policies/li-ion-48v.yaml:56:12: error: finish.soc_pct: 101 % is too high"),
         ("finish.soc_pct", "99 %", "only the number, without a unit"),
         ("finish.sco_pct", "99", "unknown key 'sco_pct' in finish; did you mean soc_pct?"),
         ("current.soc_pct[0].to", "80", "current.soc_pct[1].from: 90 leaves a gap"),

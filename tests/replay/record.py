@@ -1,0 +1,77 @@
+"""Journals to be replayed: the demo's, in earnest, and those of some fault scripts of the campaign, in virtual time.
+
+    python -m tests.replay.record              all of them anew
+    python -m tests.replay.record scripts      only those in virtual time
+
+They are references: record them anew only where a decision was changed on purpose, and look at what the replay says
+before (`orchestrator replay tests/replay/journals/…`). A bug that was found in the field becomes one more of them.
+"""
+
+import gzip
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestrator.demo.stage import Stage
+from orchestrator.service.journal import _line
+from orchestrator.service.records import SnapshotRecorder
+from tests.proof.play import Player, stage
+from tests.proof.report import say
+from tests.proof.script import Script
+from tests.waiting import wait_until
+
+JOURNALS = Path(__file__).parent / "journals"
+#: Fault scripts that together have every state and most faults in them, several bays, automatic and manual chargers.
+SEEDS = (14, 20, 21, 22, 27, 41, 46, 79, 102, 105)
+#: Where virtual time lies in real time.
+BEGAN_S = 1_767_225_600.0
+DEMO_S = 150.0
+
+
+def script(seed: int) -> bytes:
+    """The journal of a script of the campaign."""
+    lines: list[bytes] = []
+    the_script = Script.of_seed(seed)
+    with stage(the_script) as made:
+        player = Player(the_script, made)
+
+        def put(bay: str, line: Any) -> None:
+            lines.append(_line((made.time.now_s, BEGAN_S + made.time.now_s, bay, line)))
+
+        made.journal.put = put  # type: ignore[method-assign]  # what it is given is written down
+        for runner in made.bays:
+            runner._recorder = SnapshotRecorder(runner._rules.bay)
+        player.run()
+    return b"".join(lines)
+
+
+def demo() -> bytes:
+    """The journal of the demo's whole charge."""
+    with Stage() as made:
+        wait_until(lambda: (made.bay() or {}).get("state") == "FULL", DEMO_S, "the demo's battery is full", 0.5)
+        made.end()
+        return b"".join(path.read_bytes() for path in sorted((made.directory / "run" / "journal").glob("*.jsonl")))
+
+
+def write(name: str, journal: bytes) -> None:
+    """Gzipped without a time, so that the same journal is the same file."""
+    path = JOURNALS / f"{name}.jsonl.gz"
+    path.write_bytes(gzip.compress(journal, mtime=0))
+    say(f"{path.name}: {journal.count(b'snapshot')} steps, {path.stat().st_size / 1000:.0f} kB")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Record; the exit status."""
+    JOURNALS.mkdir(exist_ok=True)
+    names: Iterable[str] = arguments or ("demo", "scripts")
+    if "demo" in names:
+        write("demo", demo())
+    if "scripts" in names:
+        for seed in SEEDS:
+            write(f"script-{seed}", script(seed))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,34 @@
+"""What was decided once is decided again: every journal that ships, taken again with its own rules."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.model import State
+from orchestrator.workbench.recording import read
+from orchestrator.workbench.replay import again
+from tests.replay.record import JOURNALS, SEEDS
+
+PATHS = sorted(JOURNALS.glob("*.jsonl.gz"))
+
+
+def test_the_journals_are_there() -> None:
+    assert {path.name for path in PATHS} >= {"demo.jsonl.gz", *(f"script-{seed}.jsonl.gz" for seed in SEEDS)}
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.name)
+def test_every_decision_is_the_one_that_was_recorded(path: Path) -> None:
+    wrong = {
+        f"{bay} {one.recorded.wall}": one.wrong
+        for bay, steps in read([path]).items()
+        for one in again(steps)
+        if one.wrong
+    }
+    assert not wrong, "on purpose? python -m tests.replay.record"
+
+
+def test_they_have_all_that_matters_in_them() -> None:
+    taken = [one for path in PATHS for steps in read([path]).values() for one in again(steps)]
+    assert len(taken) > 2000
+    assert {one.decision.state for one in taken} == set(State)
+    assert len({fault.id for one in taken for fault in one.decision.faults}) >= 8
