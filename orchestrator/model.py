@@ -181,9 +181,6 @@ class BatteryLink:
     bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers
 
 
-# --- what the core is given and what it says -------------------------------------------------------------------------
-
-
 class Request(StrEnum):
     """What an operator can ask of a bay."""
 
