@@ -16,6 +16,8 @@ def table(bays: Sequence[Mapping[str, object]]) -> str:
         lines.append("  ".join([*cells, row[-1]]).rstrip())
         if bay is not None:
             lines.extend(f"  {fault['effect']}: {fault['text']}" for fault in other_faults(bay))
+            if cast("Mapping[str, object]", bay.get("policy", {})).get("waiting_sha256"):
+                lines.append("  POLICY: a changed one comes into force when this bay stands by")
     return "\n".join(lines)
 
 

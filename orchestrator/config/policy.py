@@ -102,7 +102,9 @@ class Finish:
     taper: Taper | None = key("full when the current has tapered off", default=None)
     charger_full: bool = key("full when the charger itself says so (mode 5)", default=True)
     max_hours: float = key("a charge that takes longer is a fault", unit="h", gt=0, le=12)
-    max_ah: float = key("a charge that took more is a fault", unit="Ah", gt=0)
+    max_ah: float = key(
+        "a charge that took more is a fault; one that begins above SOC 20 % may take that much less", unit="Ah", gt=0
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

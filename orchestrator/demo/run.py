@@ -13,7 +13,7 @@ from orchestrator.sim.faults import FAULTS
 #: How often the picture changes.
 LOOK_EVERY_S = 0.1
 #: Not faults that the service is to stop for.
-NO_FAULT = ("heal", "frozen_temperature")
+NO_FAULT = ("heal", "frozen_temperature", "soc_jump")
 
 
 def demo(fault: str | None, *, plain: bool) -> int:

@@ -18,6 +18,8 @@ from orchestrator.sim.rig import Rig
 NO_SUCH_OBJECT = 0x0602_0000
 #: The object that holds the temperature, without which nothing may be charged.
 TEMPERATURE = 0x6004
+#: How long a BMU is not heard while somebody puts another battery in its place.
+EXCHANGE_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +155,26 @@ def _illegal_value(rig: Rig, value: float | None) -> None:
     rig.wire.lies[Kind.CHARGE_MODE] = 9 if value is None else int(value)
 
 
+def _polarity_contradicts(rig: Rig, _: float | None) -> None:
+    rig.wire.lies[Kind.CHARGE_MODE] = ChargeMode.REVERSED
+
+
+def _frozen_charger(rig: Rig, _: float | None) -> None:
+    charger = rig.bay.charger
+    rig.wire.lies |= {Kind.VOLTAGE: round(charger.voltage_v * 100), Kind.CURRENT: round(charger.current_a * 100)}
+
+
+def _soc_jump(rig: Rig, value: float | None) -> None:
+    step_pct = -15.0 if value is None else value
+    rig.bay.falsify["soc_pct"] = lambda pct: min(max(pct + step_pct, 0.0), 100.0)
+
+
+def _battery_exchanged(rig: Rig, value: float | None) -> None:
+    _soc_jump(rig, -25.0 if value is None else value)
+    rig.bmu.port.faults.mute = True
+    rig.later(EXCHANGE_S, lambda: setattr(rig.bmu.port.faults, "mute", False))
+
+
 def _mode_taken_over(rig: Rig, _: float | None) -> None:
     rig.bay.charger.control_mode = ControlMode.AUTOMATIC
 
@@ -209,6 +231,12 @@ FAULTS = {
     "command_ignored": Fault("the charger falls to its lowest limit and takes no other", _command_ignored),
     "precharge_no_rise": Fault("what flows into the pack is lost inside: its voltage stays", _precharge_no_rise),
     "illegal_value": Fault("the charger says mode 9, which does not exist", _illegal_value),
+    "polarity_contradicts": Fault(
+        "the charger says mode 6 (reversed) and connection 1 (normal)", _polarity_contradicts
+    ),
+    "frozen_charger": Fault("the charger goes on saying the volts and amps of now", _frozen_charger),
+    "soc_jump": Fault("the BMU says 15 % less from one reading to the next", _soc_jump),
+    "battery_exchanged": Fault("the BMU falls silent, and after 4 s says 25 % less", _battery_exchanged),
     "mode_taken_over": Fault("somebody turns the charger's rotary switch to automatic", _mode_taken_over),
     "battery_removed": Fault("the battery is taken out of the bay", _battery_removed),
     "ignore_stop": Fault("the charger no longer obeys a stop", _ignore_stop),

@@ -66,6 +66,10 @@ class Rig:
         self.injected_s = self._loop.time()
         return self.injected_s
 
+    def later(self, seconds: float, act: Callable[[], object]) -> None:
+        """Let something happen after a while."""
+        self._loop.call_later(seconds, act)
+
     def close(self) -> None:
         """Both devices vanish."""
         self.wire.close()

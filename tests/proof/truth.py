@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from orchestrator.core.rules import Rules
-from orchestrator.model import ENERGISED, STOP, Decision, State
+from orchestrator.model import ENERGISED, STOP, ChargeMode, Decision, State
+from orchestrator.sim.charger_frames import Kind
 from orchestrator.sim.pack import Readout
 from tests.proof.virtual_rig import VirtualRig
 from tests.proof.virtual_service import STEPS_A
@@ -62,12 +63,17 @@ class Condition:
     holds: Callable[[Bay], bool]
 
 
+def _shown(bay: Bay, kind: Kind, truth: float) -> float:
+    """What the charger says: nobody can see through its lie, only past it, at the BMU's values."""
+    return bay.rig.wire.lies[kind] / 100 if kind in bay.rig.wire.lies else truth
+
+
 def _implausible(bay: Bay) -> bool:
     return not 0 <= bay.told.soc_pct <= 100
 
 
 def _over_voltage(bay: Bay) -> bool:
-    return max(bay.told.voltage_v, bay.rig.bay.charger.voltage_v) > bay.rules.max_v + ROUND_V
+    return max(bay.told.voltage_v, _shown(bay, Kind.VOLTAGE, bay.rig.bay.charger.voltage_v)) > bay.rules.max_v + ROUND_V
 
 
 def _switch_turned(bay: Bay) -> bool:
@@ -79,16 +85,16 @@ def _over_current(bay: Bay) -> bool:
     limit_a = bay.rules.bay.limits.current_a
     if bay.rules.manual:
         limit_a = min(limit_a, STEPS_A[charger.current_limit])
-    return charger.current_a > limit_a * 1.1 + 0.3 + ROUND_A
+    return _shown(bay, Kind.CURRENT, charger.current_a) > limit_a * 1.1 + 0.3 + ROUND_A
 
 
 def _volts_disagree(bay: Bay) -> bool:
-    differ_v = abs(bay.rig.bay.charger.voltage_v - bay.told.voltage_v)
+    differ_v = abs(_shown(bay, Kind.VOLTAGE, bay.rig.bay.charger.voltage_v) - bay.told.voltage_v)
     return differ_v > max(1.0, 0.02 * bay.told.voltage_v) + ROUND_V
 
 
 def _amps_disagree(bay: Bay) -> bool:
-    charger_a = bay.rig.bay.charger.current_a
+    charger_a = _shown(bay, Kind.CURRENT, bay.rig.bay.charger.current_a)
     return abs(charger_a - bay.told.current_a) > max(1.0, 0.1 * charger_a) + ROUND_A
 
 
@@ -100,6 +106,7 @@ def _since_start(when_s: float | None, bay: Bay) -> bool:
 TRIP_BITS = 1 << 0 | 1 << 2 | 1 << 4 | 1 << 6
 
 CONDITIONS: tuple[Condition, ...] = (
+    Condition("polarity", SILENT_S, lambda b: b.rig.wire.lies.get(Kind.CHARGE_MODE) == ChargeMode.REVERSED),
     Condition("runs uncommanded", SILENT_S, lambda b: b.decision.state not in ENERGISED),
     Condition("charger's answers lost", SILENT_S, lambda b: b.rig.wire.mute_tx or b.rig.wire.complains),
     Condition("charger hears nothing", SILENT_S, lambda b: b.rig.wire.mute_rx and b.rig.wire.mute_tx),
@@ -117,7 +124,7 @@ CONDITIONS: tuple[Condition, ...] = (
     Condition("volts disagree", SILENT_S + 3.0, _volts_disagree),
     Condition("amps disagree", SILENT_S + 5.0, _amps_disagree),
     Condition("no battery", SILENT_S, lambda b: not b.rig.bay.connected),
-    Condition("undocumented mode", SILENT_S, lambda b: any(not 1 <= lie <= 8 for lie in b.rig.wire.lies.values())),
+    Condition("undocumented mode", SILENT_S, lambda b: not 1 <= b.rig.wire.lies.get(Kind.CHARGE_MODE, 1) <= 8),
     Condition("rotary switch turned", SILENT_S, _switch_turned),
     Condition("BMU booted", SILENT_S, lambda b: _since_start(b.heard.boot_s, b)),
     Condition("emergency", SILENT_S, lambda b: _since_start(b.heard.emergency_s, b)),

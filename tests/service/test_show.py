@@ -52,6 +52,12 @@ def test_a_fault_that_is_not_the_reason_stands_below() -> None:
     assert table([told]).splitlines()[2:] == ["  WARN: a noisy line"]
 
 
+def test_a_policy_that_waits_is_told() -> None:
+    told = bay(policy={"name": "mine", "sha256": "0123", "waiting_sha256": "4567"})
+    assert table([told]).splitlines()[2:] == ["  POLICY: a changed one comes into force when this bay stands by"]
+    assert len(table([bay(policy={"waiting_sha256": ""})]).splitlines()) == 2
+
+
 def test_figures() -> None:
     assert figure(0, "{:.1f} A") == "0.0 A"
     assert figure(None, "{:.1f} A") == "–"

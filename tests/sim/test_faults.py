@@ -127,6 +127,15 @@ SEEN: dict[str, Callable[[Rig], object]] = {
     "command_ignored": ignores_a_limit,
     "precharge_no_rise": does_not_rise,
     "illegal_value": lambda rig: rig.wire.lies == {Kind.CHARGE_MODE: 9},
+    "polarity_contradicts": lambda rig: rig.wire.lies == {Kind.CHARGE_MODE: 6} and rig.bay.charger.connection == 1,
+    "frozen_charger": after(
+        60,
+        lambda rig: (
+            rig.wire.lies.get(Kind.CURRENT) == 800 and rig.bay.charger.voltage_v > rig.wire.lies[Kind.VOLTAGE] / 100
+        ),
+    ),
+    "soc_jump": lambda rig: rig.bay.readout().soc_pct < 36,
+    "battery_exchanged": lambda rig: rig.bmu.port.faults.mute and rig.bay.readout().soc_pct < 26,
     "mode_taken_over": lambda rig: rig.bay.charger.control_mode is ControlMode.AUTOMATIC,
     "battery_removed": lambda rig: rig.bay.charger.voltage_v == 0 and rig.bmu.port.faults.mute,
     "ignore_stop": ignores_a_stop,

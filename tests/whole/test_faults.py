@@ -56,6 +56,8 @@ CASES = (
     Case("precharge_no_rise", "TRIPPED", "precharge_no_rise", 10.0, before="precharge"),
     Case("ignore_stop", "UNCONTROLLABLE", "will_not_stop"),
     Case("illegal_value", "SUSPENDED", "illegal_value"),
+    Case("polarity_contradicts", "TRIPPED", "reverse_polarity"),  # with either it stops at once
+    Case("battery_exchanged", "IDLE", "heartbeat_lost", SILENCE_S),
     Case("mode_taken_over", "IDLE", "mode_taken_over"),
     Case("battery_removed", "IDLE", "heartbeat_lost", SILENCE_S),
     Case("port_gone", "UNCONTROLLABLE", "charger_silent", None),
@@ -117,8 +119,9 @@ def named(service: Service, case: Case) -> bool:
 
 
 def test_every_fault_is_tried() -> None:
-    # A sensor that goes on saying the temperature of now cannot be told from a pack that keeps it.
-    assert {case.name for case in CASES} == set(FAULTS) - {"heal", "frozen_temperature"}
+    # A sensor that goes on saying the temperature of now cannot be told from a pack that keeps it; a charger that goes
+    # on saying its volts and amps takes a minute to be found out (tests/core); a SOC that jumps stops nothing.
+    assert {case.name for case in CASES} == set(FAULTS) - {"heal", "frozen_temperature", "frozen_charger", "soc_jump"}
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
