@@ -10,7 +10,7 @@ AT_ONCE_S = 0.5
 
 
 def test_a_charge_from_the_first_pulse_to_full(tmp_path: Path) -> None:
-    with vcan("vcan0"), station(tmp_path, socketcan("vcan0"), None, "--pack", "demo", "--speed", "4") as scene:
+    with vcan("vcan0"), station(tmp_path, socketcan("vcan0"), None, "--pack", "demo", "--speed", "2") as scene:
         scene.service.wait("FULL", timeout_s=120)
         truth = scene.plant.state()
         assert truth["soc_pct"] > 95
