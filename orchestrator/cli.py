@@ -178,11 +178,12 @@ def _request(arguments: argparse.Namespace) -> int:
 def _check(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import check
     from orchestrator.devices.bus_load import slow_buses
+    from orchestrator.workbench.lint import LINT
 
-    findings = check(arguments.file)
+    findings = check(arguments.file, LINT)
     for finding in findings:
         print(finding, file=sys.stderr)
-    if findings:
+    if any(finding.severity == "error" for finding in findings):
         return 1
     for station in filter(None, map(_station, arguments.file)):
         for warning in slow_buses(station):

@@ -19,9 +19,10 @@ class Finding:
     line: int
     column: int
     text: str
+    severity: str = "error"  #: or "warning": it can be used as it is, and can hardly be meant
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}:{self.column}: error: {self.text}"
+        return f"{self.file}:{self.line}:{self.column}: {self.severity}: {self.text}"
 
 
 class ConfigError(OrchestratorError):

@@ -10,6 +10,7 @@ from orchestrator.config.change import changed
 from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.policy import Policy
 from orchestrator.config.reader import Reader
+from orchestrator.config.rules import Problems
 from orchestrator.config.scalars import UnfitError, nearest
 from orchestrator.config.scenario import Scenario
 from orchestrator.config.schema import INVALID
@@ -19,6 +20,7 @@ from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
 
 T = TypeVar("T")
+Lint = Callable[[Mapping[str, object]], Problems]  #: a file's values by their paths → what can hardly be meant
 #: So many hexadecimal digits tell two versions of a file apart.
 DIGEST = 12
 
@@ -48,13 +50,14 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     return _load(SCENARIO, _find(SCENARIO, name_or_path, None), Scenario)
 
 
-def check(paths: Iterable[str | Path]) -> list[Finding]:
-    """Everything that is wrong in these files and in those that they name, sorted; an empty list is a yes.
+def check(paths: Iterable[str | Path], lint: Mapping[str, Lint] | None = None) -> list[Finding]:
+    """Everything that is wrong in these files and in those that they name, sorted; without an error it is a yes.
 
     What a file is, is told by its key `policy`, `station`, `map` or `scenario`. A file named twice is reported once.
+    `lint`, by that key, adds warnings about files without errors.
     """
     places = [place(path) for path in paths]
-    loader = _Loader(places)
+    loader = _Loader(places, lint=lint)
     for one in places:
         loader.check(one)
     return sorted(set(loader.findings))
@@ -84,8 +87,14 @@ def _find(kind: Kind, name_or_path: str | Path, relative_to: Path | None) -> Pla
 class _Loader:
     """Reads each file once, however many bays name it, and collects the findings of all."""
 
-    def __init__(self, named: Iterable[Place], changes: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        named: Iterable[Place],
+        changes: Mapping[str, str] | None = None,
+        lint: Mapping[str, Lint] | None = None,
+    ) -> None:
         self.findings: list[Finding] = []
+        self._lint = lint or {}
         self._changes = changes or {}
         self._shown = {os.path.realpath(one.path): one.shown for one in named}
         self._trees: dict[str, Node | None] = {}
@@ -133,8 +142,12 @@ class _Loader:
         value = reader.read(kind.record, node)
         for path, text in kind.rules(reader.values):
             reader.report(path, text)
+        bad = bool(reader.findings)
+        if not bad and kind.key in self._lint:
+            for path, text in self._lint[kind.key](reader.values):
+                reader.report(path, text, "warning")
         self.findings += reader.findings
-        return INVALID if reader.findings else value
+        return INVALID if bad else value
 
     def _tree(self, where: Place) -> Node | None:
         real = os.path.realpath(where.path)

@@ -47,21 +47,21 @@ class Reader:
         self._file, self._digest = file, digest
         self._references = references or {}
 
-    def report(self, path: str, text: str) -> None:
+    def report(self, path: str, text: str, severity: str = "error") -> None:
         """A finding at the key `path`, or at its nearest parent that is written in the file."""
         at = path
         while at not in self.marks and at:
             at = _parent(at)
-        self._report(self.marks.get(at, Mark(1, 1)), f"{path}: {text}" if path else text)
+        self._report(self.marks.get(at, Mark(1, 1)), f"{path}: {text}" if path else text, severity)
 
     def read(self, record: type, node: Node) -> object:
         """The whole file as one record, or `INVALID`."""
         self.marks[""] = node.mark
         return self._record(node, record, "")
 
-    def _report(self, mark: Mark, text: str) -> None:
+    def _report(self, mark: Mark, text: str, severity: str = "error") -> None:
         if len(self.findings) < MAX_FINDINGS:
-            self.findings.append(Finding(self._file, mark.line, mark.column, text))
+            self.findings.append(Finding(self._file, mark.line, mark.column, text, severity))
 
     # --- by kind of type -------------------------------------------------------------------------------------------
 

@@ -1,0 +1,49 @@
+"""What is allowed and can hardly be meant: every warning on a file of its own, and none on what ships."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.config.load import check, load_policy
+from orchestrator.config.shipped import shipped_dir
+from orchestrator.workbench.lint import LINT
+
+ODD = Path(__file__).parent / "odd"
+
+
+@pytest.mark.parametrize("name", ["policy", "quick", "station"])
+def test_each_is_told_at_its_key(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ODD)
+    assert main(["check", f"{name}.yaml"]) == 0, "it can be used as it is"
+    assert capsys.readouterr().err == (ODD / f"{name}.txt").read_text(encoding="utf-8")
+
+
+def test_the_files_have_every_warning() -> None:
+    """Each text of the lint appears in one of them."""
+    said = "\n".join(path.read_text(encoding="utf-8") for path in ODD.glob("*.txt"))
+    for words in (
+        "precharge never begins", "the pulse stage ends as it begins", "the taper is never seen", "only the BMU's own",
+        "too near to full", "charging pauses outside", "is refused", "no current flows outside", "will flap",
+        "is never taken", "the charge is over at", "are a fault", "of a taper: full right above",
+    ):  # fmt: skip
+        assert words in said, words
+
+
+def test_a_file_with_errors_gets_no_warnings(tmp_path: Path) -> None:
+    broken = tmp_path / "policy.yaml"
+    broken.write_text((ODD / "policy.yaml").read_text(encoding="utf-8").replace("max_ah: 44", "max_ah: -1"))
+    assert {finding.severity for finding in check([broken], LINT)} == {"error"}
+    assert main(["check", str(broken)]) == 1
+
+
+def test_a_service_is_not_kept_from_a_policy_by_a_warning() -> None:
+    assert load_policy(ODD / "policy.yaml").policy == "odd"
+
+
+def test_nothing_is_odd_about_what_ships() -> None:
+    files = [path for folder in ("policies", "configs") for path in (shipped_dir() / folder).rglob("*.yaml")]
+    assert len(files) > 10
+    assert check(files, LINT) == []
