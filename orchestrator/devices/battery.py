@@ -122,7 +122,7 @@ class BatteryNode:
             self._plan.unanswered(asked, now_s)
         link = self._view.link
         if link.online:
-            if now_s - self._answer_s >= ANSWER_LIMIT_S:
+            if now_s >= self._answer_s + ANSWER_LIMIT_S:  # the same sum as in `turn`: a difference is rounded otherwise
                 # The next one to answer may be another battery: what this one complained of is not its fault.
                 self._view.set(online=False, problem=self._why_silent(), emergency="")
             elif link.heartbeat_s is not None and link.heartbeat_t_s is not None:

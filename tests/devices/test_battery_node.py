@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import pytest
 
+from orchestrator.devices.battery import ANSWER_LIMIT_S
 from orchestrator.model import BatteryReading, Measurement
 from orchestrator.protocol.objects import ObjectMap
 from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, REQUEST, RX, TABOS, TX, WORDS, Bench, Dialogue, config
@@ -109,6 +110,15 @@ def test_silence_is_noticed_after_the_limit_and_values_keep_their_age() -> None:
     assert "check its power" in bench.link.problem
     assert bench.reading == before
     assert bench.now_s - answered_s < 1.52
+
+
+def test_a_node_that_falls_silent_is_called_so_at_the_time_that_it_asked_for() -> None:
+    """Whatever the digits of that time: a node that is not, asks for the same moment again and again."""
+    for answer_s in (1023.3499999999991, *(1000.0 + number / 7 for number in range(200))):
+        bench = online()
+        bench.node._answer_s = answer_s
+        bench.node.turn(answer_s + ANSWER_LIMIT_S, lambda _cob_id, _data: None)
+        assert not bench.link.online, answer_s
 
 
 def test_a_silent_node_is_asked_twice_a_second_and_its_return_is_noticed() -> None:

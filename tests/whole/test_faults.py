@@ -37,7 +37,7 @@ CASES = (
     Case("charger_silent", "UNCONTROLLABLE", "charger_silent", SILENCE_S),
     Case("charger_cut_off", "UNCONTROLLABLE", "charger_silent", None),
     Case("charger_error_frames", "UNCONTROLLABLE", "charger_silent", None),
-    Case("bmu_silent", "OFFLINE", "heartbeat_lost", SILENCE_S),
+    Case("bmu_silent", "OFFLINE", "heartbeat_lost", SILENCE_S, instead="bmu_silent"),  # whichever is due first
     Case("sdo_abort", "TRIPPED", "sdo_refused"),
     Case("wrong_size", "TRIPPED", "temperature_invalid"),
     Case("implausible_soc", "SUSPENDED", "implausible"),
@@ -57,9 +57,9 @@ CASES = (
     Case("ignore_stop", "UNCONTROLLABLE", "will_not_stop"),
     Case("illegal_value", "SUSPENDED", "illegal_value"),
     Case("polarity_contradicts", "TRIPPED", "reverse_polarity"),  # with either it stops at once
-    Case("battery_exchanged", "IDLE", "heartbeat_lost", SILENCE_S),
+    Case("battery_exchanged", "IDLE", "battery_exchanged", SILENCE_S),
     Case("mode_taken_over", "IDLE", "mode_taken_over"),
-    Case("battery_removed", "IDLE", "heartbeat_lost", SILENCE_S),
+    Case("battery_removed", "IDLE", "heartbeat_lost", SILENCE_S, instead="bmu_silent"),
     Case("port_gone", "UNCONTROLLABLE", "charger_silent", None),
 )
 BAYS = {case.name: number for number, case in enumerate(CASES, 1)}

@@ -110,8 +110,8 @@ def test_a_policy_for_other_cells_is_refused_with_both_lines() -> None:
     with pytest.raises(UnsuitableError) as caught:
         simulate(load_policy("li-ion-24v"), load_scenario("cold-morning"))
     assert str(caught.value) == (
-        "policy li-ion-24v is for 7 cells in series (policies/li-ion-24v.yaml:10), "
-        "pack-1 has 13 (configs/scenarios/cold-morning.yaml:33)"
+        "policy li-ion-24v is for 7 cells in series (policies/li-ion-24v.yaml:11), "
+        "pack-1 has 13 (configs/scenarios/cold-morning.yaml:34)"
     )
 
 

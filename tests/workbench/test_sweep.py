@@ -47,7 +47,7 @@ def test_the_values_are_what_the_policy_goes_by(swept: Sweep) -> None:
 def test_what_the_policy_may_not_have_is_refused_with_its_line(swept: Sweep) -> None:
     refused = [point for point in swept.points if point.values[0] == "80"]
     assert all(point.figures is None for point in refused)
-    assert refused[0].refused.startswith("policies/li-ion-48v.yaml:21:18: error: start.soc_below_pct: 98 % is above")
+    assert refused[0].refused.startswith("policies/li-ion-48v.yaml:22:18: error: start.soc_below_pct: 98 % is above")
     assert any("refused" in cell for row in rows(swept) for cell in row)
 
 
