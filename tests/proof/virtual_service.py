@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 import serial.serialposix
 import serial.serialutil
+from durand.scheduler import get_scheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
 
 from orchestrator.config.load import load_map, load_policy
 from orchestrator.config.policy import Policy
@@ -175,6 +176,8 @@ class World:
         self, time: Time, the_station: Station, natures: Sequence[Nature], kept: Mapping[str, Memory], bus: Bus
     ) -> None:
         self.time = time
+        self._patches = ExitStack()
+        self._patches.callback(set_scheduler, get_scheduler())  # the emulated BMUs put this world's in its place
         self.kernel = Kernel(time)
         self.bus = BusWire(time, self.kernel.calls, bus)
         self.rigs = [
@@ -183,7 +186,6 @@ class World:
         ]
         self._station = the_station
         self._kept = kept
-        self._patches = ExitStack()
         self._patch()
         self.guardian = Guardian()
         self.supervisor = Supervisor(the_station, self.guardian)  # type: ignore[arg-type]  # as the real one
