@@ -9,6 +9,7 @@ import select
 import termios
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from itertools import count
 from math import inf
 from types import SimpleNamespace
 from typing import Any
@@ -16,8 +17,9 @@ from typing import Any
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
 
-#: Descriptors of ours begin here; the others are the real kernel's.
-FIRST_FD = 100_000
+#: Descriptors of ours; the others are the real kernel's. None comes twice: what is left of an earlier world, and closes
+#: its port when it is collected, must not close one of this world's.
+DESCRIPTORS = count(100_001)
 #: What a tty takes before it is full.
 ROOM = 4096
 
@@ -68,7 +70,6 @@ class Kernel:
         self.calls = Calls()
         self.ttys: dict[str, Tty] = {}
         self._open: dict[int, Tty | None] = {}
-        self._next_fd = FIRST_FD
 
     def add(self, path: str) -> Tty:
         self.ttys[path] = Tty(self.time)
@@ -105,11 +106,13 @@ class Kernel:
         return self._new(None), self._new(None)
 
     def _new(self, tty: Tty | None) -> int:
-        self._next_fd += 1
-        self._open[self._next_fd] = tty
-        return self._next_fd
+        fd = next(DESCRIPTORS)
+        self._open[fd] = tty
+        return fd
 
     def close(self, fd: int) -> None:
+        if fd not in self._open:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
         tty = self._open.pop(fd)
         if tty is not None:
             tty.opened -= 1
