@@ -32,6 +32,8 @@ WHY_UNSEEN = {
     "stale_reading": "answers within the SDO time-out are good",
     "command_ignored": "the lowest step is the one in use in a precharge",
     "over_current": "a precharge stays below the step's limit",
+    "frozen_charger": "shows after a minute of which the battery's values are not still",
+    "soc_jump": "the SOC of an empty pack stays at 0 %, or nearly",
 }
 
 
