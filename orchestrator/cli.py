@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 from orchestrator import __version__
 from orchestrator.errors import ConfigError, HexError, OrchestratorError, UsageError
-from orchestrator.workbench.verbs import add_workbench_verbs, missing
+from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
 if TYPE_CHECKING:
     from orchestrator.config.station import Station
@@ -85,6 +85,10 @@ def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
 def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     check = verbs.add_parser("check", help="every error of policies, stations and object maps, with its line")
     check.add_argument("file", nargs="+", help="files; what each is, it says itself")
+    check.add_argument(
+        "--exhaustive", action="store_true", help="explore all that can happen under a policy, too: a minute for each"
+    )
+    check.add_argument("--jobs", type=int, metavar="N", help="processes for that (default: one for each core)")
     check.set_defaults(run=_check)
     schema = verbs.add_parser("schema", help="JSON Schema of a kind of file, so that an editor completes and checks")
     schema.add_argument("kind", choices=SCHEMAS, help="which kind")
@@ -188,7 +192,7 @@ def _check(arguments: argparse.Namespace) -> int:
     for station in filter(None, map(_station, arguments.file)):
         for warning in slow_buses(station):
             print(warning, file=sys.stderr)
-    return 0
+    return prove_all(arguments.file, arguments.jobs) if arguments.exhaustive else 0
 
 
 def _station(file: str) -> "Station | None":

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from orchestrator.config.station import Limits
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.model import BatteryLink, BatteryReading, BatteryStatus, Measurement
@@ -13,6 +14,9 @@ FRESH_S, OLD_S = 0.05, 30.0
 HEARTBEAT_S = 0.5
 #: How far beside a bound "just below" and "just above" lie: the resolution of what a BMU sends.
 NEAR = {"voltage_v": 0.01, "temperature_c": 0.1, "soc_pct": 1.0, "soh_pct": 1.0}
+
+#: What two instruments of this kind may differ by, measuring the same: cable, resolution, offset.
+WITHIN_V, WITHIN_A = 0.5, 0.5
 
 Link = Mapping[str, Any]
 
@@ -112,15 +116,31 @@ def _bounds(rules: Rules) -> dict[str, set[float]]:
     return bounds
 
 
+def _beyond(limits: Limits) -> dict[str, dict[str, float]]:
+    """What a station allows under no policy."""
+    return {
+        "beyond the station's voltage": {"voltage_v": limits.voltage_v + NEAR["voltage_v"]},
+        "colder than the station allows": {"temperature_c": limits.temperature_c.low - NEAR["temperature_c"]},
+        "hotter than the station allows": {"temperature_c": limits.temperature_c.high + NEAR["temperature_c"]},
+    }
+
+
 def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
     """What no threshold cuts: a battery that leaves, falls silent, complains or lies."""
+    pack, precharge = rules.policy.pack, rules.policy.precharge
     status = {**base.values, "status": float(1 << BatteryStatus.BMU_ERROR)}
     limit = {**base.values, "status": float(1 << BatteryStatus.LOW_TEMPERATURE)}
     full = {**base.values, "soc_pct": rules.policy.finish.soc_pct}
-    return {
+    deep = (
+        {**base.values, "voltage_v": (pack.voltage_v.low + precharge.below_v) / 2}
+        if precharge is not None and rules.manual
+        else None
+    )
+    return ({"deeply discharged": replace(base, values=deep)} if deep else {}) | {
         "full": replace(base, values=full),
         "takes nothing": replace(base, takes=0.0),
         "tapers": replace(base, takes=0.01, values={**base.values, "voltage_v": rules.max_v - 0.1}),
+        **{name: replace(base, values={**base.values, **value}) for name, value in _beyond(rules.bay.limits).items()},
         "absent": replace(base, connected=False, link=_fixed(online=False, speaks=False, problem="no answer")),
         "silent": replace(base, link=_fixed(online=False, speaks=False, problem="no answer")),
         "not trusted": replace(base, link=_fixed(online=False, problem="answered twice")),
@@ -136,6 +156,7 @@ def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
         "status bit that trips": replace(base, values=status),
         "status bit that limits": replace(base, values=limit),
         "emergency": replace(base, link=_fixed(emergency="EMCY 0x5000")),
+        "measured differently": replace(base, takes=1.0, differs_v=WITHIN_V, differs_a=WITHIN_A),
         "another voltage than the charger's": replace(base, differs_v=5.0),
         "another current than the charger's": replace(base, differs_a=5.0),
         "discharges": replace(base, differs_a=-20.0),

@@ -1,80 +1,214 @@
-"""What becomes of a bay when nothing happens any more: does it come to rest, and can it always be brought to standby?
+"""What must become of a bay when nothing happens any more: that it comes to rest, stops, charges, and is charged full.
 
-Each memory that was explored is left alone in each of the lasting surroundings, with small steps of time after every
-change and ever larger ones while there is none. To change for ever without any news from outside is a livelock.
+Each memory that was explored is left alone in lasting surroundings, with small steps of time after every change of
+state or order, and ever larger ones while there is none. To change for ever without news from outside is a livelock.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
-from orchestrator.model import Request
-from orchestrator.workbench.explore import Ending, Explorer, Move, Node, Taken
+from orchestrator.core.faults import ROW, Clear
+from orchestrator.core.memory import Memory
+from orchestrator.model import ENERGISED, STOP, Request, State
+from orchestrator.workbench.explore import Explorer, Node, Place, Walk
+from orchestrator.workbench.properties import STANDBY
+from orchestrator.workbench.story import Move, Taken
 
 TICK_S = 0.25
 #: While nothing changes: so many steps of each length. Beyond the last one all timers have run out.
 LADDER = ((16, TICK_S), (10, 1.0), (12, 5.0), (12, 30.0), (10, 300.0), (15, 3600.0))
 #: More changes of state than this without news: the longest orderly story is three backoffs and a latch.
 PATIENCE = 60
+#: … of which a story tells so many.
+SHOWN = 8
+#: What backoffs, hysteresis and the qualification take together, at most.
+RECOVERY_S = 600.0
+#: In this time a pack comes from any temperature to any other without looking like a broken sensor.
+SLOWLY_S = 30.0
+#: Faults that a charge brings with it have shown by then.
+STEADY_S = 10.0
 
 
-def reaches(explorer: Explorer, endings: Iterable[Ending]) -> None:
-    """Hold every ending against every node."""
-    for ending in endings:
-        for node in explorer.nodes:
-            steps = _until(explorer, node, ending)
-            if steps is not None:
-                state = steps[-1].after.state if steps else node.memory.state
-                explorer.find(ending.name, f"not within {ending.within_s:g} s, but {state}", node, *steps)
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """What must become of every memory that it is `asked_of`, when surroundings last after the operator's `request`."""
+
+    name: str
+    about: str
+    charger: str  #: the names of classes of inputs
+    battery: str
+    within_s: float
+    reached: Callable[[Taken], bool]
+    request: Request | None = None
+    first_s: float = TICK_S  #: after so long the surroundings begin
+    asked_of: Callable[[Memory], bool] = lambda _: True
+
+
+def _stands_by(taken: Taken) -> bool:
+    return taken.after.state in STANDBY and taken.decision.command is None
+
+
+def _uncontrollable(taken: Taken) -> bool:
+    return taken.after.state is State.UNCONTROLLABLE
+
+
+def _called(taken: Taken) -> bool:
+    """Where people are told, and the stop is repeated for as long as it is not proved."""
+    named = taken.after.state in (State.UNCONTROLLABLE, State.OFFLINE, State.TRIPPED)
+    return named and taken.decision.command == STOP
+
+
+def _charges(taken: Taken) -> bool:
+    return _runs(taken, State.CHARGING)
+
+
+def _wakes(taken: Taken) -> bool:
+    return _runs(taken, State.PRECHARGE_PULSE)
+
+
+def _runs(taken: Taken, state: State) -> bool:
+    """Long enough for any fault to show; or the change of surroundings looks like another battery."""
+    since_s = taken.after.since_s or taken.now_s
+    runs = taken.after.state is state and taken.after.ran and taken.now_s - since_s > STEADY_S
+    return runs or "battery_exchanged" in taken.after.faults
+
+
+def _full(taken: Taken) -> bool:
+    return taken.after.state is State.FULL
+
+
+def _ended(taken: Taken) -> bool:
+    return taken.after.state not in ENERGISED
+
+
+def _free(memory: Memory) -> bool:
+    """No person must act before the bay charges (again), and it is not charging."""
+    waits = any(fault.latched or ROW[name].clear is Clear.OPERATOR for name, fault in memory.faults.items())
+    return memory.state not in (*ENERGISED, State.TRIPPED) and not (waits or memory.hold or memory.paused)
+
+
+def _charging(memory: Memory) -> bool:
+    return memory.state is State.CHARGING and memory.ran
+
+
+def _energised(memory: Memory) -> bool:
+    return memory.state in ENERGISED
+
+
+ENDINGS: tuple[Ending, ...] = (
+    Ending("to standby", "an operator's stop leads to verified standby wherever the charger obeys",
+           "obeys", "healthy", 10.0, _stands_by, Request.STOP),
+    Ending("to standby, no battery", "the same without a battery",
+           "obeys", "absent", 10.0, _stands_by, Request.STOP),
+    Ending("named", "a charger that cannot be stopped is named: UNCONTROLLABLE or OFFLINE",
+           "runs, whatever it is told", "healthy", 10.0, _uncontrollable, Request.STOP),
+    Ending("named, silent", "a charger that says nothing is named, too",
+           "silent", "healthy", 10.0, _called, Request.STOP),
+    Ending("charges", "a healthy battery is charged wherever no person must act first, also after every pause",
+           "obeys", "healthy", RECOVERY_S, _charges, first_s=SLOWLY_S, asked_of=_free),
+    Ending("charges, as measured", "the same where charger and BMU measure a little differently",
+           "obeys", "measured differently", RECOVERY_S, _charges, first_s=SLOWLY_S, asked_of=_free),
+    Ending("wakes", "a deeply discharged pack is precharged",
+           "obeys", "deeply discharged", RECOVERY_S, _wakes, first_s=SLOWLY_S, asked_of=_free),
+    Ending("full", "a charge is over when the BMU says so",
+           "obeys", "full", 30.0, _full, asked_of=_charging),
+    Ending("ends", "a charge that leads nowhere is ended by a limit",
+           "obeys", "healthy", 14 * 3600.0, _ended, asked_of=_energised),
+)  # fmt: skip
+
+
+def reaches(explorer: Explorer, endings: Sequence[Ending] = ENDINGS) -> None:
+    """Hold every ending against every node; of each the first node that does not end so is kept."""
+    batteries = {battery for _, battery in explorer.walk.inputs.constants()}
+    jobs = [
+        (ENDINGS.index(ending), [node.place for node in explorer.nodes])
+        for ending in endings if ending.battery in batteries
+    ]  # fmt: skip
+    for (which, _), missed in zip(jobs, explorer.each(_first_missed, jobs), strict=True):
+        if missed is not None:
+            number, moves, state = missed
+            ending = ENDINGS[which]
+            text = f"{ending.about}: not within {ending.within_s:g} s, but {state}"
+            explorer.find(ending.name, text, explorer.nodes[number], moves)
+
+
+def _first_missed(walk: Walk, which: int, places: Sequence[Place]) -> tuple[int, list[Move], State] | None:
+    """The first place that does not end so, what happened from there, and where it is then."""
+    ending = ENDINGS[which]
+    first = Move(ending.first_s, ending.charger, ending.battery, ending.request)
+    for number, place in enumerate(places):
+        if not ending.asked_of(place.memory):
+            continue
+        moves: list[Move] = []
+        for taken in lasting(walk, place, first):
+            moves.append(taken.move)
+            if ending.reached(taken):
                 break
-
-
-def _until(explorer: Explorer, node: Node, ending: Ending) -> list[Taken] | None:
-    """The steps that did not lead there; None if they did."""
-    moves = _ticks(ending.charger, ending.battery, ending.request, ending.within_s)
-    steps: list[Taken] = []
-    for taken in explorer.follow(node, moves):
-        steps.append(taken)
-        if ending.reached(taken):
-            return None
-    return steps
-
-
-def _ticks(charger: str, battery: str, request: Request | None, seconds: float) -> Iterator[Move]:
-    yield Move(TICK_S, charger, battery, request)
-    for _ in range(round(seconds / TICK_S)):
-        yield Move(TICK_S, charger, battery)
-
-
-def settles(explorer: Explorer, nodes: Iterable[Node] | None = None) -> None:
-    """No livelock: every node (or those given) comes to rest in every lasting surrounding."""
-    chosen = explorer.nodes if nodes is None else tuple(nodes)
-    for charger, battery in explorer.inputs.constants():
-        settled: set[object] = set()
-        for node in chosen:
-            steps = _changes(explorer, node, charger, battery, settled)
-            if steps is not None:
-                text = f"{PATIENCE} changes of state without news (charger: {charger}; battery: {battery})"
-                explorer.find("no livelock", text, node, *steps[-8:])
-                return
-
-
-def _changes(explorer: Explorer, node: Node, charger: str, battery: str, settled: set[object]) -> list[Taken] | None:
-    """The steps that changed the state, if they do not end; None, and what was passed is settled, if they do."""
-    changes: list[Taken] = []
-    passed: set[object] = set()
-    while True:
-        moves = (Move(dt_s, charger, battery) for times, dt_s in LADDER for _ in range(times))
-        for taken in explorer.follow(node, moves):
-            key = explorer.gist(taken.after)
-            if key in settled:
-                settled |= passed
-                return None
-            node = Node(taken.after, taken.now_s, taken, node)
-            if taken.after.state is not taken.before.state:
-                passed.add(key)
-                changes.append(taken)
-                break
+            if taken.now_s - place.now_s > ending.first_s + ending.within_s:
+                return number, moves, taken.after.state
         else:
-            settled |= passed
-            return None
-        if len(changes) >= PATIENCE:
-            return changes
+            return number, moves, taken.after.state
+    return None
+
+
+def settles(explorer: Explorer, some: Iterable[Node] | None = None) -> None:
+    """No livelock: every node (or some of them) comes to rest in every lasting surrounding."""
+    nodes = explorer.nodes if some is None else list(some)
+    places = [node.place for node in nodes]
+    jobs = [(*constant, places) for constant in explorer.walk.inputs.constants()]
+    for (charger, battery, _), endless in zip(jobs, explorer.each(_first_endless, jobs), strict=True):
+        if endless is not None:
+            number, moves = endless
+            text = f"{PATIENCE} changes of state without news (charger: {charger}; battery: {battery})"
+            explorer.find("no livelock", text, nodes[number], moves)
+
+
+def _first_endless(walk: Walk, charger: str, battery: str, places: Sequence[Place]) -> tuple[int, list[Move]] | None:
+    """The first place from which the state changes for ever, and the moves of the first changes."""
+    settled: set[object] = set()
+    for number, place in enumerate(places):
+        moves = _changes(walk, place, Move(TICK_S, charger, battery), settled)
+        if moves is not None:
+            return number, moves
+    return None
+
+
+def _changes(walk: Walk, place: Place, first: Move, settled: set[object]) -> list[Move] | None:
+    """What leads through the first of the changes, if they do not end; None, and all passed is settled, if they do."""
+    changes = 0
+    moves: list[Move] = []
+    passed: set[object] = set()
+    for taken in lasting(walk, place, first):
+        if changes < SHOWN:
+            moves.append(taken.move)
+        key = walk.gist(taken.after)
+        if key in settled:
+            break
+        passed.add(key)
+        changes += taken.after.state is not taken.before.state
+        if changes == PATIENCE:
+            return moves
+    settled |= passed
+    return None
+
+
+def lasting(walk: Walk, place: Place, first: Move) -> Iterator[Taken]:
+    """What comes of it when the surroundings of a move last: steps until nothing has changed for a long time."""
+    move, order = first, place.memory.order
+    rungs = _ladder()
+    while True:
+        taken = walk.take(place, move)
+        yield taken
+        if taken.error:
+            return
+        if (taken.after.state, taken.decision.command) != (taken.before.state, order):
+            order, rungs = taken.decision.command, _ladder()
+        place = Place(taken.after, taken.now_s)
+        dt_s = next(rungs, None)
+        if dt_s is None:
+            return
+        move = Move(dt_s, first.charger, first.battery)
+
+
+def _ladder() -> Iterator[float]:
+    return (dt_s for times, dt_s in LADDER for _ in range(times))

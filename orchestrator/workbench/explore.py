@@ -5,37 +5,20 @@ memory of each gist stands for all of them. So what is found is real, with the s
 is not found is absent up to these cuts. Properties are data (`properties.py`); nothing here knows what they mean.
 """
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol, TypeVar
 
 from orchestrator.core.latches import effect, raised
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.model import ENERGISED, Decision, Request, Snapshot, State
-
-#: Where time begins; not 0, so that nobody takes "never" for a time.
-BEGIN_S = 1000.0
+from orchestrator.model import ENERGISED, Decision, Snapshot, State
+from orchestrator.workbench.properties import Property
+from orchestrator.workbench.story import BEGIN_S, Counterexample, Move, Taken
 
 Step = Callable[[float, Snapshot, Memory, Rules], tuple[Decision, Memory]]
-
-
-@dataclass(frozen=True, slots=True)
-class Move:
-    """What happens between two steps: time passes, and then this is what the devices and the operator say."""
-
-    dt_s: float
-    charger: str  #: the name of a class of inputs
-    battery: str
-    request: Request | None = None
-    internal: str = ""
-
-    def __str__(self) -> str:
-        asked = f", operator: {self.request}" if self.request else ""
-        broke = f", internal error: {self.internal}" if self.internal else ""
-        return f"charger: {self.charger}; battery: {self.battery}{asked}{broke}"
+T = TypeVar("T")
 
 
 class Inputs(Protocol):
@@ -52,71 +35,6 @@ class Inputs(Protocol):
 
     def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
         """What the step is given."""
-
-
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """One step as it was taken."""
-
-    move: Move
-    now_s: float
-    snapshot: Snapshot
-    before: Memory
-    decision: Decision
-    after: Memory
-    rules: Rules
-
-
-@dataclass(frozen=True, slots=True)
-class Property:
-    """What every step must fulfil; `check` returns what is wrong, or None."""
-
-    name: str
-    about: str
-    check: Callable[[Taken], str | None]
-
-
-@dataclass(frozen=True, slots=True)
-class Ending:
-    """What must become of every memory within `within_s` in lasting surroundings, after the operator's `request`."""
-
-    name: str
-    about: str
-    charger: str
-    battery: str
-    request: Request | None
-    within_s: float
-    reached: Callable[[Taken], bool]
-
-
-@dataclass(slots=True)
-class Node:
-    """The first memory of its gist, and the step that led to it; the very first has none."""
-
-    memory: Memory
-    now_s: float
-    taken: Taken | None = None
-    parent: "Node | None" = None
-    depth: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Counterexample:
-    """A property that does not hold, and the shortest story that shows it."""
-
-    name: str
-    text: str
-    story: tuple[Taken, ...]
-
-    def __str__(self) -> str:
-        lines = [f"{self.name}: {self.text}"]
-        for taken in self.story:
-            order = taken.decision.command
-            said = f"{order.action} {order.value}" if order else "only polls"
-            answer = f"; answer: {taken.decision.answer}" if taken.decision.answer else ""
-            lines.append(f"  t = {taken.now_s - BEGIN_S:9.2f} s  {taken.move}")
-            lines.append(f"      → {taken.decision.state}: {taken.decision.reason}; {said}{answer}")
-        return "\n".join(lines)
 
 
 def outline(memory: Memory) -> tuple[object, ...]:
@@ -140,15 +58,111 @@ def gist(memory: Memory) -> tuple[object, ...]:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A memory and its moment: where a step can be taken from."""
+
+    memory: Memory
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Expanded:
+    """What lies one step from a place."""
+
+    reached: Sequence[tuple[object, Move, Place]]  #: the first place of each gist, and the move that leads there
+    broken: Sequence[tuple[str, str, Move]]  #: properties that do not hold, by what, and the move that shows it
+    changes: frozenset[tuple[State, State]]
+    steps: int
+
+
 @dataclass(slots=True)
-class Explorer:
-    """`run` explores; then `nodes` has what was reached, `found` at most one counterexample for each property."""
+class Walk:
+    """What may happen, and what must hold: takes steps, and keeps nothing but what it need not tell again."""
 
     rules: Rules
     inputs: Inputs
     properties: Sequence[Property]
     gist: Callable[[Memory], object] = gist
     step: Step = step
+    _told: set[object] = field(default_factory=set)  # gists that were reached, and names of what was found broken
+
+    def take(self, place: Place, move: Move) -> Taken:
+        """One step from there."""
+        now_s = place.now_s + move.dt_s
+        snapshot = self.inputs.snapshot(move, now_s, place.memory)
+        try:
+            decision, after = self.step(now_s, snapshot, place.memory, self.rules)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+            stays = Decision(place.memory.state, f"{type(error).__name__}: {error}")
+            return Taken(move, now_s, snapshot, place.memory, stays, place.memory, self.rules, error=repr(error))
+        return Taken(move, now_s, snapshot, place.memory, decision, after, self.rules)
+
+    def broken(self, taken: Taken) -> Iterator[tuple[str, str]]:
+        """Name of each property that the step breaks, and by what."""
+        if taken.error:
+            yield "no exception", f"step() raised {taken.error}"
+            return
+        for rule in self.properties:
+            wrong = rule.check(taken)
+            if wrong is not None:
+                yield rule.name, wrong
+
+    def follow(self, place: Place, moves: Iterable[Move]) -> Iterator[Taken]:
+        """Steps one after another from there, as far as none raises an exception."""
+        for move in moves:
+            taken = self.take(place, move)
+            yield taken
+            if taken.error:
+                return
+            place = Place(taken.after, taken.now_s)
+
+    def expand(self, place: Place, *, in_pairs: bool) -> Expanded:
+        """Every move from there. What it has told of before, it leaves out."""
+        reached, broken, changes, steps = [], [], set(), 0
+        for move in (*self.inputs.moves(), *(self.inputs.pairs() if in_pairs else ())):
+            taken = self.take(place, move)
+            steps += 1
+            for name, text in self.broken(taken):
+                if name not in self._told:
+                    self._told.add(name)
+                    broken.append((name, text, move))
+            if taken.before.state is not taken.after.state:
+                changes.add((taken.before.state, taken.after.state))
+            if not taken.error and (key := self.gist(taken.after)) not in self._told:
+                self._told.add(key)
+                reached.append((key, move, Place(taken.after, taken.now_s)))
+        return Expanded(reached, broken, frozenset(changes), steps)
+
+
+class Each(Protocol):
+    """Does one thing to each of many, in their order: here, or in many processes."""
+
+    def __call__(self, function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
+        """`function(walk, *job)` of each job."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A place that was reached, and how; the very first one has no way."""
+
+    place: Place
+    move: Move | None = None
+    parent: "Node | None" = None
+
+    @property
+    def way(self) -> tuple[Move, ...]:
+        """The moves that led there."""
+        return (*self.parent.way, self.move) if self.parent is not None and self.move is not None else ()
+
+
+@dataclass(slots=True)
+class Explorer:
+    """`run` explores; then `nodes` has what was reached, `found` at most one counterexample for each property."""
+
+    walk: Walk
+    each: Each
+    watch: Callable[[int], None] = lambda _: None  #: is called now and then with the number of steps so far
     nodes: list[Node] = field(default_factory=list)
     steps: int = 0
     found: dict[str, Counterexample] = field(default_factory=dict)
@@ -157,66 +171,44 @@ class Explorer:
 
     def run(self, until: str = "", most: int = 1_000_000) -> None:
         """Everything that can be reached; or until the property `until` is found not to hold, or `most` nodes."""
-        first = Node(Memory(), BEGIN_S)
+        first = Node(Place(Memory(), BEGIN_S))
+        level, seen = [first], {self.walk.gist(first.place.memory)}
         self.nodes = [first]
-        seen, waiting = {self.gist(first.memory)}, deque([first])
-        while waiting and until not in self.found and len(self.nodes) < most:
-            node = waiting.popleft()
-            for move in self._moves(node.memory):
-                taken = self.take(node, move)
-                if taken is None or (key := self.gist(taken.after)) in seen:
-                    continue
+        while level:
+            jobs = [(node.place, self._first_of_its_outline(node)) for node in level]
+            following: list[Node] = []
+            for node, expanded in zip(level, self.each(_expand, jobs), strict=True):
+                following += self._learn(node, expanded, seen)
+                if until in self.found or len(self.nodes) >= most:
+                    return
+            level = following
+
+    def _first_of_its_outline(self, node: Node) -> bool:
+        """Pairs are tried only once for each outline: they are many."""
+        shape = outline(node.place.memory)
+        new = shape not in self._paired
+        self._paired.add(shape)
+        return new
+
+    def _learn(self, node: Node, expanded: Expanded, seen: set[object]) -> Iterator[Node]:
+        self.steps += expanded.steps
+        self.watch(self.steps)
+        self.changes |= expanded.changes
+        for name, text, move in expanded.broken:
+            self.find(name, text, node, (move,))
+        for key, move, place in expanded.reached:
+            if key not in seen:
                 seen.add(key)
-                reached = Node(taken.after, taken.now_s, taken, node, node.depth + 1)
-                self.nodes.append(reached)
-                waiting.append(reached)
+                new = Node(place, move, node)
+                self.nodes.append(new)
+                yield new
 
-    def _moves(self, memory: Memory) -> Iterator[Move]:
-        """Pairs only once for each outline: they are many."""
-        yield from self.inputs.moves()
-        if (shape := outline(memory)) not in self._paired:
-            self._paired.add(shape)
-            yield from self.inputs.pairs()
-
-    def take(self, node: Node, move: Move) -> Taken | None:
-        """One step from there, held against every property; None where it raised an exception."""
-        now_s = node.now_s + move.dt_s
-        snapshot = self.inputs.snapshot(move, now_s, node.memory)
-        self.steps += 1
-        try:
-            decision, after = self.step(now_s, snapshot, node.memory, self.rules)
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
-            stays = Decision(node.memory.state, f"{type(error).__name__}: {error}")
-            taken = Taken(move, now_s, snapshot, node.memory, stays, node.memory, self.rules)
-            self.find("no exception", f"step() raised {error!r}", node, taken)
-            return None
-        taken = Taken(move, now_s, snapshot, node.memory, decision, after, self.rules)
-        if node.memory.state is not after.state:
-            self.changes.add((node.memory.state, after.state))
-        for rule in self.properties:
-            if rule.name not in self.found and (wrong := rule.check(taken)) is not None:
-                self.find(rule.name, wrong, node, taken)
-        return taken
-
-    def find(self, name: str, text: str, node: Node, *more: Taken) -> None:
+    def find(self, name: str, text: str, node: Node, more: Sequence[Move]) -> None:
         """Keep a counterexample: the way to the node, and what followed."""
         if name not in self.found:
-            self.found[name] = Counterexample(name, text, (*way(node), *more))
-
-    def follow(self, node: Node, moves: Iterable[Move]) -> Iterator[Taken]:
-        """Steps one after another from there."""
-        for move in moves:
-            taken = self.take(node, move)
-            if taken is None:
-                return
-            yield taken
-            node = Node(taken.after, taken.now_s, taken, node, node.depth + 1)
+            story = self.walk.follow(Place(Memory(), BEGIN_S), (*node.way, *more))
+            self.found[name] = Counterexample(name, text, tuple(story))
 
 
-def way(node: Node) -> tuple[Taken, ...]:
-    """The steps that led there."""
-    steps: list[Taken] = []
-    while node.taken is not None and node.parent is not None:
-        steps.append(node.taken)
-        node = node.parent
-    return tuple(reversed(steps))
+def _expand(walk: Walk, place: Place, in_pairs: bool) -> Expanded:  # noqa: FBT001 - a job's arguments have no names
+    return walk.expand(place, in_pairs=in_pairs)

@@ -28,7 +28,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.workbench.batteries import Shown, batteries
-from orchestrator.workbench.explore import Move
+from orchestrator.workbench.story import Move
 
 #: Ages at the moment of the step: an order and a stop were written this long ago, readings were asked for after that.
 SENT_AGE_S, READ_AGE_S, OLD_S = 0.1, 0.05, 30.0

@@ -1,11 +1,14 @@
-"""What every step of every bay must fulfil, and what must become of every bay: the safety properties, as data.
+"""What every step of every bay must fulfil: the safety properties, as data.
 
 Each check reads snapshot, decision and memory, and works out for itself what it needs: it asks none of the core's own
 predicates, so that a mistake in one of those does not hide here.
 """
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 from orchestrator.model import ENERGISED, STOP, Action, Decision, Effect, Operation, Request, State
-from orchestrator.workbench.explore import Ending, Property, Taken
+from orchestrator.workbench.story import Taken
 
 #: The ages that evidence may have (DESIGN §6): a charger's silence is noticed within 2 s, fast values of a BMU go stale
 #: after 1.5 s, slow ones after three readings.
@@ -21,22 +24,36 @@ UNPROVED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
 STANDBY = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
 
 
+@dataclass(frozen=True, slots=True)
+class Property:
+    """What every step must fulfil; `check` returns what is wrong, or None."""
+
+    name: str
+    about: str
+    check: Callable[[Taken], str | None]
+
+
 def _orders_run(decision: Decision) -> bool:
     return decision.command is not None and decision.command.action in RUNS
 
 
+def _runs(taken: Taken) -> bool:
+    """The charger shall run, whether it is told so in this very step or was before."""
+    return taken.decision.setpoint.run or _orders_run(taken.decision)
+
+
 def no_run_without_fresh_readings(taken: Taken) -> str | None:
     """DESIGN §2: unknown means no."""
-    if not _orders_run(taken.decision):
+    if not _runs(taken):
         return None
     charger, battery = taken.snapshot.charger, taken.snapshot.battery
     if charger is None or taken.now_s - charger.t_s > CHARGER_S:
-        return f"{taken.decision.command} without a fresh status of the charger"
+        return "runs without a fresh status of the charger"
     for age_s, names in ((FAST_S, FAST), (SLOW_S, SLOW)):
         for name in names:
             value = getattr(battery, name)
             if value is None or taken.now_s - value.t_s > age_s:
-                return f"{taken.decision.command} without a fresh {name}"
+                return f"runs without a fresh {name}"
     return None
 
 
@@ -51,7 +68,7 @@ def stop_at_once(taken: Taken) -> str | None:
 def no_current_under_a_fault(taken: Taken) -> str | None:
     """While a fault of effect PAUSE or worse is in force, nothing runs."""
     worst = max((fault.effect for fault in taken.decision.faults), default=Effect.WARN)
-    if worst >= Effect.PAUSE and (taken.decision.setpoint.run or _orders_run(taken.decision)):
+    if worst >= Effect.PAUSE and _runs(taken):
         return f"runs with {taken.decision.faults[0].id} in force"
     return None
 
@@ -108,13 +125,29 @@ def rest_is_verified(taken: Taken) -> str | None:
     return None
 
 
-def within_limits(taken: Taken) -> str | None:
+def within_current(taken: Taken) -> str | None:
     """No step above the station's current limit, whatever the policy allows."""
     setpoint, rules = taken.decision.setpoint, taken.rules
     if not setpoint.run or setpoint.current_limit is None:
         return None
     amps = rules.bay.charger.steps_a[setpoint.current_limit]
     return f"step of {amps:g} A above {rules.bay.limits.current_a:g} A" if amps > rules.bay.limits.current_a else None
+
+
+def within_volts(taken: Taken) -> str | None:
+    """Nothing runs while charger or pack is above the station's voltage."""
+    limit_v = taken.rules.bay.limits.voltage_v
+    charger, pack = taken.snapshot.charger, taken.snapshot.battery.voltage_v
+    highest_v = max(charger.voltage_v if charger else 0.0, pack.value if pack else 0.0)
+    return f"runs at {highest_v:.2f} V, above {limit_v:g} V" if _runs(taken) and highest_v > limit_v else None
+
+
+def within_temperature(taken: Taken) -> str | None:
+    """Nothing runs while the pack is colder or warmer than the station allows."""
+    allowed, measured = taken.rules.bay.limits.temperature_c, taken.snapshot.battery.temperature_c
+    if not _runs(taken) or measured is None or measured.value in allowed:
+        return None
+    return f"runs at {measured.value:.1f} °C, allowed are {allowed} °C"
 
 
 def unproved_stops(taken: Taken) -> str | None:
@@ -158,18 +191,8 @@ def session_ends(taken: Taken) -> str | None:
     return f"energised for {session.energised_s / 3600:.2f} h, allowed are {hours:g} h"
 
 
-def _standby(taken: Taken) -> bool:
-    return taken.after.state in STANDBY and taken.decision.command is None
-
-
-def _called(taken: Taken) -> bool:
-    """Where people are told, and the stop is repeated for as long as it is not proved."""
-    named = taken.after.state in (State.UNCONTROLLABLE, State.OFFLINE, State.TRIPPED)
-    return named and taken.decision.command == STOP
-
-
 PROPERTIES: tuple[Property, ...] = (
-    Property("fresh", "no run command without fresh readings of everything", no_run_without_fresh_readings),
+    Property("fresh", "nothing runs without fresh readings of everything", no_run_without_fresh_readings),
     Property("stop at once", "a new fault of effect STOP or worse: stop in the same step", stop_at_once),
     Property("no current", "nothing runs while a fault of effect PAUSE or worse is in force", no_current_under_a_fault),
     Property("operator", "an accepted stop or pause takes effect in the same step", operator_stops),
@@ -178,20 +201,12 @@ PROPERTIES: tuple[Property, ...] = (
     Property("latched", "a latched fault is taken away by a reset only", latched_until_reset),
     Property("qualified", "current begins after QUALIFYING only", charge_begins_qualified),
     Property("verified", "standby is entered on proof only", rest_is_verified),
-    Property("limits", "no step above the station's current limit", within_limits),
+    Property("current limit", "no step above the station's current limit", within_current),
+    Property("voltage limit", "nothing runs above the station's voltage", within_volts),
+    Property("temperature limit", "nothing runs outside the station's temperatures", within_temperature),
     Property("standing stop", "stop is the order until standby is proved", unproved_stops),
     Property("alarm", "the alarm means UNCONTROLLABLE", alarmed),
     Property("in time", "STOPPING ends within 3 s, one way or the other", stops_in_time),
     Property("precharge", "precharge never exceeds its time", precharge_ends),
     Property("hours", "a charge never exceeds its hours", session_ends),
 )
-
-ENDINGS: tuple[Ending, ...] = (
-    Ending("to standby", "an operator's stop leads to verified standby wherever the charger obeys",
-           "obeys", "healthy", Request.STOP, 10.0, _standby),
-    Ending("to standby, no battery", "the same without a battery", "obeys", "absent", Request.STOP, 10.0, _standby),
-    Ending("named", "a charger that cannot be stopped is named: UNCONTROLLABLE or OFFLINE",
-           "runs, whatever it is told", "healthy", Request.STOP, 10.0, lambda t: t.after.state is State.UNCONTROLLABLE),
-    Ending("named, silent", "a charger that says nothing is named, too",
-           "silent", "healthy", Request.STOP, 10.0, _called),
-)  # fmt: skip

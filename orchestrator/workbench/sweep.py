@@ -1,14 +1,12 @@
 """Many values of a policy's keys on one scenario: which of them charges faster, cooler, or at a lower voltage."""
 
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from multiprocessing import get_context
 
 from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Scenario
@@ -104,11 +102,6 @@ def _try(policy: str, scenario: Scenario, axes: tuple[Axis, ...], values: tuple[
         return Point(values, figures(simulate(changed, scenario)))
     except OrchestratorError as error:
         return Point(values, None, str(error).splitlines()[0])
-
-
-def cores(jobs: int | None = None) -> Executor:
-    """So many processes of this machine; None: one for each of its cores."""
-    return ProcessPoolExecutor(jobs or len(os.sched_getaffinity(0)), mp_context=get_context("spawn"))
 
 
 @contextmanager

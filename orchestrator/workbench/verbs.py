@@ -6,7 +6,8 @@ Each imports what it needs when it runs: plots and their like are extras, which 
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -44,6 +45,28 @@ def _add_simulate(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     simulate.set_defaults(run=_simulate)
 
 
+def prove_all(files: Sequence[str], jobs: int | None) -> int:
+    """`check --exhaustive` for each policy and each kind of bay in files without errors; 1 if a property is broken."""
+    from orchestrator.core.rules import Rules
+    from orchestrator.workbench.exhaustive import bays_in, prove
+
+    held = True
+    for file in files:
+        for names, bay in bays_in(file):
+            begin_s = time.monotonic()
+            proof = prove(Rules.of(bay), partial(_progress("{:,} steps"), names), jobs)
+            for found in proof.counterexamples:
+                print(f"{names}: {found}\n", file=sys.stderr)
+            came = f"{len(proof.counterexamples)} BROKEN" if proof.counterexamples else "all hold"
+            print(
+                f"{names}: {proof.properties} properties, {came}; {proof.memories} situations, {proof.steps:,} steps, "
+                f"{time.monotonic() - begin_s:.0f} s",
+                flush=True,
+            )
+            held = held and not proof.counterexamples
+    return 0 if held else 1
+
+
 def _simulate(arguments: argparse.Namespace) -> int:
     from orchestrator.workbench.simulate import as_table, play
 
@@ -59,7 +82,8 @@ def _simulate(arguments: argparse.Namespace) -> int:
 def _sweep(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import load_scenario
     from orchestrator.workbench.figures import aligned
-    from orchestrator.workbench.sweep import axis, cluster, cores, played, rows
+    from orchestrator.workbench.processes import cores
+    from orchestrator.workbench.sweep import axis, cluster, played, rows
 
     if len(arguments.policy) != 1:
         raise UsageError("--sweep: name one policy")
@@ -80,13 +104,13 @@ def _present() -> ModuleType:
     return present
 
 
-def _progress() -> Callable[[str, float], None]:
+def _progress(form: str = "{:.0%}") -> Callable[[str, float], None]:
     """Says on a terminal how far what takes longer than a second has come."""
     begin_s = time.monotonic()
 
     def say(what: str, share: float) -> None:
         if time.monotonic() - begin_s > 1 and sys.stderr.isatty():
-            print(f"\r\x1b[K{what}: {share:.0%}", end="\r", file=sys.stderr, flush=True)
+            print(f"\r\x1b[K{what}: {form.format(share)}", end="\r", file=sys.stderr, flush=True)
 
     return say
 

@@ -6,18 +6,18 @@ import pytest
 
 from orchestrator.model import ControlMode, State
 from orchestrator.workbench.endings import reaches, settles
+from orchestrator.workbench.exhaustive import here
 from orchestrator.workbench.explore import Explorer, outline
-from orchestrator.workbench.properties import ENDINGS, PROPERTIES
-from tests.proof.exploring import NEVER, changes_of_table, quick, rules
+from tests.proof.exploring import NEVER, changes_of_table, quick, rules, walk_on
 
 
 @pytest.fixture(name="explored", scope="module", params=list(ControlMode), ids=lambda mode: mode.name.lower())
 def _explored(request: pytest.FixtureRequest) -> Iterator[Explorer]:
-    of = rules(control=request.param)
-    explorer = Explorer(of, quick(of), PROPERTIES)
+    walk = walk_on(quick(rules(control=request.param)))
+    explorer = Explorer(walk, here(walk))
     explorer.run()
-    reaches(explorer, ENDINGS)
-    settles(explorer, {outline(node.memory): node for node in explorer.nodes}.values())
+    reaches(explorer)
+    settles(explorer, {outline(node.place.memory): node for node in explorer.nodes}.values())
     yield explorer
 
 
@@ -26,12 +26,12 @@ def test_every_property_holds(explored: Explorer) -> None:
 
 
 def test_every_state_is_reached(explored: Explorer) -> None:
-    precharge = {State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS} if not explored.rules.manual else set()
-    assert {node.memory.state for node in explored.nodes} == set(State) - precharge
+    precharge = {State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS} if not explored.walk.rules.manual else set()
+    assert {node.place.memory.state for node in explored.nodes} == set(State) - precharge
 
 
 def test_every_change_of_the_table_is_made_and_no_other(explored: Explorer) -> None:
-    if not explored.rules.manual:
+    if not explored.walk.rules.manual:
         assert explored.changes < changes_of_table()
         return
     assert changes_of_table() - explored.changes == set(NEVER)

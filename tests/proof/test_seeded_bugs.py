@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import pytest
@@ -15,11 +16,12 @@ from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
-from orchestrator.model import Effect, Request, State
-from orchestrator.workbench.endings import reaches, settles
+from orchestrator.model import ChargeMode, Effect, Precharge, Request, State
+from orchestrator.workbench.endings import ENDINGS, reaches, settles
+from orchestrator.workbench.exhaustive import here
 from orchestrator.workbench.explore import Explorer
-from orchestrator.workbench.properties import ENDINGS, PROPERTIES
-from tests.proof.exploring import rules, small
+from orchestrator.workbench.properties import PROPERTIES
+from tests.proof.exploring import rules, small, walk_on
 
 Patch = pytest.MonkeyPatch
 
@@ -135,6 +137,26 @@ def unwritten_row(patch: Patch) -> None:
     patch.setattr(step_module, "fire", without_row)
 
 
+def never_sure(patch: Patch) -> None:
+    patch.setattr(course_module, "QUALIFY_S", inf)
+
+
+def no_tolerance(patch: Patch) -> None:
+    def differ(f: Facts) -> str | None:
+        return "not the same" if f.volts != f.pack_v else None
+
+    rows = tuple(replace(row, check=differ) if row.id == "volts_disagree" else row for row in FAULTS)
+    patch.setattr(latches, "FAULTS", rows)
+
+
+def wakes_with_the_wrong_function(patch: Patch) -> None:
+    patch.setitem(step_module.SETPOINTS, State.PRECHARGE_PULSE, (ChargeMode.PRECHARGE, Precharge.OFF))
+
+
+def never_full(patch: Patch) -> None:
+    patch.setattr(course_module, "finished", lambda f: None)
+
+
 #: The property that must fail → the bug.
 BUGS: dict[str, Callable[[Patch], None]] = {
     "fresh": without("stale_reading"),
@@ -146,7 +168,9 @@ BUGS: dict[str, Callable[[Patch], None]] = {
     "latched": latches_wear_off,
     "qualified": nobody_qualifies,
     "verified": any_standby_proves,
-    "limits": station_limit_is_forgotten,
+    "current limit": station_limit_is_forgotten,
+    "voltage limit": without("over_voltage"),
+    "temperature limit": without("over_temperature", "under_temperature", "hot_trip"),
     "standing stop": nothing_must_stop,
     "alarm": silent_alarm,
     "in time": never_gives_up,
@@ -156,6 +180,11 @@ BUGS: dict[str, Callable[[Patch], None]] = {
     "to standby, no battery": absent_battery_is_waited_for,
     "named": never_gives_up,
     "named, silent": silence_is_patient,
+    "charges": never_sure,
+    "charges, as measured": no_tolerance,
+    "wakes": wakes_with_the_wrong_function,
+    "full": never_full,
+    "ends": without("time_limit", "ah_limit"),
     "no livelock": strikes_are_forgotten,
     "no exception": unwritten_row,
 }
@@ -164,8 +193,8 @@ BUGS: dict[str, Callable[[Patch], None]] = {
 @pytest.mark.parametrize("name", BUGS)
 def test_the_bug_is_caught(name: str, monkeypatch: Patch) -> None:
     BUGS[name](monkeypatch)
-    of = rules(current_a=12.0)
-    explorer = Explorer(of, small(of), PROPERTIES)
+    walk = walk_on(small(rules(current_a=12.0)))
+    explorer = Explorer(walk, here(walk))
     if name in {rule.name for rule in PROPERTIES} | {"no exception"}:
         explorer.run(until=name)
     else:

@@ -12,8 +12,9 @@ from orchestrator.config.load import load_scenario
 from orchestrator.errors import ConfigError, UsageError
 from orchestrator.workbench.figures import Figures
 from orchestrator.workbench.present import save_sweep
+from orchestrator.workbench.processes import cores
 from orchestrator.workbench.simulation import UnsuitableError
-from orchestrator.workbench.sweep import Axis, ClusterError, Point, Sweep, axis, best, cluster, cores, played, rows
+from orchestrator.workbench.sweep import Axis, ClusterError, Point, Sweep, axis, best, cluster, played, rows
 
 FINISH = Axis(("finish.soc_pct",), ("80", "97", "100"))
 DEEP = load_scenario("deep-discharge")

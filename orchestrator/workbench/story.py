@@ -1,0 +1,89 @@
+"""A counterexample as people read it: what the devices did, step by step, and what the bay made of it."""
+
+from dataclasses import dataclass
+from itertools import groupby
+
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
+from orchestrator.model import Action, Decision, Measurement, Request, Snapshot
+
+#: Where time begins in a story; not 0, so that nobody takes "never" for a time.
+BEGIN_S = 1000.0
+WITH_VALUE = (Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE)
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """What happens between two steps: time passes, and then this is what the devices and the operator say."""
+
+    dt_s: float
+    charger: str  #: the name of a class of inputs
+    battery: str
+    request: Request | None = None
+    internal: str = ""
+
+    def __str__(self) -> str:
+        asked = f"; operator: {self.request}" if self.request else ""
+        broke = f"; internal error: {self.internal}" if self.internal else ""
+        return f"charger: {self.charger}; battery: {self.battery}{asked}{broke}"
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """One step as it was taken."""
+
+    move: Move
+    now_s: float
+    snapshot: Snapshot
+    before: Memory
+    decision: Decision
+    after: Memory
+    rules: Rules
+    error: str = ""  #: the exception that it raised instead
+
+
+@dataclass(frozen=True, slots=True)
+class Counterexample:
+    """Something that must hold and does not, and the shortest story that shows it."""
+
+    name: str
+    text: str
+    story: tuple[Taken, ...]
+
+    def __str__(self) -> str:
+        told = [_told(taken) for taken in self.story]
+        lines = [f"{self.name}: {self.text}"]
+        for same, group in groupby(zip(self.story, told, strict=True), lambda pair: pair[1]):
+            times_s = [taken.now_s - BEGIN_S for taken, _ in group]
+            until = f" … {times_s[-1]:.2f}" if len(times_s) > 1 else ""
+            lines.append(f"  t = {times_s[0]:.2f}{until} s  {same}")
+        return "\n".join(lines)
+
+
+def _told(taken: Taken) -> str:
+    """One step; steps that tell the same are told once."""
+    answer = f"; answer: {taken.decision.answer}" if taken.decision.answer else ""
+    return (
+        f"{taken.move}\n      {_values(taken.snapshot)}\n"
+        f"      → {taken.decision.state}: {taken.decision.reason}; {_order(taken.decision)}{answer}"
+    )
+
+
+def _order(decision: Decision) -> str:
+    order = decision.command
+    if order is None:
+        return "no order"
+    return f"order: {order.action}" + (f" {order.value}" if order.action in WITH_VALUE else "")
+
+
+def _values(snapshot: Snapshot) -> str:
+    charger, battery = snapshot.charger, snapshot.battery
+    told = f"charger {charger.voltage_v:.2f} V, {charger.current_a:.2f} A" if charger else "charger not heard"
+    return (
+        f"{told}; pack {_value(battery.voltage_v, '.2f')} V, {_value(battery.temperature_c, '.1f')} °C, "
+        f"SOC {_value(battery.soc_pct, '.0f')} %, SOH {_value(battery.soh_pct, '.0f')} %"
+    )
+
+
+def _value(measurement: Measurement | None, form: str) -> str:
+    return "?" if measurement is None else format(measurement.value, form)
