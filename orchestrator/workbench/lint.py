@@ -9,6 +9,7 @@ from typing import cast
 
 from orchestrator.config.policy import Policy, Table
 from orchestrator.config.rules import Problems, Rule, problems
+from orchestrator.core.checks.battery import HEAT_HYSTERESIS_K
 from orchestrator.core.course import RECHARGE_DROP_PCT
 from orchestrator.keys import Range
 from orchestrator.model import ControlMode
@@ -33,6 +34,14 @@ def _pulse(until_v: float, voltage_v: Range) -> Problems:
 def _taper(above_v: float, voltage_v: Range) -> Problems:
     if above_v >= voltage_v.high:
         yield "finish.taper.above_v", f"the taper is never seen: above {voltage_v.high:g} V the bay has stopped"
+
+
+def _window(allowed: Range) -> Problems:
+    """Between the limits there must be room for the hysteresis of the pauses."""
+    again_c = allowed.high - HEAT_HYSTERESIS_K
+    if again_c <= allowed.low:
+        text = f"too narrow: after a pause for heat it charges again below {again_c:g} °C, where it pauses for cold"
+        yield "pack.temperature_c", text
 
 
 def _end(values: Mapping[str, object]) -> Problems:
@@ -92,6 +101,7 @@ def _tables(values: Mapping[str, object]) -> Problems:
 _RULES = (
     Rule(_precharge, ("precharge.below_v", "pack.voltage_v")),
     Rule(_pulse, ("precharge.pulse.until_v", "pack.voltage_v")),
+    Rule(_window, ("pack.temperature_c",)),
     Rule(_taper, ("finish.taper.above_v", "pack.voltage_v")),
     Rule(_recharge, ("recharge.soc_below_pct", "finish.soc_pct")),
     Rule(_temperatures, ("current.temperature_c", "pack.temperature_c")),

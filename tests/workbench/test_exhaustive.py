@@ -1,0 +1,62 @@
+"""`check --exhaustive`: what it says of policies that break something, and of one that does not."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.config.load import load_policy
+from orchestrator.core.rules import Rules
+from orchestrator.workbench.endings import reaches
+from orchestrator.workbench.exhaustive import bay_of, bays_in, here
+from orchestrator.workbench.explore import Explorer
+from tests.proof.exploring import small, walk_on
+
+ROOT = Path(__file__).parent
+#: Policy → what it breaks, and how the story ends. All three are fine by every rule of `check`.
+BROKEN = {
+    "odd/narrow": (
+        "charges",
+        "→ SUSPENDED: the pack has 24.1 °C, the limit is 24 °C (narrow.yaml:2); it charges again below 19 °C; goes on "
+        "when it has cooled down; no order",
+    ),
+    "broken/volts": (
+        "charges, as measured",
+        "→ SUSPENDED: the charger reads 41.10 V, the BMU 40.60 V: not the same battery, or a bad connection; check that "
+        "this BMU belongs to this charger's battery; no order",
+    ),
+    "broken/amps": (
+        "charges, as measured",
+        "→ TRIPPED: the charger reads 14.00 A, the BMU 14.50 A; check for loads on the battery and for a wrong node id, "
+        "then reset; no order",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("policy", BROKEN)
+def test_a_broken_policy_gets_its_story(policy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT / Path(policy).parent)
+    walk = walk_on(small(Rules.of(bay_of(load_policy(f"{Path(policy).name}.yaml")))))
+    explorer = Explorer(walk, here(walk))
+    explorer.run(most=60)
+    reaches(explorer)
+    name, ending = BROKEN[policy]
+    assert name in explorer.found
+    *_, last = str(explorer.found[name]).splitlines()
+    assert last.strip() == ending
+
+
+def test_bays_that_differ_in_wiring_only_are_proved_once() -> None:
+    """Two of three are alike; an object map decides nothing."""
+    named = [name for name, _ in bays_in(str(ROOT / "broken" / "station.yaml"))]
+    assert named == [f"{ROOT}/broken/station.yaml, bay-1, bay-3", f"{ROOT}/broken/station.yaml, bay-2"]
+    assert list(bays_in("configs/maps/tabos.yaml")) == []
+
+
+def test_the_command_explores_on_every_core(capsys: pytest.CaptureFixture[str]) -> None:
+    """The whole way, on a bay with few inputs: the same findings as in one process."""
+    assert main(["check", "--exhaustive", "--jobs", "2", str(ROOT / "broken" / "automatic.yaml")]) == 1
+    said, told = capsys.readouterr()
+    assert said.startswith(f"{ROOT}/broken/automatic.yaml, bay-1: 28 properties, 2 BROKEN; ")
+    assert "bay-1: charges: a healthy battery is charged" in told
+    assert "charges, as measured" in told
