@@ -26,8 +26,8 @@ def test_the_files_have_every_warning() -> None:
     said = "\n".join(path.read_text(encoding="utf-8") for path in ODD.glob("*.txt"))
     for words in (
         "precharge never begins", "the pulse stage ends as it begins", "the taper is never seen", "only the BMU's own",
-        "too near to full", "charging pauses outside", "is refused", "no current flows outside", "will flap", "too narrow",
-        "is never taken", "the charge is over at", "are a fault", "of a taper: full right above",
+        "too near to full", "charging pauses outside", "is refused", "no current flows outside", "will flap",
+        "too narrow", "is never taken", "the charge is over at", "are a fault", "of a taper: full right above",
     ):  # fmt: skip
         assert words in said, words
 
