@@ -154,11 +154,11 @@ class Life:
         within_s = SILENT_S + LATER_S.get(name, 0.0) + VERIFY_S + MARGIN_S
         if not self._until(lambda: self._stands() or self._named(), within_s):
             self.real.missed.append(f"{self._t_s():.0f} s: {name}: {self._plant.state()}")
-        first_s = self._plant.state()["first_stop_s"]
+        self._until_passed(self._dice.uniform(2.0, 8.0))
+        first_s = self._plant.state()["first_stop_s"]  # late: a charger that stands by itself is told a moment after
         stops_s = self.real.stops_s.setdefault(name, [])
         if first_s is not None:
             stops_s.append(first_s - injected_s)
-        self._until_passed(self._dice.uniform(2.0, 8.0))
         self._mend()
         self.due.append((injected_s, time.monotonic() + DUE_S))
         self._until(self._charging, BEGIN_S)
