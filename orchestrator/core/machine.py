@@ -11,6 +11,7 @@ that is not in the table is refused with `RefusedError` and the state stays as i
 """
 
 from enum import StrEnum
+from functools import cache
 
 from transitions import Machine, MachineError
 
@@ -85,6 +86,7 @@ MACHINE = Machine(
 )
 
 
+@cache  # the answers are as fixed as the table
 def fire(state: State, trigger: Trigger) -> State:
     """The state that `trigger` leads to from `state`.
 

@@ -111,9 +111,9 @@ ENDINGS: tuple[Ending, ...] = (
     Ending("wakes", "a deeply discharged pack is precharged",
            "obeys", "deeply discharged", RECOVERY_S, _wakes, first_s=SLOWLY_S, asked_of=_free),
     Ending("full", "a charge is over when the BMU says so",
-           "obeys", "full", 30.0, _full, asked_of=_charging),
+           "obeys", "full", 30.0, _full, first_s=SLOWLY_S, asked_of=_charging),
     Ending("ends", "a charge that leads nowhere is ended by a limit",
-           "obeys", "healthy", 14 * 3600.0, _ended, asked_of=_energised),
+           "obeys", "healthy", 14 * 3600.0, _ended, first_s=SLOWLY_S, asked_of=_energised),
 )  # fmt: skip
 
 
