@@ -8,7 +8,6 @@ closed, and opened anew by its name in the next round.
 Standard library only, few imports, no threads.
 """
 
-import errno
 import fcntl
 import os
 import select
@@ -40,6 +39,7 @@ Witness = Callable[[Iterable[str], float], Mapping[str, str]]
 SILENT = "no proof of standby: the charger does not answer"
 RUNS = "NOT stopped: the charger says that it goes on"
 STALLED = "the line takes nothing"
+GONE = "the line is gone"
 HELD = "left alone: a service holds this port"
 
 
@@ -134,7 +134,7 @@ class _Line:
         try:
             data = os.read(self.fd, 4096)
             if not data:
-                raise OSError(errno.EIO, "the line is gone")
+                raise OSError(GONE)
         except BlockingIOError:
             return  # somebody else has read it
         except OSError as error:
@@ -165,10 +165,10 @@ def open_port(name: str, *, leave_held: bool) -> int:
     try:
         fd = os.open(name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     except ValueError:  # a 0, or half a character: a dying controller may say anything
-        raise OSError(errno.EINVAL, "not the name of a port") from None
+        raise OSError("not the name of a port") from None
     try:
         if not os.isatty(fd):
-            raise OSError(errno.ENOTTY, "not a serial port")
+            raise OSError("not a serial port")
         if leave_held:
             _lock(fd)
         termios.tcsetattr(fd, termios.TCSANOW, _SETTINGS)
@@ -184,7 +184,7 @@ def _lock(fd: int) -> None:
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise OSError(errno.EBUSY, HELD) from None
+        raise OSError(HELD) from None
 
 
 def drop_port(fd: int) -> None:

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import socket
 import threading
 import time
 from pathlib import Path
@@ -12,7 +13,19 @@ from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import STATUS_REQUEST, encode
 from orchestrator.protocol.standby import QUESTION, STOP_FRAME
 from orchestrator.service.guardian import VERIFY_S
-from orchestrator.service.laststop import HELD, ROUND_S, RUNS, SILENT, STALLED, STOPS, first_stop, stop_all
+from orchestrator.service.laststop import (
+    GONE,
+    HELD,
+    ROUND_S,
+    RUNS,
+    SILENT,
+    STALLED,
+    STOPS,
+    drop_port,
+    first_stop,
+    open_port,
+    stop_all,
+)
 from orchestrator.sim.charger_frames import Kind
 from tests.guardian.chargers import running_chargers
 from tests.link.ptys import plugged
@@ -170,6 +183,31 @@ def test_a_port_that_fails_is_opened_anew(tmp_path: Path) -> None:
         assert stop_all({bench.name: held}, 5.0) == {bench.name: ""}
         plug.join()
         assert not bench.runs
+
+
+def test_a_line_that_ends_says_so() -> None:
+    """A tty that was hung up reads as an end of file, and may still take what is written."""
+    ours, theirs = socket.socketpair()
+    with theirs:
+        theirs.shutdown(socket.SHUT_WR)
+        assert stop_all({"/nowhere": ours.detach()}, 0.1) == {"/nowhere": GONE}
+
+
+def test_an_open_port_keeps_nobody_waiting(tmp_path: Path) -> None:
+    with plugged(tmp_path / "port") as pty:
+        fd = open_port(pty.path, leave_held=False)
+        assert not os.get_blocking(fd)
+        os.close(fd)
+
+
+def test_a_port_that_is_dropped_does_not_send_the_rest(tmp_path: Path) -> None:
+    with plugged(tmp_path / "port") as pty:
+        fd = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        filled = pty.fill()
+        drop_port(fd)
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.fstat(fd)
+        assert len(pty.drain()) < filled, "what the other end has not taken yet is lost"
 
 
 def test_a_port_that_is_not_there_says_so(tmp_path: Path) -> None:
