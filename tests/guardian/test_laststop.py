@@ -11,9 +11,10 @@ import pytest
 
 from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import STATUS_REQUEST, encode
-from orchestrator.protocol.standby import QUESTION, STOP_FRAME
+from orchestrator.protocol.standby import OPERATION_STOP_FRAME, QUESTION, STOP_FRAME
 from orchestrator.service.guardian import VERIFY_S
 from orchestrator.service.laststop import (
+    ASK_S,
     GONE,
     HELD,
     ROUND_S,
@@ -63,6 +64,20 @@ def test_a_round_ends_when_its_chargers_have_had_time_to_obey(tmp_path: Path) ->
         assert set(seen) == {(False, True)}
         assert len(seen) >= 2
         assert rounds_s[0] < 2 * ROUND_S
+
+
+def test_every_frame_has_its_time(tmp_path: Path) -> None:
+    """On the wire one after the other, and a charger has time to obey before it is asked."""
+    frames = ((STOP_FRAME, 0.0), (STOP_FRAME, 0.02), (OPERATION_STOP_FRAME, 0.04), (QUESTION, ASK_S))
+    with plugged(tmp_path / "port") as pty:
+        began_s = time.monotonic()
+        stopping = threading.Thread(target=stop_all, args=({pty.path: None}, ROUND_S + 0.1))
+        stopping.start()
+        for round_s in (0.0, ROUND_S):
+            for frame, at_s in frames:
+                assert os.read(pty.master, len(frame)) == frame
+                assert time.monotonic() - began_s >= round_s + at_s
+        stopping.join()
 
 
 def test_a_port_is_opened_by_its_name(tmp_path: Path) -> None:
@@ -261,6 +276,7 @@ def test_what_another_process_reads_is_not_read_here(tmp_path: Path) -> None:
 
     def witness(names: object, since_s: float) -> dict[str, str]:
         asked.append(since_s)
+        assert names == [bench.name]
         return {bench.name: "" if len(asked) == 3 else "not yet"}
 
     with running_chargers(tmp_path) as (bench,):
