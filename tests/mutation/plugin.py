@@ -3,14 +3,18 @@
 - Hypothesis does not shrink an example that fails, which takes longer than all else, and tries the same examples for
   each mutant.
 - The quick tests come first: the first one that fails ends a mutant's trial.
+- A test's id is plain ASCII. mutmut collects again and again in one process, pytest escapes an id's other characters
+  anew each time, and then finds no such test; what mutmut makes of that is a mutant that was killed.
 - Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
 """
 
 import json
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
+import _pytest.python as collecting
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
@@ -23,6 +27,13 @@ settings.register_profile(
     suppress_health_check=(HealthCheck.too_slow,),
 )
 settings.load_profile("mutation")
+
+
+def _plain(val: str | bytes, config: pytest.Config | None) -> str:
+    return re.sub("[^ -~]", "?", val if isinstance(val, str) else val.hex())
+
+
+collecting._ascii_escaped_by_config = _plain
 
 #: File of tests → the module that they start as a process.
 ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/service/guardian.py"}
