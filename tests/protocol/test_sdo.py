@@ -41,6 +41,10 @@ def test_the_documents_exchanges(exchange: Exchange, ours: tuple[bytes, SdoReply
     assert (reply_cob_id(NODE), parse_reply(exchange.reply)) == (exchange.reply_cob_id, reply)
 
 
+def test_an_object_is_asked_for_with_0x40_and_nothing_behind_its_sub_index() -> None:
+    assert read_request(0x1018, 4) == bytes.fromhex("40 18 10 04 00 00 00 00")
+
+
 def test_four_bytes_are_written_with_0x23() -> None:
     assert write_request(0x1017, 1, 0x12345678, 4) == bytes.fromhex("23 17 10 01 78 56 34 12")
 
