@@ -64,8 +64,8 @@ def _pieces(data: bytes) -> Iterator[tuple[int, bytes]]:
         if at > done:
             yield done, data[done:at]
         size = frame_size(data, at)
-        after = data.find(START, at + (size if size > 0 else 1))
-        claimed = declared_size(data[at : at + MAX_FRAME]) or (after if after > 0 else len(data)) - at
+        after = data.find(START, at + max(size, 1))
+        claimed = declared_size(data[at : at + MAX_FRAME]) or (after if after > at else len(data)) - at
         piece = data[at : at + min(claimed, MAX_FRAME)]
         yield at, piece
         done = max(done, at + len(piece))

@@ -384,8 +384,8 @@ def test_a_good_frame_inside_a_false_start_is_explained_too() -> None:
 
 
 def test_a_false_start_reaches_to_the_next_start_where_its_length_makes_no_sense() -> None:
-    false_start, good = explain(f"AF FA 90 00 01 {STOP}")
-    assert (false_start.facts["hex"], good.facts["hex"]) == ("AF FA 90 00 01", STOP)
+    noise, false_start, good = explain(f"00 00 AF FA 90 00 01 {STOP}")
+    assert [one.facts["hex"] for one in (noise, false_start, good)] == ["00 00", "AF FA 90 00 01", STOP]
 
 
 def test_text_that_is_not_hexadecimal_is_refused_with_its_place() -> None:

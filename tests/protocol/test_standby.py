@@ -59,6 +59,7 @@ def test_the_newest_answer_counts() -> None:
     assert standby.stands_by(answer(0, 0) + answer(14, 1)) is False
     assert standby.stands_by(answer(14, 1) + answer(0, 0)) is True
     assert standby.stands_by(answer(14, 1) + answer(0, 0)[:-1]) is False
+    assert standby.stands_by(answer(14, 1) + answer(0, 0) + answer(14, 1)[:-1]) is True
 
 
 @given(streams, streams)
