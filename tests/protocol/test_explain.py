@@ -108,6 +108,7 @@ def test_what_is_sent_is_decoded(command: int, data: bytes, decoded: dict[str, o
         (0x01, b"\x00\x1f", "00     kind 1: none"),
         (0x01, b"\x00\x03", "03     kind 2: operation, current limit"),
         (0x01, b"\x01\x00", "00     kind 2: none"),
+        (0x01, b"\x0c\x00", "0C     kind 1: temperature 1, temperature 2"),
         (0x01, b"\x20\x80", "20     kind 1: void 20 00"),
         (0x01, b"\x20\x80", "80     kind 2: void 00 80"),
         (0x02, b"\x01\x00", "00     0: stop"),
