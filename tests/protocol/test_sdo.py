@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from orchestrator.protocol.sdo import (
     ABORT_MEANINGS,
+    NMT_COB_ID,
     NmtCommand,
     NmtState,
     SdoAbort,
@@ -118,5 +119,6 @@ def test_what_stands_behind_a_short_value_means_nothing(wire: str, value: int, s
 def test_cob_ids_and_nmt() -> None:
     assert (request_cob_id(1), reply_cob_id(127), heartbeat_cob_id(0x10)) == (0x601, 0x5FF, 0x710)
     assert [tpdo_cob_id(number, 0x10) for number in (1, 2, 3, 4)] == [0x190, 0x290, 0x390, 0x490]
+    assert NMT_COB_ID == 0
     assert [nmt_frame(command, 0x10).hex() for command in NmtCommand] == ["0110", "0210", "8010", "8110", "8210"]
     assert [state.value for state in NmtState] == [0x00, 0x04, 0x05, 0x7F]
