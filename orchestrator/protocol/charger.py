@@ -76,30 +76,26 @@ Kinds = tuple[int, int]  #: kind 1, kind 2
 STATUS_KINDS: Kinds = (0x13, 0x1F)
 
 
+def _frame(code: Code, *data: int) -> bytes:
+    return Frame(code, ADDRESS, bytes(data)).encode()
+
+
 def status_request(kind1: int = STATUS_KINDS[0], kind2: int = STATUS_KINDS[1]) -> bytes:
     """The frame that asks for these values."""
-    return Frame(Code.STATUS_REQUEST, ADDRESS, bytes((kind1, kind2))).encode()
-
-
-def _rest(rest: int) -> bytes:
-    return Frame(Code.REST, ADDRESS, bytes((rest,))).encode()
-
-
-def _push(push: Push, value: int) -> bytes:
-    return Frame(Code.SET, ADDRESS, bytes((push, value))).encode()
+    return _frame(Code.STATUS_REQUEST, kind1, kind2)
 
 
 STATUS_REQUEST = status_request()
-STOP_FRAME = _rest(0)  #: to standby, in manual and automatic mode; always the first frame of a stop
-OPERATION_STOP_FRAME = _push(Push.OPERATION, 0)  #: the second, in manual mode
+STOP_FRAME = _frame(Code.REST, 0)  #: to standby, in manual and automatic mode; always the first frame of a stop
+OPERATION_STOP_FRAME = _frame(Code.SET, Push.OPERATION, 0)  #: the second, in manual mode
 
 #: Every command that there is, with its frame: what is not in here cannot be sent (§4.2.1).
 _FRAMES: dict[Command, bytes] = {
-    Command(Action.RESUME): _rest(1),
-    Command(Action.RUN): _push(Push.OPERATION, 1),
-    **{Command(Action.SET_LIMIT, value): _push(Push.CURRENT_LIMIT, value) for value in range(5)},
-    **{Command(Action.SET_MODE, value): _push(Push.CHARGE_MODE, value) for value in (3, 4, 5)},
-    **{Command(Action.SET_PRECHARGE, value): _push(Push.PRECHARGE, value) for value in range(3)},
+    Command(Action.RESUME): _frame(Code.REST, 1),
+    Command(Action.RUN): _frame(Code.SET, Push.OPERATION, 1),
+    **{Command(Action.SET_LIMIT, value): _frame(Code.SET, Push.CURRENT_LIMIT, value) for value in range(5)},
+    **{Command(Action.SET_MODE, value): _frame(Code.SET, Push.CHARGE_MODE, value) for value in (3, 4, 5)},
+    **{Command(Action.SET_PRECHARGE, value): _frame(Code.SET, Push.PRECHARGE, value) for value in range(3)},
 }
 
 
@@ -129,12 +125,6 @@ def _signed_tenths(raw: int) -> float:
     return (raw - 0x10000 if raw & 0x8000 else raw) / 10
 
 
-def _step(raw: int) -> int:
-    if raw > 4:
-        raise ValueError(raw)
-    return raw
-
-
 @dataclass(frozen=True, slots=True)
 class StatusValue:
     """One row of §4.1.1: a value that a status reply can hold."""
@@ -154,10 +144,6 @@ class StatusValue:
             return f"{self.title} {raw} (documented: {self.documented})"
 
 
-def _void(kind1: int, kind2: int) -> StatusValue:
-    return StatusValue(f"void_{kind1:02x}{kind2:02x}", f"void {kind1:02X} {kind2:02X}", kind1, kind2, int)
-
-
 #: In the order of a reply. The document numbers the data of the ten defined values 1 to 20 without a gap, so the six
 #: void ones, which it mentions (§3.3.3) but does not list, can only follow them. Nobody needs to ask for those.
 STATUS_VALUES = (
@@ -167,12 +153,14 @@ STATUS_VALUES = (
     StatusValue("temperature_2_c", "temperature 2", Kind1.TEMPERATURE_2, 0, _signed_tenths),
     StatusValue("control_mode", "control mode", Kind1.CONTROL_MODE, 0, ControlMode, "0, 1"),
     StatusValue("operation", "operation", 0, Kind2.OPERATION, Operation, "0, 1"),
-    StatusValue("current_limit", "current limit", 0, Kind2.CURRENT_LIMIT, _step, "0 … 4"),
+    StatusValue("current_limit", "current limit", 0, Kind2.CURRENT_LIMIT, range(5).index, "0 … 4"),
     StatusValue("charge_mode", "charge mode", 0, Kind2.CHARGE_MODE, ChargeMode, "1 … 8"),
     StatusValue("precharge", "precharge function", 0, Kind2.PRECHARGE, Precharge, "0 … 2"),
     StatusValue("connection", "battery connection", 0, Kind2.CONNECTION, Connection, "0, 1"),
-    *(_void(1 << bit, 0) for bit in (5, 6, 7)),
-    *(_void(0, 1 << bit) for bit in (5, 6, 7)),
+    *(
+        StatusValue(f"void_{kind1:02x}{kind2:02x}", f"void {kind1:02X} {kind2:02X}", kind1, kind2, int)
+        for kind1, kind2 in ((0x20, 0), (0x40, 0), (0x80, 0), (0, 0x20), (0, 0x40), (0, 0x80))
+    ),
 )
 
 
@@ -207,7 +195,7 @@ def parse_values(frame: Frame, kind1: int, kind2: int) -> dict[str, float | str]
     rows = status_values(kind1, kind2)
     data = frame.data
     _expect(frame, Code.STATUS_REPLY, 2 * len(rows), ADDRESS)
-    return {row.name: row.value(data[at] << 8 | data[at + 1]) for row, at in zip(rows, range(0, 32, 2), strict=False)}
+    return {row.name: row.value(data[2 * at] << 8 | data[2 * at + 1]) for at, row in enumerate(rows)}
 
 
 def parse_status(frame: Frame, kinds: Kinds, t_s: float) -> ChargerReading:

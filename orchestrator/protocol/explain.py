@@ -64,8 +64,8 @@ def _pieces(data: bytes) -> Iterator[tuple[int, bytes]]:
         if at > done:
             yield done, data[done:at]
         size = frame_size(data, at)
-        after = data.find(START, at + (size if size > 0 else 1))
-        claimed = declared_size(data[at : at + MAX_FRAME]) or (after if after > 0 else len(data)) - at
+        after = data.find(START, at + max(size, 1))
+        claimed = declared_size(data[at : at + MAX_FRAME]) or (after if after > at else len(data)) - at
         piece = data[at : at + min(claimed, MAX_FRAME)]
         yield at, piece
         done = max(done, at + len(piece))
@@ -114,7 +114,7 @@ def _hints(ahead: bytes, piece: bytes) -> list[str]:
         return [_MISPRINT_NOTE]
     end = ahead.find(END, OVERHEAD - 2)
     whole = declared_size(piece) == len(piece) and piece.endswith(END)
-    if whole or end < 0 or ahead.find(START, 2, end) > 0:
+    if whole or end < 0 or START in ahead[2:end]:
         return []
     return [
         f"an end AF A0 stands after {end + 2} bytes: the length of such a frame is 0x{end + 2 - OVERHEAD + COUNTED:02X}"

@@ -6,11 +6,13 @@ A request is one byte; each page is one frame: the request's byte, the page's nu
 The COB-ID of the pages is not known.
 """
 
-from orchestrator.keys import Range
-from orchestrator.protocol.objects import Evidence, FieldMap, ObjectEntry, Sweep
-from orchestrator.protocol.words import Decoded, decode_word
+from functools import partial
 
-_VALUE_BYTES = 6  #: of a page, behind the echo and the page's number
+from orchestrator.keys import Range
+from orchestrator.protocol.objects import Evidence, FieldMap
+from orchestrator.protocol.words import Decoded, decode_fields
+
+_PAGE_BYTES = 8  #: the echo, the page's number, and six bytes of values
 
 
 def pages_request_cob_id(node_id: int) -> int:
@@ -23,49 +25,32 @@ def pages_request(node_id: int) -> bytes:
     return bytes((0x60 + node_id,))
 
 
-def _field(name: str, first_bit: int, width: int, scale: float, low: float, high: float) -> FieldMap:
-    return FieldMap(
-        name=name,
-        first_bit=first_bit,
-        width=width,
-        signed=low < 0,
-        scale=scale,
-        unavailable=0xFFFF if name.endswith("_min") else None,  # as in the object maps
-        range=Range(low, high),
-        evidence=Evidence.ASSUMED,
-    )
+_field = partial(FieldMap, evidence=Evidence.ASSUMED)
+_minutes = partial(_field, width=16, unavailable=0xFFFF, range=Range(0, 65534))  # as in the object maps
 
-
-def _page(number: int, *fields: FieldMap) -> ObjectEntry:
-    return ObjectEntry(index=number, size=_VALUE_BYTES, sweep=Sweep.SLOW, fields=fields)
-
-
-#: By number; a page is written down as an object of six bytes.
+#: The values on each page, by its number.
 PAGES = {
-    1: _page(
-        1,
-        _field("voltage_v", 0, 16, 0.01, 0, 100),
-        _field("current_a", 16, 16, 0.01, -327, 327),
-        _field("status", 32, 16, 1, 0, 127),
+    1: (
+        _field(name="voltage_v", first_bit=0, width=16, scale=0.01, range=Range(0, 100)),
+        _field(name="current_a", first_bit=16, width=16, scale=0.01, signed=True, range=Range(-327, 327)),
+        _field(name="status", first_bit=32, width=16, range=Range(0, 127)),
     ),
-    2: _page(
-        2,
-        _field("time_to_full_min", 0, 16, 1, 0, 65534),
-        _field("time_to_empty_min", 16, 16, 1, 0, 65534),
-        _field("soc_pct", 32, 8, 1, 0, 100),
-        _field("soh_pct", 40, 8, 1, 0, 100),
+    2: (
+        _minutes(name="time_to_full_min", first_bit=0),
+        _minutes(name="time_to_empty_min", first_bit=16),
+        _field(name="soc_pct", first_bit=32, width=8, range=Range(0, 100)),
+        _field(name="soh_pct", first_bit=40, width=8, range=Range(0, 100)),
     ),
-    3: _page(
-        3,
-        _field("remaining_ah", 0, 16, 0.01, 0, 655.34),
-        _field("available_wh", 16, 16, 0.1, 0, 6553.4),
-        _field("temperature_c", 32, 16, 0.1, -39.9, 124.9),
+    3: (
+        _field(name="remaining_ah", first_bit=0, width=16, scale=0.01, range=Range(0, 655.34)),
+        _field(name="available_wh", first_bit=16, width=16, scale=0.1, range=Range(0, 6553.4)),
+        _field(name="temperature_c", first_bit=32, width=16, scale=0.1, signed=True, range=Range(-39.9, 124.9)),
     ),
 }
 
 
 def parse_page(node_id: int, data: bytes) -> dict[str, Decoded]:
     """The values on a page of this node; nothing for any other frame."""
-    if len(data) != 2 + _VALUE_BYTES or data[:1] != pages_request(node_id) or data[1] not in PAGES:
+    if len(data) != _PAGE_BYTES or data[:1] != pages_request(node_id) or data[1] not in PAGES:
         return {}
-    return decode_word(PAGES[data[1]], int.from_bytes(data[2:], "little"), _VALUE_BYTES, 0.0)
+    return decode_fields(PAGES[data[1]], int.from_bytes(data[2:], "little"), 0.0)

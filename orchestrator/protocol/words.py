@@ -1,5 +1,7 @@
 """From the BMU's words to measurements, by an object map."""
 
+from collections.abc import Iterable
+
 from orchestrator.model import Measurement
 from orchestrator.protocol.hextext import byte_count
 from orchestrator.protocol.objects import FieldMap, ObjectEntry
@@ -19,7 +21,12 @@ def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[st
     if size != entry.size:
         why = f"0x{entry.index:04X}:{entry.sub:02X} declared {byte_count(size)}, the map says {entry.size}"
         return {field.name: why for field in entry.fields}
-    return {field.name: _decode(field, word, t_s) for field in entry.fields}
+    return decode_fields(entry.fields, word, t_s)
+
+
+def decode_fields(fields: Iterable[FieldMap], word: int, t_s: float) -> dict[str, Decoded]:
+    """Every field of a word that is as long as it should be; asked for at `t_s`."""
+    return {field.name: _decode(field, word, t_s) for field in fields}
 
 
 def _decode(field: FieldMap, word: int, t_s: float) -> Decoded:

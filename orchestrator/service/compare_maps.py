@@ -1,6 +1,7 @@
 """Object maps side by side: what each makes of a BMU's words, what speaks against it, and which fits best. Pure."""
 
 from collections.abc import Iterator, Mapping
+from itertools import chain
 
 from orchestrator.model import Measurement
 from orchestrator.protocol.objects import READING_FIELDS, ObjectMap
@@ -52,7 +53,8 @@ def _cell(field: str, values: Values) -> str:
 def _wrong(one: ObjectMap, values: Values, pages: Values) -> Iterator[str]:
     """What cannot be, and what the older protocol says otherwise."""
     yield from (value for value in values.values() if isinstance(value, str))
-    scales = {field.name: field.scale for entry in (*one.objects, *PAGES.values()) for field in entry.fields}
+    fields = chain(*(entry.fields for entry in one.objects), *PAGES.values())
+    scales = {field.name: field.scale for field in fields}
     for name, page in pages.items():
         value = values.get(name)
         if isinstance(value, Measurement) and isinstance(page, Measurement):

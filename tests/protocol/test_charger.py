@@ -250,6 +250,14 @@ def test_the_documents_error_frame_with_its_sum_corrected() -> None:
     } == vector.decoded
 
 
+@pytest.mark.parametrize(
+    ("raw", "bit"),
+    [(0x01, ErrorBit.LENGTH), (0x02, ErrorBit.COMMAND), (0x04, ErrorBit.ORDER), (0x08, ErrorBit.CHECKSUM)],
+)
+def test_each_error_has_the_documents_bit(raw: int, bit: ErrorBit) -> None:
+    assert parse_error(Frame(Code.ERROR, raw, bytes(4))).bits == bit
+
+
 @pytest.mark.parametrize("bits", range(256))
 def test_any_error_bits_may_stand_in_the_orders_place(bits: int) -> None:
     assert parse_error(Frame(Code.ERROR, bits, bytes(4))).bits == bits

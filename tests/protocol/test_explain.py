@@ -71,6 +71,22 @@ def test_every_golden_frame_is_explained_to_a_program(vector: ChargerVector) -> 
     assert vector.decoded.items() <= decoded.items()
 
 
+def test_a_good_frame_is_facts_to_a_program() -> None:
+    assert only(STOP).facts == {
+        "offset": 0,
+        "hex": STOP,
+        "frame": True,
+        "valid": True,
+        "name": "stop/resume",
+        "command": 0x10,
+        "order": 0x90,
+        "data": "00",
+        "decoded": {"rest": 0},
+        "checksum": {"got": 0x34, "expected": 0x34},
+        "problems": [],
+    }
+
+
 FACTS = [
     (0x01, b"\x03\x04", {"kind1": 3, "kind2": 4, "asks": ["voltage_v", "current_a", "charge_mode"]}),
     (0x01, b"\x00\x00", {"kind1": 0, "kind2": 0, "asks": []}),
@@ -92,18 +108,37 @@ def test_what_is_sent_is_decoded(command: int, data: bytes, decoded: dict[str, o
         (0x01, b"\x00\x1f", "00     kind 1: none"),
         (0x01, b"\x00\x03", "03     kind 2: operation, current limit"),
         (0x01, b"\x01\x00", "00     kind 2: none"),
+        (0x01, b"\x0c\x00", "0C     kind 1: temperature 1, temperature 2"),
+        (0x01, b"\x20\x80", "20     kind 1: void 20 00"),
+        (0x01, b"\x20\x80", "80     kind 2: void 00 80"),
+        (0x01, b"\x01\x00", "01     status request (controller → charger)"),
+        (0x02, b"\x01\x00", "02     set value (controller → charger, acted on in manual mode only)"),
+        (0x02, b"\x01\x00", "01     push: operation"),
         (0x02, b"\x01\x00", "00     0: stop"),
-        (0x02, b"\x02\x04", "02     push: current limit"),
+        (0x02, b"\x01\x01", "01     1: run"),
+        (0x02, b"\x02\x00", "02     push: current limit"),
+        (0x02, b"\x02\x00", "00     0: step 1, the lowest"),
+        (0x02, b"\x02\x01", "01     1: step 2"),
+        (0x02, b"\x02\x02", "02     2: step 3"),
+        (0x02, b"\x02\x03", "03     3: step 4"),
         (0x02, b"\x02\x04", "04     4: step 5, the highest"),
+        (0x02, b"\x04\x03", "04     push: charge mode"),
         (0x02, b"\x04\x03", "03     3: precharge"),
+        (0x02, b"\x04\x04", "04     4: charge"),
+        (0x02, b"\x04\x05", "05     5: standby"),
+        (0x02, b"\x08\x00", "08     push: precharge function"),
+        (0x02, b"\x08\x00", "00     0: off"),
+        (0x02, b"\x08\x01", "01     1: pulse"),
         (0x02, b"\x08\x02", "02     2: continuous"),
+        (0x10, b"\x00", "10     stop/resume (controller → charger)"),
         (0x10, b"\x00", "00     stop: to standby, whatever it is doing"),
         (0x10, b"\x01", "01     resume: from standby back to normal"),
+        (0x1F, bytes(4), "90     what was wrong: no documented bit is set"),
     ],
 )
 def test_every_kind_of_order_has_its_words(command: int, data: bytes, line: str) -> None:
     told = of(command, data)
-    assert line in told.text
+    assert line in [row[12:] for row in told.text.splitlines()]
     assert told.ok
 
 
@@ -128,8 +163,21 @@ def test_a_whole_frame_that_is_not_as_documented_says_so(
 ) -> None:
     told = of(command, data, order, kinds)
     assert (told.ok, told.facts["valid"], told.facts["problems"]) == (False, True, [problem])
-    assert "a whole frame, but not as documented" in told.text
+    assert ", a whole frame, but not as documented\n" in told.text
     assert told.text.endswith(f"! {problem}")
+
+
+def test_a_command_that_nobody_knows_is_told_as_such() -> None:
+    assert of(0x44, b"").text == dedent("""\
+            byte 0: unknown command, 9 bytes, a whole frame, but not as documented
+              start     AF FA
+              address   90
+              length    03     3: command, order, 0 bytes of data, checksum
+              command   44     unknown command (not documented)
+              order     90     the charger meant
+              checksum  67     good
+              end       AF A0
+              ! command 0x44 is not documented""")
 
 
 def test_data_without_a_meaning_is_shown_in_rows_of_eight() -> None:
@@ -212,7 +260,7 @@ def test_the_kinds_that_a_person_gives_win_over_those_of_a_request() -> None:
         "current_a": 23.11,
         "temperature_1_c": 0.3,
     }
-    assert "temperature 1 0.3 °C" in told.text
+    assert "\n            00 03  temperature 1 0.3 °C\n" in told.text
 
 
 # --- bad frames and garbage ------------------------------------------------------------------------------------------
@@ -265,6 +313,45 @@ def test_a_bad_frame_says_what_is_wrong_with_it(text: str, lines: list[str]) -> 
         assert line in everything
 
 
+@pytest.mark.parametrize(
+    ("text", "problems"),
+    [
+        # What the fields say comes after the reason.
+        (
+            "AF FA 91 04 10 91 00 36 AF A0",
+            ["address 0x91, expected 0x90", "order 0x91, expected 0x90: it must equal the address"],
+        ),
+        # An end in its place is no hint, and none is looked for.
+        ("AF FA 90 04 10 90 00 35 AF A0", ["checksum 0x35, expected 0x34"]),
+    ],
+)
+def test_a_bad_frame_of_the_length_that_it_declares_gets_no_hint(text: str, problems: list[str]) -> None:
+    assert only(text).facts["problems"] == problems
+
+
+ENDS_EARLY = "AF FA 90 23 10 90 00 34 AF A0"
+LENGTH_04 = ["an end AF A0 stands after 10 bytes: the length of such a frame is 0x04"]
+
+
+@pytest.mark.parametrize(
+    ("text", "hints"),
+    [
+        (ENDS_EARLY, LENGTH_04),
+        (f"{ENDS_EARLY} {ENDS_EARLY[6:]}", LENGTH_04),  # of two ends the first
+        (f"{ENDS_EARLY} AF FA", LENGTH_04),  # what starts after the end is no matter
+        ("AF FA 90 23 10 AF FA 34 AF A0", []),  # the end of what starts before it
+        ("AF FA AF FA 90 FF 00 00 AF A0", []),
+        ("AF FA 90 23 10 90 AF A0 00 00", []),  # nothing so short is a frame
+        ("AF FA 90 23 10 90 33 AF A0 00", ["an end AF A0 stands after 9 bytes: the length of such a frame is 0x03"]),
+    ],
+)
+def test_an_end_in_another_place_is_a_hint_unless_it_belongs_to_something_else(text: str, hints: list[str]) -> None:
+    first, *_ = explain(text)
+    problems = first.facts["problems"]
+    assert isinstance(problems, list)
+    assert problems[1:] == hints
+
+
 def test_what_has_no_sensible_length_is_told_byte_by_byte() -> None:
     (told,) = explain("AF FA 90 FF 10 91 01 02 03 04 05 06 07 08 09")
     assert told.text == dedent("""\
@@ -301,7 +388,9 @@ def test_garbage_between_frames_is_shown_where_it_stands() -> None:
         (39, False),
     ]
     assert told[0].text == "byte 0: 2 bytes outside of any frame (no start AF FA)\n            00 11"
-    assert told[2].text.splitlines()[2].strip() == "55"
+    assert told[0].facts == {"offset": 0, "hex": "00 11", "frame": False, "valid": False}
+    assert [one.ok for one in told] == [False, True, False, True, False]
+    assert [row.split() for row in told[2].text.splitlines()[1:]] == [["55"] * 16, ["55"]]
 
 
 def test_a_good_frame_inside_a_false_start_is_explained_too() -> None:
@@ -311,8 +400,8 @@ def test_a_good_frame_inside_a_false_start_is_explained_too() -> None:
 
 
 def test_a_false_start_reaches_to_the_next_start_where_its_length_makes_no_sense() -> None:
-    false_start, good = explain(f"AF FA 90 00 01 {STOP}")
-    assert (false_start.facts["hex"], good.facts["hex"]) == ("AF FA 90 00 01", STOP)
+    noise, false_start, good = explain(f"00 00 AF FA 90 00 01 {STOP}")
+    assert [one.facts["hex"] for one in (noise, false_start, good)] == ["00 00", "AF FA 90 00 01", STOP]
 
 
 def test_text_that_is_not_hexadecimal_is_refused_with_its_place() -> None:

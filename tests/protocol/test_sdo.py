@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from orchestrator.protocol.sdo import (
     ABORT_MEANINGS,
+    NMT_COB_ID,
     NmtCommand,
     NmtState,
     SdoAbort,
@@ -39,6 +40,10 @@ def test_the_documents_exchanges(exchange: Exchange, ours: tuple[bytes, SdoReply
     request, reply = ours
     assert (request_cob_id(NODE), request) == (exchange.request_cob_id, exchange.request)
     assert (reply_cob_id(NODE), parse_reply(exchange.reply)) == (exchange.reply_cob_id, reply)
+
+
+def test_an_object_is_asked_for_with_0x40_and_nothing_behind_its_sub_index() -> None:
+    assert read_request(0x1018, 4) == bytes.fromhex("40 18 10 04 00 00 00 00")
 
 
 def test_four_bytes_are_written_with_0x23() -> None:
@@ -114,5 +119,6 @@ def test_what_stands_behind_a_short_value_means_nothing(wire: str, value: int, s
 def test_cob_ids_and_nmt() -> None:
     assert (request_cob_id(1), reply_cob_id(127), heartbeat_cob_id(0x10)) == (0x601, 0x5FF, 0x710)
     assert [tpdo_cob_id(number, 0x10) for number in (1, 2, 3, 4)] == [0x190, 0x290, 0x390, 0x490]
+    assert NMT_COB_ID == 0
     assert [nmt_frame(command, 0x10).hex() for command in NmtCommand] == ["0110", "0210", "8010", "8110", "8210"]
     assert [state.value for state in NmtState] == [0x00, 0x04, 0x05, 0x7F]

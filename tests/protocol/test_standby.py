@@ -39,7 +39,10 @@ def test_the_question_is_three_bytes_away_from_every_command() -> None:
 
 @pytest.mark.parametrize(
     ("amps", "operation", "said"),
-    [(0, 0, True), (0.5, 0, True), (0.51, 0, False), (14, 1, False), (0, 1, False), (655.35, 0, False), (0, 2, False)],
+    [
+        *((0, 0, True), (0.5, 0, True), (0.51, 0, False), (14, 1, False), (0, 1, False), (0, 2, False)),
+        *((2.56, 0, False), (655.35, 0, False), (0, 0x100, False)),  # the high bytes count as well
+    ],
 )
 def test_standby_is_operation_0_and_no_current(amps: float, operation: int, said: bool) -> None:
     assert standby.stands_by(answer(amps, operation)) is said
@@ -59,6 +62,7 @@ def test_the_newest_answer_counts() -> None:
     assert standby.stands_by(answer(0, 0) + answer(14, 1)) is False
     assert standby.stands_by(answer(14, 1) + answer(0, 0)) is True
     assert standby.stands_by(answer(14, 1) + answer(0, 0)[:-1]) is False
+    assert standby.stands_by(answer(14, 1) + answer(0, 0) + answer(14, 1)[:-1]) is True
 
 
 @given(streams, streams)
