@@ -31,7 +31,7 @@ def stands_by(data: bytes) -> bool | None:
         values = answer[len(_ANSWER_HEAD) : len(_ANSWER_HEAD) + _DATA_BYTES]
         checksum, end = answer[-3:-2], answer[-2:]
         if len(answer) == ANSWER_BYTES and end == _ANSWER_END and checksum[0] == sum(answer[2:-3]) & 0xFF:
-            amps = int.from_bytes(values[_CURRENT])
-            said = int.from_bytes(values[_OPERATION]) == 0 and amps <= _STANDBY_CENTIAMPS
+            amps = int.from_bytes(values[_CURRENT], "big")
+            said = int.from_bytes(values[_OPERATION], "big") == 0 and amps <= _STANDBY_CENTIAMPS
         at = data.find(_ANSWER_HEAD, at + 1)
     return said
