@@ -31,8 +31,8 @@ LATER_S = {
     "stale_reading": 0.5, "implausible_soc": 1.0, "volts_disagree": 3.0, "amps_disagree": 5.0, "over_temperature": 7.0,
     "under_temperature": 6.0, "command_ignored": 5.0, "battery_removed": 1.0,
 }  # fmt: skip
-#: Nothing to stop for in the middle of these charges: a temperature that stays is not seen, a charger's values that stay
-#: only after a minute, what shows in a precharge or at rest neither, and of a SOC that jumps people are warned.
+#: Nothing to stop for in the middle of these charges: a temperature that stays is not seen, a charger's values that
+#: stay only after a minute, what shows in a precharge or at rest neither, and of a SOC that jumps people are warned.
 UNSEEN = ("heal", "frozen_charger", "frozen_temperature", "precharge_no_rise", "rogue_run", "soc_jump")
 #: A deeply discharged toy is full within a minute, and a charge that was refused is tried again after a backoff.
 BEGIN_S, FULL_S, BACKOFF_S = 25.0, 150.0, 330.0
