@@ -180,12 +180,16 @@ def test_a_late_obedience_is_waited_for(tmp_path: Path) -> None:
 def test_a_line_that_takes_nothing_is_not_waited_for(tmp_path: Path) -> None:
     """What it had not taken is dropped: an order from before the stop must not come out minutes later."""
     with plugged(tmp_path / "stalled") as pty, running_chargers(tmp_path) as (bench,):
-        pty.fill()
+        filled = pty.fill()
         began_s = time.monotonic()
-        told = stop_all({pty.path: None, bench.name: bench.duplicate()}, 0.6)
+        adopted = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+        told = stop_all({pty.path: adopted, bench.name: bench.duplicate()}, 0.6)
         assert told[bench.name] == ""
         assert told[pty.path] in (STALLED, SILENT)
         assert time.monotonic() - began_s < 3.0
+        came = pty.drain()
+        assert len(came) < filled
+        assert came.endswith(STOP_FRAME * 2 + OPERATION_STOP_FRAME + QUESTION)
 
 
 def test_a_port_that_fails_is_opened_anew(tmp_path: Path) -> None:

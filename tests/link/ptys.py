@@ -41,6 +41,9 @@ class Pty:
         while writable.poll(100):  # the kernel hands on what was written a little later, and so makes room again
             with suppress(BlockingIOError):
                 filled += os.write(self._ours, bytes(4096))
+        with suppress(BlockingIOError):  # "writable" begins with room for more than a frame
+            while True:
+                filled += os.write(self._ours, bytes(1))
         return filled
 
     def drain(self) -> bytes:
