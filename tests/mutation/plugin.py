@@ -2,7 +2,7 @@
 
 - Hypothesis does not shrink an example that fails, which takes longer than all else, and tries the same examples for
   each mutant.
-- The quick tests come first: the first one that fails ends a mutant's trial.
+- The first test that fails ends a mutant's trial. So those come first that ended the last ones, then the quick ones.
 - A test's id is plain ASCII. mutmut collects again and again in one process, pytest escapes an id's other characters
   anew each time, and then finds no such test; what mutmut makes of that is a mutant that was killed.
 - Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
@@ -12,6 +12,7 @@ import json
 import os
 import re
 from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 
 import _pytest.python as collecting
@@ -37,12 +38,20 @@ collecting._ascii_escaped_by_config = _plain
 
 #: File of tests → the module that they start as a process.
 ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/service/guardian.py"}
-STATS = Path("mutmut-stats.json")
+STATS, KILLERS = Path("mutmut-stats.json"), Path("killers.txt")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     seconds = json.loads(STATS.read_text(encoding="utf-8"))["duration_by_test"] if STATS.exists() else {}
-    items.sort(key=lambda item: seconds.get(item.nodeid, 0.0))
+    names = KILLERS.read_text(encoding="utf-8").splitlines() if KILLERS.exists() else []
+    ago = {name: number for number, name in enumerate(dict.fromkeys(reversed(names)))}
+    items.sort(key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.failed and "__mutmut_" in os.environ.get("MUTANT_UNDER_TEST", ""):
+        with KILLERS.open("a", encoding="utf-8") as file:
+            file.write(f"{report.nodeid}\n")
 
 
 @pytest.hookimpl(tryfirst=True)
