@@ -67,14 +67,19 @@ def _wakes(taken: Taken) -> bool:
 
 
 def _runs(taken: Taken, state: State) -> bool:
-    """Long enough for any fault to show; or the change of surroundings looks like another battery."""
+    """Long enough for any fault to show."""
     since_s = taken.after.since_s or taken.now_s
     runs = taken.after.state is state and taken.after.ran and taken.now_s - since_s > STEADY_S
-    return runs or "battery_exchanged" in taken.after.faults
+    return runs or _exchanged(taken)
+
+
+def _exchanged(taken: Taken) -> bool:
+    """The change of surroundings looks like another battery, after which a person must act."""
+    return "battery_exchanged" in taken.after.faults
 
 
 def _full(taken: Taken) -> bool:
-    return taken.after.state is State.FULL
+    return taken.after.state is State.FULL or _exchanged(taken)
 
 
 def _ended(taken: Taken) -> bool:
