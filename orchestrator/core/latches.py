@@ -110,19 +110,23 @@ def release(
 
     Returns the faults that are left and the reasons why some of them cannot be cleared; then none is.
     """
-    left: dict[str, FaultMemory] = {}
-    reasons: list[str] = []
-    for name, fault in faults.items():
-        row = ROW[name]
-        if fault.raised_s is None or clear_after_s(row, fault) is not None:
-            left[name] = fault  # it is not a fault, or clears by itself
-        elif not by_reset and fault.latched:
-            left[name] = fault
-            reasons.append(f"{name} is latched and needs a reset: {fault.text}")
-        elif fault.clean_s is None:
-            left[name] = fault
-            reasons.append(f"{name} is still there: {fault.text}")
-        elif now_s - fault.clean_s < row.clean_s:
-            left[name] = fault
-            reasons.append(f"{name} must be gone for {row.clean_s:g} s first")
-    return (faults if reasons else left), reasons
+    waiting = {
+        name: fault
+        for name, fault in faults.items()
+        if fault.raised_s is not None and clear_after_s(ROW[name], fault) is None
+    }
+    reasons = [reason for name, fault in waiting.items() if (reason := _kept_by(name, fault, now_s, by_reset=by_reset))]
+    left = {name: fault for name, fault in faults.items() if reasons or name not in waiting}
+    return left, reasons
+
+
+def _kept_by(name: str, fault: FaultMemory, now_s: float, *, by_reset: bool) -> str:
+    """Why a person may not clear this fault now; "" if they may."""
+    row = ROW[name]
+    if not by_reset and fault.latched:
+        return f"{name} is latched and needs a reset: {fault.text}"
+    if fault.clean_s is None:
+        return f"{name} is still there: {fault.text}"
+    if now_s - fault.clean_s < row.clean_s:
+        return f"{name} must be gone for {row.clean_s:g} s first"
+    return ""

@@ -42,11 +42,12 @@ def test_a_deeply_discharged_pack_goes_through_every_stage() -> None:
     for volts in (33.5, 34.0, 34.6, 35.1):
         world.run(60)
         world.values["voltage_v"] = volts
-    assert world.until(S.PRECHARGE_CONTINUOUS, 5).reason.startswith("the pack reached 35.1 V (")
+    at = POLICY.source.at
+    assert world.until(S.PRECHARGE_CONTINUOUS, 5).reason == f"the pack reached 35.1 V ({at('precharge.pulse.until_v')})"
     for volts in (36.0, 37.0, 38.0, 39.0):
         world.run(60)
         world.values["voltage_v"] = volts
-    assert world.until(S.CHARGING, 5).reason.startswith("the pack reached 39 V (")
+    assert world.until(S.CHARGING, 5).reason == f"the pack reached 39 V ({at('precharge.below_v')})"
     for soc in range(5, 100, 5):
         world.run(60, dt_s=1.0)
         world.values["soc_pct"] = float(soc)
@@ -576,7 +577,9 @@ def test_a_tripped_charger_that_runs_again_is_stopped_again() -> None:
 def test_a_precharge_that_lost_its_rule_stops() -> None:
     world = pulse()
     world.rules = Rules.of(bay(replace(POLICY, precharge=None)))
-    assert world.tick().command == STOP
+    decision = world.tick()
+    assert decision.command == STOP
+    assert decision.reason == "precharge without a rule for it, or without the pack's voltage"
 
 
 def test_our_own_exception_trips_with_its_words() -> None:

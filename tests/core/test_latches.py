@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core.latches import release
-from orchestrator.core.memory import FaultMemory
+from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.operator import hear
 from orchestrator.model import Action, Connection, ControlMode, Effect, Request, State
 from tests.core.bays import charging, idle, stopping
 from tests.core.world import TICK_S, World
@@ -199,12 +200,33 @@ def test_a_refused_request_changes_nothing() -> None:
     assert world.is_in(State.TRIPPED)
     assert world.ask(Request.RESET) == "sdo_refused is still there: 0x6004: no such object"
     assert set(world.raised) == {"internal", "sdo_refused"}
-    assert "internal is latched" in world.ask(Request.START)
-    assert "sdo_refused is latched" in world.ask(Request.START)
+    assert world.ask(Request.START) == (
+        "sdo_refused is latched and needs a reset: 0x6004: no such object; "
+        "internal is latched and needs a reset: ValueError()"
+    )
     world.battery_link = replace(world.battery_link, abort="", abort_code=0)
     world.tick()
     assert world.ask(Request.RESET) == ""
     assert not world.raised
+
+
+def test_each_that_keeps_a_reset_from_its_effect_is_named() -> None:
+    world = charging()
+    world.shows["connection"] = Connection.REVERSED
+    world.battery_link = replace(world.battery_link, abort="0x6004: no such object", abort_code=0x06020000)
+    world.run(2)
+    assert world.is_in(State.TRIPPED)
+    world.shows.clear()
+    world.tick()
+    assert world.ask(Request.RESET) == (
+        "reverse_polarity must be gone for 5 s first; sdo_refused is still there: 0x6004: no such object"
+    )
+
+
+def test_a_fault_is_gone_long_enough_at_the_very_moment() -> None:
+    gone = {"reverse_polarity": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
+    assert release(gone, 6.75, by_reset=True) == (gone, ["reverse_polarity must be gone for 5 s first"])
+    assert release(gone, 7.0, by_reset=True) == ({}, [])
 
 
 def test_a_start_clears_only_what_waits_for_one() -> None:
@@ -338,6 +360,22 @@ def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:
     assert world.ask(Request.RESET) != ""
     world.run(30)
     assert world.ask(Request.RESET) == ""
+
+
+def test_an_hour_after_the_first_of_three_there_may_be_a_fourth() -> None:
+    latched = {"internal": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
+    memory = Memory(faults=latched, resets=tuple((1000.0 + t_s, "internal") for t_s in (0.0, 10.0, 20.0)))
+    assert "reset again in 0 min" in hear(memory, Request.RESET, 4599.75)
+    assert hear(memory, Request.RESET, 4600.0) == ""
+    assert [t_s for t_s, _ in memory.resets] == [1010.0, 1020.0, 4600.0]
+
+
+def test_only_what_was_latched_counts_as_reset() -> None:
+    world = charging()
+    world.charger.run = False
+    world.until(State.IDLE, 5)
+    assert world.ask(Request.RESET) == ""
+    assert world.memory.resets == ()
 
 
 def test_resets_are_counted_for_each_fault() -> None:
