@@ -21,6 +21,11 @@ class Mutant:
     became: str = ""
 
     @property
+    def tried(self) -> bool:
+        """Its tests have been run, as far as there are any."""
+        return self.exit_code is not None
+
+    @property
     def killed(self) -> bool:
         """A test failed."""
         return self.exit_code in KILLED
@@ -33,7 +38,7 @@ class Mutant:
     @property
     def lives(self) -> bool:
         """No test noticed it, or none reaches it."""
-        return not self.killed and not self.timed_out
+        return self.tried and not self.killed and not self.timed_out
 
     @property
     def function(self) -> str:

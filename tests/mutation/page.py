@@ -24,8 +24,9 @@ reasons; `?` stands where there is none yet. A mutant that times out counts as k
 
 
 def score(mutants: Sequence[Mutant]) -> float:
-    """How many were killed, in percent."""
-    return 100 * sum(not mutant.lives for mutant in mutants) / max(1, len(mutants))
+    """How many of those that were tried were killed, in percent."""
+    tried = [mutant for mutant in mutants if mutant.tried]
+    return 100 * sum(not mutant.lives for mutant in tried) / max(1, len(tried))
 
 
 def page(mutants: Sequence[Mutant], known: Reasons) -> str:
@@ -35,19 +36,18 @@ def page(mutants: Sequence[Mutant], known: Reasons) -> str:
 
 
 def _scores(mutants: Sequence[Mutant]) -> Iterator[str]:
-    yield "| module | mutants | killed | timed out | live | % killed | seconds |"
-    yield "| --- | --: | --: | --: | --: | --: | --: |"
+    yield "| module | mutants | tried | killed | timed out | live | % killed | seconds |"
+    yield "| --- | --: | --: | --: | --: | --: | --: | --: |"
     for module, some in groupby(mutants, lambda mutant: mutant.module):
         yield _score_row(f"`{module}`", list(some))
     yield _score_row("all", mutants)
 
 
 def _score_row(title: str, mutants: Sequence[Mutant]) -> str:
-    killed, timed_out, live = (
-        sum(getattr(mutant, fate) for mutant in mutants) for fate in ("killed", "timed_out", "lives")
-    )
+    fates = (sum(getattr(mutant, fate) for mutant in mutants) for fate in ("tried", "killed", "timed_out", "lives"))
     seconds = sum(mutant.seconds for mutant in mutants)
-    return f"| {title} | {len(mutants)} | {killed} | {timed_out} | {live} | {score(mutants):.1f} | {seconds:.0f} |"
+    cells = (title, len(mutants), *fates, f"{score(mutants):.1f}", f"{seconds:.0f}")
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def _living(mutants: Iterable[Mutant], known: Reasons) -> Iterator[str]:
