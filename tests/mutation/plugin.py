@@ -2,7 +2,8 @@
 
 - Hypothesis does not shrink an example that fails, which takes longer than all else, and tries the same examples for
   each mutant.
-- The first test that fails ends a mutant's trial. So those come first that ended the last ones, then the quick ones.
+- The first test that fails ends a mutant's trial. So those come first that ended the last ones, then the quick ones;
+  and slow ones, where there are others, not at all: a mutant that only they would kill lives.
 - A test's id is plain ASCII. mutmut collects again and again in one process, pytest escapes an id's other characters
   anew each time, and then finds no such test; what mutmut makes of that is a mutant that was killed.
 - Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
@@ -38,6 +39,8 @@ collecting._ascii_escaped_by_config = _plain
 
 #: File of tests → the module that they start as a process.
 ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/service/guardian.py"}
+#: What takes longer is a slow test, measured with mutmut's detours in the code.
+QUICK_S = 0.3
 STATS, KILLERS = Path("mutmut-stats.json"), Path("killers.txt")
 
 
@@ -45,7 +48,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     seconds = json.loads(STATS.read_text(encoding="utf-8"))["duration_by_test"] if STATS.exists() else {}
     names = KILLERS.read_text(encoding="utf-8").splitlines() if KILLERS.exists() else []
     ago = {name: number for number, name in enumerate(dict.fromkeys(reversed(names)))}
-    items.sort(key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
+    quick = [item for item in items if seconds.get(item.nodeid, 0.0) <= QUICK_S]
+    items[:] = sorted(quick or items, key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
