@@ -3,6 +3,7 @@
 import array
 import fcntl
 import os
+import select
 import signal
 import socket
 import struct
@@ -225,6 +226,13 @@ def test_heartbeats_keep_it_quiet(tmp_path: Path) -> None:
 def test_a_controller_that_never_gets_going_is_killed(tmp_path: Path) -> None:
     with watched(tmp_path, "STARTUP_S=0.3") as guardian:
         assert guardian.ended() == ACTED
+
+
+def test_a_controller_that_starts_slowly_is_waited_for(tmp_path: Path) -> None:
+    with watched(tmp_path, "SILENCE_S=0.1") as guardian:
+        assert guardian.controller
+        assert select.select([guardian.link], [], [], 0.5) == ([], [], [])
+        guardian.beat()
 
 
 @pytest.mark.parametrize(
