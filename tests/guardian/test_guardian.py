@@ -270,11 +270,17 @@ def test_an_orderly_end_needs_no_stop(tmp_path: Path, controller: str, status: i
         assert bench.stops == 0
 
 
-def test_an_orderly_end_that_hangs_is_cut_short(tmp_path: Path) -> None:
+@pytest.mark.parametrize("hangs_up", [False, True])
+def test_an_orderly_end_that_hangs_is_cut_short(tmp_path: Path, *, hangs_up: bool) -> None:
     with running_chargers(tmp_path) as (bench,), watched(tmp_path, "END_S=0.3") as guardian:
+        controller = guardian.controller
         guardian.hand_over(bench.name, bench.fd)
         guardian.send(DONE)
+        if hangs_up:
+            guardian.link.close()
         assert guardian.ended() == ACTED
+        assert state_of(controller) == "Z"
+        assert guardian.log == ""
 
 
 def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_anew(tmp_path: Path) -> None:
@@ -283,7 +289,10 @@ def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_an
         guardian.hand_over(bench.name, bench.fd)
         guardian.beat()
         assert guardian.ended() == ACTED
-        assert "NOT stopped: the charger says that it goes on" in guardian.log
+        assert guardian.log.splitlines() == [
+            "guardian: the controller hangs: stopping the chargers on 1 ports",
+            f"guardian: {bench.name}: NOT stopped: the charger says that it goes on",
+        ]
 
 
 # --- messages --------------------------------------------------------------------------------------------------------
