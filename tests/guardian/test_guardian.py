@@ -295,6 +295,27 @@ def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_an
         ]
 
 
+def test_it_starts_a_controller_that_nobody_can_freeze_and_ends_with_its_status(tmp_path: Path) -> None:
+    guards = "import sys; from orchestrator.service import guardian; "
+    guards += "sys.exit(guardian.guard(['our.yaml'], ('-c', sys.argv[1])))"
+    controller = """
+import os, signal, socket, sys
+link = socket.socket(fileno=int(sys.argv[1]))
+link.send(b"B")
+assert link.recv(9) == b"A"
+link.send(b"E")
+keys = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
+print(sys.argv[2:], [signal.getsignal(key) is signal.SIG_IGN for key in keys], os.environ["HERE"])
+sys.exit(3)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", guards, controller], env={**os.environ, "HERE": str(tmp_path)}, capture_output=True,
+        text=True, timeout=END_S, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (3, "")
+    assert done.stdout == f"['our.yaml'] [True, True, True] {tmp_path}\n"
+
+
 # --- messages --------------------------------------------------------------------------------------------------------
 
 
