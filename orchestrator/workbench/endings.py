@@ -93,7 +93,8 @@ def _free(memory: Memory) -> bool:
 
 
 def _charging(memory: Memory) -> bool:
-    return memory.state is State.CHARGING and memory.ran
+    """With nothing ordered that is not seen yet: no charger leaves an order alone for `SLOWLY_S`."""
+    return memory.state is State.CHARGING and memory.ran and memory.order is None
 
 
 def _energised(memory: Memory) -> bool:
