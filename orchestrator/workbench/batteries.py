@@ -131,12 +131,11 @@ def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
     status = {**base.values, "status": float(1 << BatteryStatus.BMU_ERROR)}
     limit = {**base.values, "status": float(1 << BatteryStatus.LOW_TEMPERATURE)}
     full = {**base.values, "soc_pct": rules.policy.finish.soc_pct}
-    deep = (
-        {**base.values, "voltage_v": (pack.voltage_v.low + precharge.below_v) / 2}
-        if precharge is not None and rules.manual
-        else None
-    )
-    return ({"deeply discharged": replace(base, values=deep)} if deep else {}) | {
+    deep: dict[str, Shown] = {}
+    if precharge is not None and rules.manual:
+        low_v = (pack.voltage_v.low + precharge.below_v) / 2
+        deep["deeply discharged"] = replace(base, values={**base.values, "voltage_v": low_v})
+    return deep | {
         "full": replace(base, values=full),
         "takes nothing": replace(base, takes=0.0),
         "tapers": replace(base, takes=0.01, values={**base.values, "voltage_v": rules.max_v - 0.1}),

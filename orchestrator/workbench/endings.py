@@ -6,6 +6,7 @@ state or order, and ever larger ones while there is none. To change for ever wit
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
@@ -19,8 +20,8 @@ TICK_S = 0.25
 LADDER = ((16, TICK_S), (10, 1.0), (12, 5.0), (12, 30.0), (10, 300.0), (15, 3600.0))
 #: More changes of state than this without news: the longest orderly story is three backoffs and a latch.
 PATIENCE = 60
-#: … of which a story tells so many.
-SHOWN = 8
+#: … of which a story tells so many steps.
+SHOWN = 40
 #: What backoffs, hysteresis and the qualification take together, at most.
 RECOVERY_S = 600.0
 #: In this time a pack comes from any temperature to any other without looking like a broken sensor.
@@ -79,7 +80,8 @@ def _exchanged(taken: Taken) -> bool:
 
 
 def _full(taken: Taken) -> bool:
-    return taken.after.state is State.FULL or _exchanged(taken)
+    """A pack cannot come from any temperature to any other in the moment in which it gets full: that is no ending."""
+    return taken.after.state is State.FULL or "temperature_invalid" in taken.after.faults
 
 
 def _ended(taken: Taken) -> bool:
@@ -117,44 +119,22 @@ ENDINGS: tuple[Ending, ...] = (
     Ending("wakes", "a deeply discharged pack is precharged",
            "obeys", "deeply discharged", RECOVERY_S, _wakes, first_s=SLOWLY_S, asked_of=_free),
     Ending("full", "a charge is over when the BMU says so",
-           "obeys", "full", 30.0, _full, first_s=SLOWLY_S, asked_of=_charging),
+           "obeys", "full", 30.0, _full, asked_of=_charging),
     Ending("ends", "a charge that leads nowhere is ended by a limit",
            "obeys", "healthy", 14 * 3600.0, _ended, first_s=SLOWLY_S, asked_of=_energised),
 )  # fmt: skip
 
 
+#: What is broken, by what, from which of the places, and the moves that lead there.
+Broken = tuple[str, str, int, list[Move]]
+
+
 def reaches(explorer: Explorer, endings: Sequence[Ending] = ENDINGS) -> None:
-    """Hold every ending against every node; of each the first node that does not end so is kept."""
+    """Hold every ending against every node, and every property on the way; the first node that breaks one is kept."""
     batteries = {battery for _, battery in explorer.walk.inputs.constants()}
-    jobs = [
-        (ENDINGS.index(ending), [node.place for node in explorer.nodes])
-        for ending in endings if ending.battery in batteries
-    ]  # fmt: skip
-    for (which, _), missed in zip(jobs, explorer.each(_first_missed, jobs), strict=True):
-        if missed is not None:
-            number, moves, state = missed
-            ending = ENDINGS[which]
-            text = f"{ending.about}: not within {ending.within_s:g} s, but {state}"
-            explorer.find(ending.name, text, explorer.nodes[number], moves)
-
-
-def _first_missed(walk: Walk, which: int, places: Sequence[Place]) -> tuple[int, list[Move], State] | None:
-    """The first place that does not end so, what happened from there, and where it is then."""
-    ending = ENDINGS[which]
-    first = Move(ending.first_s, ending.charger, ending.battery, ending.request)
-    for number, place in enumerate(places):
-        if not ending.asked_of(place.memory):
-            continue
-        moves: list[Move] = []
-        for taken in lasting(walk, place, first):
-            moves.append(taken.move)
-            if ending.reached(taken):
-                break
-            if taken.now_s - place.now_s > ending.first_s + ending.within_s:
-                return number, moves, taken.after.state
-        else:
-            return number, moves, taken.after.state
-    return None
+    places = [node.place for node in explorer.nodes]
+    jobs = [(ENDINGS.index(ending), places) for ending in endings if ending.battery in batteries]
+    _keep(explorer, explorer.nodes, explorer.each(_missed, jobs))
 
 
 def settles(explorer: Explorer, some: Iterable[Node] | None = None) -> None:
@@ -162,40 +142,59 @@ def settles(explorer: Explorer, some: Iterable[Node] | None = None) -> None:
     nodes = explorer.nodes if some is None else list(some)
     places = [node.place for node in nodes]
     jobs = [(*constant, places) for constant in explorer.walk.inputs.constants()]
-    for (charger, battery, _), endless in zip(jobs, explorer.each(_first_endless, jobs), strict=True):
-        if endless is not None:
-            number, moves = endless
-            text = f"{PATIENCE} changes of state without news (charger: {charger}; battery: {battery})"
-            explorer.find("no livelock", text, nodes[number], moves)
+    _keep(explorer, nodes, explorer.each(_endless, jobs))
 
 
-def _first_endless(walk: Walk, charger: str, battery: str, places: Sequence[Place]) -> tuple[int, list[Move]] | None:
-    """The first place from which the state changes for ever, and the moves of the first changes."""
-    settled: set[object] = set()
+def _keep(explorer: Explorer, nodes: Sequence[Node], found: Iterable[Sequence[Broken]]) -> None:
+    for name, text, number, moves in chain.from_iterable(found):
+        explorer.find(name, text, nodes[number], moves)
+
+
+def _missed(walk: Walk, which: int, places: Sequence[Place]) -> list[Broken]:
+    """The first place that does not end so, and what is broken on the way."""
+    ending = ENDINGS[which]
+    first = Move(ending.first_s, ending.charger, ending.battery, ending.request)
+    found: list[Broken] = []
     for number, place in enumerate(places):
-        moves = _changes(walk, place, Move(TICK_S, charger, battery), settled)
-        if moves is not None:
-            return number, moves
-    return None
-
-
-def _changes(walk: Walk, place: Place, first: Move, settled: set[object]) -> list[Move] | None:
-    """What leads through the first of the changes, if they do not end; None, and all passed is settled, if they do."""
-    changes = 0
-    moves: list[Move] = []
-    passed: set[object] = set()
-    for taken in lasting(walk, place, first):
-        if changes < SHOWN:
+        if not ending.asked_of(place.memory):
+            continue
+        moves: list[Move] = []
+        state, reached = place.memory.state, False
+        for taken in lasting(walk, place, first):
             moves.append(taken.move)
-        key = walk.gist(taken.after)
-        if key in settled:
-            break
-        passed.add(key)
-        changes += taken.after.state is not taken.before.state
-        if changes == PATIENCE:
-            return moves
-    settled |= passed
-    return None
+            found += [(name, text, number, [*moves]) for name, text in walk.news(taken)]
+            state, reached = taken.after.state, ending.reached(taken)
+            if reached or taken.now_s - place.now_s > ending.first_s + ending.within_s:
+                break
+        if not reached:
+            text = f"{ending.about}: not within {ending.within_s:g} s, but {state}"
+            return [*found, (ending.name, text, number, moves)]
+    return found
+
+
+def _endless(walk: Walk, charger: str, battery: str, places: Sequence[Place]) -> list[Broken]:
+    """The first place from which the state changes for ever, and what is broken on the way."""
+    settled: set[object] = set()
+    found: list[Broken] = []
+    for number, place in enumerate(places):
+        if walk.gist(place.memory) in settled:
+            continue
+        changes = 0
+        moves: list[Move] = []
+        passed: set[object] = {walk.gist(place.memory)}
+        for taken in lasting(walk, place, Move(TICK_S, charger, battery)):
+            moves.append(taken.move)
+            found += [(name, text, number, [*moves]) for name, text in walk.news(taken)]
+            key = walk.gist(taken.after)
+            if key in settled:
+                break
+            passed.add(key)
+            changes += taken.after.state is not taken.before.state
+            if changes == PATIENCE:
+                text = f"{PATIENCE} changes of state without news (charger: {charger}; battery: {battery})"
+                return [*found, ("no livelock", text, number, moves[:SHOWN])]
+        settled |= passed
+    return found
 
 
 def lasting(walk: Walk, place: Place, first: Move) -> Iterator[Taken]:

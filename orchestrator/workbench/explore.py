@@ -108,6 +108,13 @@ class Walk:
             if wrong is not None:
                 yield rule.name, wrong
 
+    def news(self, taken: Taken) -> Iterator[tuple[str, str]]:
+        """What the step breaks and was not told of before."""
+        for name, text in self.broken(taken):
+            if name not in self._told:
+                self._told.add(name)
+                yield name, text
+
     def follow(self, place: Place, moves: Iterable[Move]) -> Iterator[Taken]:
         """Steps one after another from there, as far as none raises an exception."""
         for move in moves:
@@ -123,10 +130,7 @@ class Walk:
         for move in (*self.inputs.moves(), *(self.inputs.pairs() if in_pairs else ())):
             taken = self.take(place, move)
             steps += 1
-            for name, text in self.broken(taken):
-                if name not in self._told:
-                    self._told.add(name)
-                    broken.append((name, text, move))
+            broken += [(name, text, move) for name, text in self.news(taken)]
             if taken.before.state is not taken.after.state:
                 changes.add((taken.before.state, taken.after.state))
             if not taken.error and (key := self.gist(taken.after)) not in self._told:

@@ -34,7 +34,7 @@ from orchestrator.workbench.story import Move
 SENT_AGE_S, READ_AGE_S, OLD_S = 0.1, 0.05, 30.0
 TICK_S = 0.25
 #: Of two timers that are no farther apart than this, a jump past the longer one is past both.
-NEAR = 1.1
+ALIKE = 1.1
 #: What flows in precharge.
 PRECHARGE_A = 1.0
 #: What a charger shows in each stage.
@@ -211,5 +211,5 @@ def jumps(rules: Rules) -> tuple[float, ...]:
     if policy.precharge is not None:
         rule = policy.precharge
         timers += [m * 60 for m in (rule.pulse.max_min, rule.continuous.max_min, rule.rise.within_min)]
-    apart = [timer for timer in timers if not any(timer < other < timer * NEAR for other in timers)]
+    apart = [timer for timer in timers if not any(timer < other < timer * ALIKE for other in timers)]
     return tuple(sorted({timer + 0.1 for timer in apart}))

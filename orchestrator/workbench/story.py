@@ -51,10 +51,9 @@ class Counterexample:
     story: tuple[Taken, ...]
 
     def __str__(self) -> str:
-        told = [_told(taken) for taken in self.story]
         lines = [f"{self.name}: {self.text}"]
-        for same, group in groupby(zip(self.story, told, strict=True), lambda pair: pair[1]):
-            times_s = [taken.now_s - BEGIN_S for taken, _ in group]
+        for same, group in groupby(self.story, _told):
+            times_s = [taken.now_s - BEGIN_S for taken in group]
             until = f" … {times_s[-1]:.2f}" if len(times_s) > 1 else ""
             lines.append(f"  t = {times_s[0]:.2f}{until} s  {same}")
         return "\n".join(lines)

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -23,6 +24,7 @@ from orchestrator.model import ENERGISED, State
 from orchestrator.service.control import ask
 from orchestrator.sim.faults import FAULTS
 from tests.proof.truth import MARGIN_S, SILENT_S, VERIFY_S
+from tests.waiting import wait_until
 
 LOOK_S = 0.1
 SAMPLE_S = 10.0
@@ -213,15 +215,17 @@ class Life:
         self._until(lambda: False, seconds)
 
     def _until(self, condition: Callable[[], bool], within_s: float) -> bool:
-        deadline_s = time.monotonic() + within_s
-        while not condition():
-            now_s = time.monotonic()
-            if now_s > deadline_s:
-                return False
+        deadline_s, came = time.monotonic() + within_s, False
+
+        def over() -> bool:
+            nonlocal came
+            now_s, came = time.monotonic(), condition()
             if now_s - self._sampled_s >= SAMPLE_S:
                 self._sample(now_s)
-            time.sleep(LOOK_S)
-        return True
+            return came or now_s > deadline_s
+
+        wait_until(over, inf, every_s=LOOK_S)
+        return came
 
     def _odd(self, text: str) -> None:
         self.real.odd.append(f"{self._t_s():.0f} s: {text}")
