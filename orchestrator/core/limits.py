@@ -1,6 +1,6 @@
 """The current-limit step: of all that limits it the lowest wins, and has a name. Down at once, up after a hold."""
 
-from orchestrator.config.policy import Band, Table
+from orchestrator.config.policy import Table
 from orchestrator.core.facts import Facts
 from orchestrator.model import ActiveFault, Effect, Step
 
@@ -78,15 +78,13 @@ def _rule(f: Facts, what: str, path: str, value: float | None) -> str:
     place = f.rules.policy.source.at(path)
     if value is None:
         return f"{name} unknown, {place}"
-    table: Table | None = getattr(f.rules.policy.current, what)
-    row = _row(table, value) if table is not None else None
-    band: Band | None = table[row] if table is not None and row is not None else None
-    where = f"in {band.from_:g} … {band.to:g}" if band is not None else "outside of its table"
+    table: Table = getattr(f.rules.policy.current, what)
+    row = _row(table, value)
+    where = f"in {table[row].from_:g} … {table[row].to:g}" if row is not None else "outside of its table"
     return f"{name} {form.format(value)} {where}, {place}"
 
 
 def _same_rule(before: Step, f: Facts, bound: Bound) -> bool:
-    """Whether the step that is in force is bound by the same line; its sentence then stays as it was."""
+    """Whether the step that is in force is bound by the same line of a table; its sentence then keeps its value."""
     _, what, path, _ = bound
-    source = f.rules.bay.source if what not in WORDS else f.rules.policy.source
-    return before.rule.endswith(source.at(path) if path else what)
+    return what in WORDS and before.rule.endswith(f.rules.policy.source.at(path))

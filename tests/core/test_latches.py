@@ -365,6 +365,7 @@ def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:
 def test_an_hour_after_the_first_of_three_there_may_be_a_fourth() -> None:
     latched = {"internal": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
     memory = Memory(faults=latched, resets=tuple((1000.0 + t_s, "internal") for t_s in (0.0, 10.0, 20.0)))
+    assert "reset again in 59 min" in hear(memory, Request.RESET, 1060.0)
     assert "reset again in 0 min" in hear(memory, Request.RESET, 4599.75)
     assert hear(memory, Request.RESET, 4600.0) == ""
     assert [t_s for t_s, _ in memory.resets] == [1010.0, 1020.0, 4600.0]

@@ -57,9 +57,14 @@ def test_the_lowest_wins_and_has_a_name(values: dict[str, float], index: int, pa
     assert step is not None
     assert (step.index, step.current_a) == (index, STEPS_A[index])
     assert step.rule.startswith(words)
-    assert not path or step.rule.endswith(f", {the_policy.source.at('current.' + path)}")
+    assert step.rule.endswith(f", {the_policy.source.at('current.' + path)}" if path else words)
     assert world.charger.limit == index
     assert world.decision.reason == f"step {index} ({STEPS_A[index]:.1f} A): {step.rule}"
+
+
+def test_a_table_that_is_not_there_hides_no_other() -> None:
+    without = replace(POLICY, current=replace(POLICY.current, temperature_c=None))
+    assert index(World(bay(without), temperature_c=5.0, soc_pct=95.0).charging()) == 2
 
 
 def test_the_first_of_two_equal_limits_is_named() -> None:

@@ -2,17 +2,19 @@
 
 mutmut makes the mutants and tries them; pyproject.toml says of what, and with which tests. What it finds goes to
 docs/mutation.md, in which the reasons of those that live are kept by hand. Arguments choose some mutants, as
-`orchestrator.protocol.frame.*`; without any, those are tried that are new or whose function has changed.
+`orchestrator.protocol.frame.*`; without any, those are tried that are new or whose function has changed. Each is tried
+with the quick tests; those that live without a reason are tried once more, with the slow ones.
 """
 
 import json
+import os
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from tests.mutation.mutants import Mutant
-from tests.mutation.page import GOAL_PCT, page, reasons, score
+from tests.mutation.mutants import SLOW_TESTS, Mutant
+from tests.mutation.page import GOAL_PCT, Reasons, page, reasons, score
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 MUTANTS = ROOT / "mutants"
@@ -21,11 +23,14 @@ PAGE = ROOT / "docs" / "mutation.md"
 
 def main(patterns: Sequence[str]) -> int:
     """Try them and write the page; 1 if too many live, or one without a reason, or some were not tried."""
-    _mutmut("run", "--max-children", "1", *patterns)
-    mutants = list(_mutants())
     known = reasons(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
+    _mutmut("run", "--max-children", "1", *patterns)
+    if living := [mutant.name for mutant in _unexplained(_mutants(), known)]:
+        os.environ[SLOW_TESTS] = "yes"
+        _mutmut("run", "--max-children", "1", *living)
+    mutants = list(_mutants())
     PAGE.write_text(page(mutants, known), encoding="utf-8")
-    unexplained = [mutant for mutant in mutants if mutant.lives and mutant.key not in known]
+    unexplained = _unexplained(mutants, known)
     for mutant in unexplained:
         print(f"no reason in {PAGE.name}: {mutant.key}")
     untried = sum(not mutant.tried for mutant in mutants)
@@ -34,6 +39,10 @@ def main(patterns: Sequence[str]) -> int:
         f"{untried} not tried"
     )
     return int(score(mutants) < GOAL_PCT or bool(unexplained or untried))
+
+
+def _unexplained(mutants: Iterable[Mutant], known: Reasons) -> list[Mutant]:
+    return [mutant for mutant in mutants if mutant.lives and mutant.key not in known]
 
 
 def _mutants() -> Iterator[Mutant]:

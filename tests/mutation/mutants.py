@@ -7,6 +7,8 @@ from typing import Self
 #: mutmut's exit codes: 1 and 3 are pytest's, the rest stand for a processor or a clock that ran out.
 KILLED = (1, 3)
 TIMED_OUT = (-24, 24, 36, 152, 255)
+#: Set in the environment of mutmut, it stands for a trial with the slow tests instead of the quick ones.
+SLOW_TESTS = "MUTATION_SLOW_TESTS"
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,11 @@ HEAD = """\
 # Would a test notice?
 
 `make mutation` breaks the product in every small way that [mutmut](https://mutmut.readthedocs.io) knows, one at a time
-(a `<` to `<=`, an `and` to `or`, a number by one, an argument to None, a text to another), and runs the quick tests
-that reach the broken function. A mutant that no test notices lives: either a test is missing, or the change changes
-nothing. At least 95 % must die, and each one that lives needs a reason below. What is mutated are the bodies of
-functions and methods, not the tables and constants of a module, nor functions with a decorator (a property, say).
+(a `<` to `<=`, an `and` to `or`, a number by one, an argument to None, a text to another), and runs the tests that
+reach the broken function, the quick ones first. A mutant that no test notices lives: either a test is missing, or the
+change changes nothing. At least 95 % must die, and each one that lives needs a reason below. What is mutated are the
+bodies of functions and methods, not the tables and constants of a module, nor functions with a decorator (a property,
+say).
 
 `make mutation ARGS='orchestrator.protocol.frame.*'` tries some again. The command writes this page and keeps the
 reasons; `?` stands where there is none yet. A mutant that times out counts as killed: it hung the test.

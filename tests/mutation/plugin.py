@@ -2,8 +2,8 @@
 
 - Hypothesis does not shrink an example that fails, which takes longer than all else, and tries the same examples for
   each mutant.
-- The first test that fails ends a mutant's trial. So those come first that ended the last ones, then the quick ones;
-  and slow ones, where there are others, not at all: a mutant that only they would kill lives.
+- The first test that fails ends a mutant's trial. So those come first that ended the last ones, then the quick ones.
+  Slow tests have a trial of their own, of the mutants that lived: `SLOW_TESTS` in the environment.
 - A test's id is plain ASCII. mutmut collects again and again in one process, pytest escapes an id's other characters
   anew each time, and then finds no such test; what mutmut makes of that is a mutant that was killed.
 - Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
@@ -19,6 +19,8 @@ from pathlib import Path
 import _pytest.python as collecting
 import pytest
 from hypothesis import HealthCheck, Phase, settings
+
+from tests.mutation.mutants import SLOW_TESTS
 
 settings.register_profile(
     "mutation",
@@ -48,8 +50,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     seconds = json.loads(STATS.read_text(encoding="utf-8"))["duration_by_test"] if STATS.exists() else {}
     names = KILLERS.read_text(encoding="utf-8").splitlines() if KILLERS.exists() else []
     ago = {name: number for number, name in enumerate(dict.fromkeys(reversed(names)))}
-    quick = [item for item in items if seconds.get(item.nodeid, 0.0) <= QUICK_S]
-    items[:] = sorted(quick or items, key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
+    slow = SLOW_TESTS in os.environ
+    chosen = [item for item in items if (seconds.get(item.nodeid, 0.0) > QUICK_S) == slow] or items
+    items[:] = sorted(chosen, key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
