@@ -67,6 +67,11 @@ class Watched:
     def hand_over(self, name: str, fd: int | None = None) -> None:
         self.send(PORT + name.encode(), fd)
 
+    def settle(self) -> None:
+        """Returns when all that was sent has been taken, without a heartbeat that would put the deadline off."""
+        wait_until(lambda: not unread_bytes(self.link))
+        wait_until(lambda: state_of(self.process.pid) in "SZ")
+
     def beat(self) -> None:
         """One heartbeat; returns when it was answered, so that all that was sent before has been taken."""
         self.send(BEAT)
@@ -102,6 +107,11 @@ class Watched:
 def die_with_parent_in(terminal: int) -> None:
     die_with_parent()
     fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
+
+
+def unread_bytes(link: socket.socket) -> int:
+    """What was sent and not received yet, as the kernel accounts for it."""
+    return int.from_bytes(fcntl.ioctl(link, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
 
 
 def children_of(pid: int) -> list[int]:
@@ -296,7 +306,9 @@ def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_an
 
 
 def test_it_starts_a_controller_that_nobody_can_freeze_and_ends_with_its_status(tmp_path: Path) -> None:
-    guards = "import sys; from orchestrator.service import guardian; "
+    """Also where whoever started it does not care what becomes of children: the kernel then buries them at once."""
+    guards = "import signal, sys; from orchestrator.service import guardian; "
+    guards += "signal.signal(signal.SIGCHLD, signal.SIG_IGN); "
     guards += "sys.exit(guardian.guard(['our.yaml'], ('-c', sys.argv[1])))"
     controller = """
 import os, signal, socket, sys
@@ -385,6 +397,19 @@ def test_strange_messages_are_no_harm(tmp_path: Path) -> None:
         assert guardian.files == before
 
 
+def test_a_controller_that_reads_no_answers_holds_nothing_up(tmp_path: Path) -> None:
+    with watched(tmp_path) as guardian:
+        for _ in range(1000):  # far more than the socket takes
+            guardian.send(BEAT)
+        guardian.settle()
+        guardian.link.setblocking(False)
+        with suppress(BlockingIOError):
+            while True:
+                assert guardian.link.recv(16) == ALIVE
+        guardian.link.settimeout(END_S)
+        guardian.beat()
+
+
 def test_the_last_words_of_a_controller_that_died_are_heard(tmp_path: Path) -> None:
     """It died with answers unread: the kernel's first word is "connection reset", and what it had sent comes after."""
     with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
@@ -425,11 +450,12 @@ def test_a_machine_that_stood_still_is_no_hang_once(tmp_path: Path) -> None:
             guardian.beat()
             sleep_through(guardian, 0.7)
             guardian.thaw()
+            guardian.settle()
         assert bench.stops == 0
         guardian.beat()
         sleep_through(guardian, 0.7)
         guardian.thaw()
-        wait_until(lambda: state_of(guardian.process.pid) == "S")
+        guardian.settle()
         sleep_through(guardian, 0.7)
         guardian.thaw()
         assert guardian.ended() == ACTED
@@ -445,6 +471,7 @@ def test_whoever_wants_it_to_end_ends_the_controller_first(tmp_path: Path, numbe
         guardian.waits_for("\n")  # the controller is ready to be told
         guardian.hand_over(bench.name, bench.fd)
         guardian.send(DONE)
+        guardian.settle()
         guardian.process.send_signal(number)
         wait_until(lambda: state_of(guardian.controller) == "Z")
         guardian.link.close()
@@ -452,7 +479,7 @@ def test_whoever_wants_it_to_end_ends_the_controller_first(tmp_path: Path, numbe
 
 
 def test_a_hang_up_without_a_terminal_is_passed_on_and_ends_nothing(tmp_path: Path) -> None:
-    with watched(tmp_path, "SILENCE_S=20", controller=SAYS_WHEN_HUNG_UP) as guardian:
+    with watched(tmp_path, "SILENCE_S=20", "END_S=0.1", controller=SAYS_WHEN_HUNG_UP) as guardian:
         guardian.waits_for("\n")
         guardian.process.send_signal(signal.SIGHUP)  # too early: it reads everything anew anyway
         guardian.beat()

@@ -5,6 +5,7 @@ import os
 import socket
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -190,6 +191,17 @@ def test_a_line_that_takes_nothing_is_not_waited_for(tmp_path: Path) -> None:
         came = pty.drain()
         assert len(came) < filled
         assert came.endswith(STOP_FRAME * 2 + OPERATION_STOP_FRAME + QUESTION)
+
+
+def test_a_line_that_takes_nothing_at_all_says_so() -> None:
+    """A tty that is flushed takes something again, if its driver lives."""
+    ours, theirs = socket.socketpair()
+    ours.setblocking(False)
+    with theirs:
+        with suppress(BlockingIOError):
+            while True:
+                ours.send(bytes(4096))
+        assert stop_all({"/nowhere": ours.detach()}, 0.1) == {"/nowhere": STALLED}
 
 
 def test_a_port_that_fails_is_opened_anew(tmp_path: Path) -> None:
