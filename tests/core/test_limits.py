@@ -63,8 +63,8 @@ def test_the_lowest_wins_and_has_a_name(values: dict[str, float], index: int, pa
 
 
 def test_a_table_that_is_not_there_hides_no_other() -> None:
-    without = replace(POLICY, current=replace(POLICY.current, temperature_c=None))
-    assert index(World(bay(without), temperature_c=5.0, soc_pct=95.0).charging()) == 2
+    without = replace(policy(), current=replace(policy().current, soh_pct=None))
+    assert index(World(bay(without), voltage_v=47.0).charging()) == 1
 
 
 def test_the_first_of_two_equal_limits_is_named() -> None:

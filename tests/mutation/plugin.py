@@ -6,19 +6,26 @@
   Slow tests have a trial of their own, of the mutants that lived: `SLOW_TESTS` in the environment.
 - A test's id is plain ASCII. mutmut collects again and again in one process, pytest escapes an id's other characters
   anew each time, and then finds no such test; what mutmut makes of that is a mutant that was killed.
+- A function that has mutants is run as it stands during a trial, not through mutmut's detour, which asks at each call
+  which mutant is on trial and makes the core's tests five times slower.
 - Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
 """
 
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import update_wrapper
+from inspect import isgeneratorfunction
 from math import inf
 from pathlib import Path
+from types import FunctionType
+from typing import Any
 
 import _pytest.python as collecting
 import pytest
 from hypothesis import HealthCheck, Phase, settings
+from mutmut.mutation import trampoline
 
 from tests.mutation.mutants import SLOW_TESTS
 
@@ -44,6 +51,51 @@ ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator
 #: What takes longer is a slow test, measured with mutmut's detours in the code.
 QUICK_S = 0.3
 STATS, KILLERS = Path("mutmut-stats.json"), Path("killers.txt")
+#: Each function that has mutants, as its module knows it, and these; mutmut's detours for them, in the same order.
+STANDING: list[tuple[FunctionType, Mapping[str, FunctionType]]] = []
+DETOURS: list[Callable[..., Any]] = []
+
+
+def _wrap(mutants: Mapping[str, FunctionType], is_classmethod: bool = False) -> Callable[[Any], Any]:
+    """In the place of mutmut's own: a plain function that takes its detour, until `_stand` gives it a body."""
+    detour_of = trampoline.wrap_in_trampoline_slowly(mutants, is_classmethod)
+
+    def wrap(function: FunctionType) -> Any:
+        detour = detour_of(function)
+        if is_classmethod or function.__closure__ or isgeneratorfunction(function):
+            return detour
+        scope = function.__globals__
+        scope["_mutation_detours"] = DETOURS
+        made: dict[str, FunctionType] = {}
+        exec(f"def f(*args, **kwargs): return _mutation_detours[{len(DETOURS)}](*args, **kwargs)", scope, made)
+        standing = update_wrapper(made["f"], function)
+        STANDING.append((made["f"], mutants))
+        DETOURS.append(detour)
+        return standing
+
+    return wrap
+
+
+def _stand(on_trial: str) -> None:
+    """In the process of one trial: give each function its own body, and one of them that of the mutant."""
+    module, _, name = on_trial.rpartition(".")
+    for function, mutants in STANDING:
+        chosen = mutants.get(name) if function.__module__ == module else None
+        body = chosen or mutants["_mutmut_orig"]
+        function.__code__, function.__defaults__, function.__kwdefaults__ = (
+            body.__code__, body.__defaults__, body.__kwdefaults__,
+        )  # fmt: skip
+
+
+if not hasattr(trampoline, "wrap_in_trampoline_slowly"):
+    trampoline.wrap_in_trampoline_slowly = trampoline.wrap_in_trampoline
+    trampoline.wrap_in_trampoline = _wrap
+
+
+def pytest_sessionstart() -> None:
+    on_trial = os.environ.get("MUTANT_UNDER_TEST", "")
+    if "__mutmut_" in on_trial:
+        _stand(on_trial)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
