@@ -280,6 +280,16 @@ def test_an_orderly_end_needs_no_stop(tmp_path: Path, controller: str, status: i
         assert bench.stops == 0
 
 
+def test_an_orderly_end_may_take_its_time(tmp_path: Path) -> None:
+    with watched(tmp_path, "SILENCE_S=0.1", controller=ENDS_WITH_4_WHEN_TOLD) as guardian:
+        guardian.waits_for("\n")
+        guardian.send(DONE)
+        assert select.select([guardian.link], [], [], 0.5) == ([], [], [])
+        os.kill(guardian.controller, signal.SIGTERM)
+        guardian.link.close()
+        assert guardian.ended() == 4
+
+
 @pytest.mark.parametrize("hangs_up", [False, True])
 def test_an_orderly_end_that_hangs_is_cut_short(tmp_path: Path, *, hangs_up: bool) -> None:
     with running_chargers(tmp_path) as (bench,), watched(tmp_path, "END_S=0.3") as guardian:

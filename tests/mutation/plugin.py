@@ -76,9 +76,15 @@ def _wrap(mutants: Mapping[str, FunctionType], is_classmethod: bool = False) -> 
     return wrap
 
 
-def _stand(on_trial: str) -> None:
-    """In the process of one trial: give each function its own body, and one of them that of the mutant."""
-    module, _, name = on_trial.rpartition(".")
+def _on_trial() -> str:
+    """The name of the mutant whose trial this process is; "" where it only learns which tests there are."""
+    name = os.environ.get("MUTANT_UNDER_TEST", "")
+    return name if "__mutmut_" in name else ""
+
+
+def _stand(mutant: str) -> None:
+    """Give each function its own body, and one of them that of the mutant."""
+    module, _, name = mutant.rpartition(".")
     for function, mutants in STANDING:
         chosen = mutants.get(name) if function.__module__ == module else None
         body = chosen or mutants["_mutmut_orig"]
@@ -93,12 +99,13 @@ if not hasattr(trampoline, "wrap_in_trampoline_slowly"):
 
 
 def pytest_sessionstart() -> None:
-    on_trial = os.environ.get("MUTANT_UNDER_TEST", "")
-    if "__mutmut_" in on_trial:
-        _stand(on_trial)
+    if mutant := _on_trial():
+        _stand(mutant)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if not _on_trial():
+        return
     seconds = json.loads(STATS.read_text(encoding="utf-8"))["duration_by_test"] if STATS.exists() else {}
     names = KILLERS.read_text(encoding="utf-8").splitlines() if KILLERS.exists() else []
     ago = {name: number for number, name in enumerate(dict.fromkeys(reversed(names)))}
@@ -108,7 +115,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    if report.failed and "__mutmut_" in os.environ.get("MUTANT_UNDER_TEST", ""):
+    if report.failed and _on_trial():
         with KILLERS.open("a", encoding="utf-8") as file:
             file.write(f"{report.nodeid}\n")
 
