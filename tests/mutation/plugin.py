@@ -50,6 +50,8 @@ collecting._ascii_escaped_by_config = _plain
 ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/service/guardian.py"}
 #: What takes longer is a slow test, measured with mutmut's detours in the code.
 QUICK_S = 0.3
+#: What takes longer waits for something that a mutant keeps from coming.
+HANGS_S = 20.0
 STATS, KILLERS = Path("mutmut-stats.json"), Path("killers.txt")
 #: Each function that has mutants, as its module knows it, and these; mutmut's detours for them, in the same order.
 STANDING: list[tuple[FunctionType, Mapping[str, FunctionType]]] = []
@@ -111,6 +113,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     ago = {name: number for number, name in enumerate(dict.fromkeys(reversed(names)))}
     slow = SLOW_TESTS in os.environ
     chosen = [item for item in items if (seconds.get(item.nodeid, 0.0) > QUICK_S) == slow] or items
+    for item in chosen:
+        item.add_marker(pytest.mark.timeout(HANGS_S), append=False)
     items[:] = sorted(chosen, key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
 
 
