@@ -316,9 +316,10 @@ def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_an
 
 
 def test_it_starts_a_controller_that_nobody_can_freeze_and_ends_with_its_status(tmp_path: Path) -> None:
-    """Also where whoever started it does not care what becomes of children: the kernel then buries them at once."""
+    """Whoever started it may ignore the end of children, which the kernel then buries at once, or block signals."""
     guards = "import signal, sys; from orchestrator.service import guardian; "
     guards += "signal.signal(signal.SIGCHLD, signal.SIG_IGN); "
+    guards += "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM]); "
     guards += "sys.exit(guardian.guard(['our.yaml'], ('-c', sys.argv[1])))"
     controller = """
 import os, signal, socket, sys
@@ -328,6 +329,7 @@ assert link.recv(9) == b"A"
 link.send(b"E")
 keys = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 print(sys.argv[2:], [signal.getsignal(key) is signal.SIG_IGN for key in keys], os.environ["HERE"])
+print(signal.pthread_sigmask(signal.SIG_BLOCK, []))
 sys.exit(3)
 """
     done = subprocess.run(
@@ -335,7 +337,7 @@ sys.exit(3)
         text=True, timeout=END_S, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (3, "")
-    assert done.stdout == f"['our.yaml'] [True, True, True] {tmp_path}\n"
+    assert done.stdout == f"['our.yaml'] [True, True, True] {tmp_path}\nset()\n"
 
 
 # --- messages --------------------------------------------------------------------------------------------------------

@@ -26,6 +26,12 @@ import sys
 from orchestrator.service.guardian import guard
 sys.exit(guard(sys.argv[2:], ("-m", "tests.guardian.saboteur", sys.argv[1])))
 """
+#: Started with neither input nor output, as by a program that has closed its own.
+WITHOUT_STREAMS = """
+import os, sys
+os.closerange(0, 3)
+os.execv(sys.executable, [sys.executable, "-m", "orchestrator", "run", sys.argv[1]])
+"""
 #: No unit test of timing (`make bench` measures that): only that nobody waited for somebody's time-out.
 SOON_S = 3.0
 
@@ -58,6 +64,7 @@ CASES = (
 AHEAD = 4
 OTHERS = (
     "half a frame",
+    "without streams",
     "guardian killed",
     "guardian frozen",
     "both killed",
@@ -119,7 +126,8 @@ class Services:
         own = self._directory / str(number)
         own.mkdir()
         mode = next((case.mode for case in CASES if case.name == name), "")
-        service = Service(own, document, ("-c", GUARD, mode) if mode else ("-m", "orchestrator", "run"))
+        run = ("-c", GUARD, mode) if mode else ("-m", "orchestrator", "run")
+        service = Service(own, document, ("-c", WITHOUT_STREAMS) if name == "without streams" else run)
         return Charging(self._plant, service.start(), number)
 
     def close(self) -> None:
@@ -168,6 +176,17 @@ def test_half_a_frame_of_the_dying_controller_is_no_harm(services: Services) -> 
     os.write(port, encode(Command(Action.RUN))[:6])
     os.close(port)
     os.kill(controller, signal.SIGKILL)
+    assert one.service.ended() == ACTED
+    one.check_stopped(since_s)
+
+
+def test_what_it_says_without_a_standard_error_does_not_go_to_a_charger(services: Services) -> None:
+    """A file that is opened gets the lowest free number: a serial port would be "standard error"."""
+    one = services.take("without streams")
+    since_s = one.watch()
+    for pid in (one.service.guardian, one.service.controller):
+        assert {Path(f"/proc/{pid}/fd/{fd}").readlink() for fd in range(3)} == {Path(os.devnull)}
+    one.service.kill_controller()
     assert one.service.ended() == ACTED
     one.check_stopped(since_s)
 
