@@ -24,7 +24,7 @@ def main() -> int:
 def _fill_standard_streams() -> None:
     """Give descriptors 0 to 2 to nothing where they are free: a serial port with one of them would get what we say."""
     while (fd := os.open(os.devnull, os.O_RDWR)) <= 2:
-        os.set_inheritable(fd, True)
+        os.set_inheritable(fd, True)  # noqa: FBT003 - it takes it no other way
     os.close(fd)
 
 

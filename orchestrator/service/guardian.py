@@ -234,9 +234,9 @@ def guard(arguments: Sequence[str], controller: Sequence[str] = CONTROLLER) -> i
     """Start the controller (`arguments` go to its command line) and watch over it; the exit status."""
     for number in FREEZES:
         signal.signal(number, signal.SIG_IGN)  # the controller inherits that
-    signal.signal(
-        signal.SIGCHLD, signal.SIG_DFL
-    )  # else, where our starter ignores it, nobody learns of the child's end
+    # What our starter ignores or blocks is inherited: we would not learn of the child's end, nor of a wish for ours.
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     theirs.set_inheritable(True)
     command = [sys.executable, *controller, str(theirs.fileno()), *arguments]
