@@ -11,7 +11,6 @@ Standard library and `protocol/standby.py` only: what is not imported cannot fai
 but the controller: not for systemd, not for who reads the log, not for a line that takes nothing.
 """
 
-import array
 import contextlib
 import os
 import select
@@ -103,8 +102,7 @@ class Guardian:
             self._signal(signal.SIGHUP)
 
     def _signal(self, number: signal.Signals) -> None:
-        with contextlib.suppress(ProcessLookupError):
-            signal.pidfd_send_signal(self._child, number)
+        signal.pidfd_send_signal(self._child, number)  # dead or not: it is there until we are gone, since nobody waits
 
     def _watch(self) -> str:
         """Read the controller's messages until they end; why they did. A controller that hangs is killed."""
@@ -129,7 +127,7 @@ class Guardian:
     def _message(self) -> bool:
         """Take one message; False at the end of the connection."""
         try:
-            data, descriptors = _receive(self._link)
+            data, descriptors, _, _ = socket.recv_fds(self._link, MESSAGE, 1)
         except ConnectionResetError:
             return True  # said once of a controller that died with our answers unread; its last messages come now
         except OSError:
@@ -213,21 +211,10 @@ class Guardian:
 def has_terminal() -> bool:
     """Whether somebody started us from a terminal: its end is ours. To a service, SIGHUP means something else."""
     try:
-        os.close(os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY))
+        os.close(os.open("/dev/tty", os.O_RDONLY))
     except OSError:
         return False
     return True
-
-
-def _receive(link: socket.socket) -> tuple[bytes, list[int]]:
-    """One message and the descriptors that came with it."""
-    size = array.array("i").itemsize
-    data, ancillary, _, _ = link.recvmsg(MESSAGE, socket.CMSG_SPACE(size))
-    descriptors = array.array("i")
-    for level, kind, content in ancillary:
-        if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
-            descriptors.frombytes(content[: len(content) - len(content) % size])
-    return data, list(descriptors)
 
 
 def guard(arguments: Sequence[str], controller: Sequence[str] = CONTROLLER) -> int:
