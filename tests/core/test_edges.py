@@ -18,6 +18,7 @@ from orchestrator.core.finish import finished, tapers
 from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import FaultMemory, Memory, Still
 from orchestrator.core.rules import Rules
+from orchestrator.core.track import Warmth, follow, follow_state, thinned
 from orchestrator.model import (
     Action,
     BatteryLink,
@@ -510,7 +511,63 @@ def test_a_pack_that_rose_is_looked_at_from_then_on(minutes: float, marked_s: fl
     assert (f.memory.mark_s, f.memory.mark_v) == (marked_s, 35.0 if marked_s == NOW_S else 34.0)
 
 
-EDGES = (*CHARGE, *FINISH, *BATTERY, *OBEDIENCE, *SOC, *PAIR, *REPORTS, *GOES)
+# --- what is followed from step to step -------------------------------------------------------------------------------
+
+
+def followed(name: str) -> Callable[[Facts], object]:
+    """What the memory says under this name, once it was brought up to these facts."""
+
+    def rule(f: Facts) -> object:
+        follow(f, None)
+        return getattr(f.memory, name)
+
+    rule.__name__ = name
+    return rule
+
+
+idle_a_s, still_values = followed("idle_a_s"), followed("still")
+STILL = Still(NOW_S, 48.0, 10.0, 48.0, 10.0)
+FOLLOWS = (
+    Edge(idle_a_s, None, charger={"current_a": 0.1}),
+    Edge(idle_a_s, NOW_S, charger={"current_a": 0.09}),
+    Edge(idle_a_s, ago(5), {"idle_a_s": ago(5)}, charger={"current_a": 0.0}),
+    Edge(idle_a_s, None, charger={"current_a": 0.0, "operation": Operation.STOPPED}),
+    Edge(idle_a_s, None, charger={"current_a": 0.0, "charge_mode": ChargeMode.BATTERY_SEARCH}),
+    Edge(still_values, STILL),
+    Edge(still_values, replace(STILL, t_s=ago(9)), {"still": replace(STILL, t_s=ago(9))}),
+    Edge(still_values, STILL, {"still": replace(STILL, t_s=ago(9), volts=48.1)}),
+    Edge(still_values, STILL, {"still": replace(STILL, t_s=ago(9), amps=10.1)}),
+    Edge(still_values, replace(STILL, amps=1.1), charger={"current_a": 1.1}),
+    Edge(still_values, None, {"still": STILL}, charger={"current_a": 1.0}),
+    Edge(still_values, None, {"still": STILL}, charger={"t_s": ago(9)}),
+    *(Edge(still_values, None, {"still": STILL}, bmu={name: None}) for name in ("voltage_v", "current_a")),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kept", "after"),
+    [
+        ((), ((1000.0, 30.0),)),
+        (((990.1, 20.0),), ((990.1, 20.0),)),
+        (((990.0, 20.0),), ((990.0, 20.0), (1000.0, 30.0))),
+        (((810.0, 20.0), (990.0, 25.0)), ((810.0, 20.0), (990.0, 25.0), (1000.0, 30.0))),
+        (((809.9, 20.0), (990.0, 25.0)), ((990.0, 25.0), (1000.0, 30.0))),
+    ],
+)
+def test_temperatures_are_kept_ten_seconds_apart_for_three_minutes(kept: Warmth, after: Warmth) -> None:
+    assert thinned(kept, (1000.0, 30.0)) == after
+
+
+@pytest.mark.parametrize(("charger", "counted_t_s"), [({}, NOW_S), ({"t_s": ago(9)}, None)])
+def test_a_session_counts_from_its_beginning(charger: dict[str, Any], counted_t_s: float | None) -> None:
+    f = Edge(goes, None, bmu={"voltage_v": None}, charger=charger).facts
+    follow_state(f, QUALIFYING)
+    assert f.memory.session == Session(NOW_S, soc_start_pct=50.0, soc_pct=50.0)
+    assert f.memory.counted_t_s == counted_t_s
+    assert (f.memory.mark_s, f.memory.mark_v) == (NOW_S, 0.0)
+
+
+EDGES = (*CHARGE, *FINISH, *BATTERY, *OBEDIENCE, *SOC, *PAIR, *REPORTS, *GOES, *FOLLOWS)
 
 
 @pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge.rule.__name__}-{edge.says}")

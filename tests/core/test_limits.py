@@ -8,7 +8,7 @@ from orchestrator.config.policy import Band, Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.limits import choose
 from orchestrator.keys import Range, Source
-from orchestrator.model import BatteryStatus, Request, Snapshot, State
+from orchestrator.model import BatteryStatus, ChargeMode, Precharge, Request, Setpoint, Snapshot, State, Step
 from tests.core.bays import POLICY, charging
 from tests.core.world import STEPS_A, TICK_S, World, bay
 
@@ -59,6 +59,8 @@ def test_the_lowest_wins_and_has_a_name(values: dict[str, float], index: int, pa
     assert step.rule.startswith(words)
     assert step.rule.endswith(f", {the_policy.source.at('current.' + path)}" if path else words)
     assert world.charger.limit == index
+    assert world.decision.setpoint == Setpoint(True, index, ChargeMode.CHARGE, Precharge.OFF)
+    assert world.decision.answer == ""
     assert world.decision.reason == f"step {index} ({STEPS_A[index]:.1f} A): {step.rule}"
 
 
@@ -213,5 +215,4 @@ def test_precharge_is_always_on_the_lowest_step() -> None:
         world = World(voltage_v=volts).charging(state)
         assert index(world) == 0
         assert world.charger.limit == 0
-        assert world.decision.step is not None
-        assert world.decision.step.rule == "precharge is always on the lowest step"
+        assert world.decision.step == Step(0, STEPS_A[0], "precharge is always on the lowest step")
