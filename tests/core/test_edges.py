@@ -198,6 +198,21 @@ BATTERY = (
     Edge(battery.temperature_invalid, "the pack's temperature went from 20.0 to 9.9 °C in 2.00 s",
          {"sample_before": (1.0, 20.0), "sample": (3.0, 9.9)}),
     Edge(battery.temperature_invalid, None, {"sample": (3.0, 9.9)}),
+    Edge(battery.status_trip, "the BMU reports over voltage, charge over current (status word 0x0005)",
+         bmu={"status": 5.0}),
+    Edge(battery.status_trip, None, bmu={"status": float(1 << 1 | 1 << 3 | 1 << 5)}),
+    Edge(battery.status_limit, "the BMU reports low temperature, discharge over current (status word 0x0028)",
+         bmu={"status": float(1 << 3 | 1 << 5)}),
+    Edge(battery.status_limit, None, bmu={"status": None}),
+    Edge(battery.implausible, "SOC 140 %; 99.00 V", bmu_link={
+        "implausible": {"soc_pct": "SOC 140 %", "temperature_c": "-300 °C", "voltage_v": "99.00 V"}}),
+    Edge(battery.implausible, None, bmu_link={"implausible": {"temperature_c": "-300 °C"}}),
+    Edge(battery.implausible, None, bmu_link={"implausible": {"soc_pct": "SOC 140 %"}, "boot_t_s": ago(1)}),
+    Edge(battery.needs_precharge, "the BMU reports low voltage and the policy has no precharge", policy=NO_PRECHARGE,
+         bmu={"status": 2.0}),
+    Edge(battery.needs_precharge, None, bmu={"status": 2.0}),
+    Edge(battery.needs_precharge, None, policy=NO_PRECHARGE, bmu={"status": 5.0}),
+    Edge(battery.needs_precharge, None, policy=NO_PRECHARGE, bmu={"status": None}),
     Edge(battery.hot_trip, None, bmu={"temperature_c": 54.9}),
     Edge(battery.hot_trip, f"the pack has 55.0 °C, at or above 55 °C ({AT('faults.temperature_trip_c')})",
          bmu={"temperature_c": 55.0}),
@@ -210,6 +225,9 @@ BATTERY = (
     Edge(battery.under_temperature,
          f"the pack has -0.1 °C, the limit is 0 °C ({AT('pack.temperature_c')}); it charges again at 3 °C",
          bmu={"temperature_c": -0.1}),
+    Edge(battery.under_temperature,
+         f"the pack has 2.9 °C, the limit is 0 °C ({AT('pack.temperature_c')}); it charges again at 3 °C",
+         raised("under_temperature"), bmu={"temperature_c": 2.9}),
     Edge(battery.under_temperature, None, raised("under_temperature"), bmu={"temperature_c": 3.0}),
     Edge(battery.under_voltage, None, bmu={"voltage_v": 26.0}),
     Edge(battery.under_voltage, f"the pack has 25.90 V, below 26 V ({AT('pack.voltage_v')})",
@@ -241,7 +259,9 @@ OBEDIENCE = (
     Edge(obedience.stopped_by_itself, None, charger={"operation": Operation.STOPPED, "t_s": ago(9)}),
     Edge(obedience.stopped_by_itself, None,
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
-    Edge(obedience.over_current, None, charger={"current_a": 15.7}),
+    Edge(obedience.found_running, "the charger was found running though it was not commanded to"),
+    Edge(obedience.found_running, None, charger={"operation": Operation.STOPPED, "current_a": 0.5}),
+    Edge(obedience.over_current, None, charger={"current_a": 14 * 110 / 100 + 0.3}),
     Edge(obedience.over_current, "15.71 A, more than 15.70 A for a limit of 14 A", charger={"current_a": 15.71}),
     Edge(obedience.over_current, "12.50 A, more than 12.40 A for a limit of 11 A",
          {"limit_before": 4, "limit_s": ago(1.1)}, charger={"current_a": 12.5, "current_limit": 3}),
@@ -377,6 +397,30 @@ REPORTS = (
     Edge(reports.rejected_frame, None, charger_link=error_frame(ErrorBit.ORDER | ErrorBit.LENGTH)),
     Edge(reports.rejected_frame, None, charger_link=error_frame(0)),
     Edge(reports.rejected_frame, None, charger_link={"error_bits": 2}),
+    Edge(reports.reverse_polarity,
+         "the charger reports connection 0: the battery is connected the wrong way round",
+         charger={"connection": Connection.REVERSED}),
+    Edge(reports.reverse_polarity, "the charger reports mode 6: the battery is connected the wrong way round",
+         charger={"charge_mode": ChargeMode.REVERSED}),
+    Edge(reports.reverse_polarity, None),
+    Edge(reports.polarity_contradicts,
+         "the charger contradicts itself: mode 6 (battery reversed) with connection 1 (normal)",
+         charger={"charge_mode": ChargeMode.REVERSED}),
+    Edge(reports.polarity_contradicts, None,
+         charger={"charge_mode": ChargeMode.REVERSED, "connection": Connection.REVERSED}),
+    Edge(reports.error_stop, "the charger reports mode 8: stopped by an error of its own",
+         charger={"charge_mode": ChargeMode.ERROR_STOP}),
+    Edge(reports.error_stop, None),
+    Edge(reports.system_stop, "the charger reports mode 7: it stopped itself without being asked",
+         charger={"charge_mode": ChargeMode.SYSTEM_STOP}),
+    Edge(reports.system_stop, None),
+    Edge(reports.illegal_value, "the charger reports charge mode 9, precharge 3",
+         charger={"illegal": ("charge mode 9", "precharge 3")}),
+    Edge(reports.illegal_value, None),
+    Edge(reports.mode_taken_over,
+         "the charger is in automatic mode, the station file says manual: look at its rotary switch",
+         charger={"control_mode": ControlMode.AUTOMATIC}),
+    Edge(reports.mode_taken_over, None, charger={"control_mode": None}),
     Edge(reports.noisy_line, None, charger_link={"bad_pct": 5.0}),
     Edge(reports.noisy_line, "6 % of the last minute's exchanges with the charger went wrong, more than 5 %",
          charger_link={"bad_pct": 6.0}),
@@ -518,15 +562,20 @@ def followed(name: str) -> Callable[[Facts], object]:
     """What the memory says under this name, once it was brought up to these facts."""
 
     def rule(f: Facts) -> object:
-        follow(f, None)
+        follow(f, ago(0.25))
         return getattr(f.memory, name)
 
     rule.__name__ = name
     return rule
 
 
-idle_a_s, still_values = followed("idle_a_s"), followed("still")
+idle_a_s, still_values, peak = followed("idle_a_s"), followed("still"), followed("peak")
+charge_step, exchange, counted = followed("charge_step"), followed("exchange"), followed("session")
 STILL = Still(NOW_S, 48.0, 10.0, 48.0, 10.0)
+BEGUN = Session(
+    ago(100), energised_s=90.0, charged_ah=1.0, charged_wh=48.0, soc_start_pct=40.0, soc_pct=49.0, step_changes=1
+)
+NOW = replace(BEGUN, elapsed_s=100.0, energised_s=90.25, soc_pct=50.0)
 FOLLOWS = (
     Edge(idle_a_s, None, charger={"current_a": 0.1}),
     Edge(idle_a_s, NOW_S, charger={"current_a": 0.09}),
@@ -541,7 +590,59 @@ FOLLOWS = (
     Edge(still_values, None, {"still": STILL}, charger={"current_a": 1.0}),
     Edge(still_values, None, {"still": STILL}, charger={"t_s": ago(9)}),
     *(Edge(still_values, None, {"still": STILL}, bmu={name: None}) for name in ("voltage_v", "current_a")),
+    Edge(peak, (NOW_S, 50.0)),
+    Edge(peak, (ago(9), 50.1), {"peak": (ago(9), 50.1)}),
+    Edge(peak, (NOW_S, 50.0), {"peak": (ago(9), 50.0)}),
+    Edge(peak, None, {"peak": (ago(9), 50.1)}, state=State.STOPPING),
+    Edge(peak, None, {"peak": (ago(9), 50.1)}, bmu={"current_a": 1.0}),
+    Edge(peak, None, {"peak": (ago(9), 50.1)}, bmu={"current_a": None}),
+    Edge(peak, None, {"peak": (ago(9), 50.1)}, bmu={"soc_pct": None}),
+    Edge(charge_step, None, {"charge": (ago(3), 42.0)}),
+    Edge(charge_step, (NOW_S, "the SOC went from 42 to 50 % in 3 s"), {"charge": (ago(3), 41.9)}),
+    Edge(charge_step, (NOW_S, "the SOC went from 58 to 50 % in 3 s"), {"charge": (ago(3), 58.1)}),
+    Edge(charge_step, None, {"charge": (ago(3), None)}),
+    Edge(charge_step, None, {"charge": (ago(3.1), 1.0)}),
+    Edge(exchange, None, {"charge": (ago(3), 1.0)}),
+    Edge(exchange, None, {"charge": (ago(30), 39.0)}),
+    Edge(exchange, (NOW_S, "the SOC went from 39 to 50 % in 30 s"), {"charge": (ago(30), 38.9)}),
+    Edge(exchange, None, {"charge": (ago(30), 1.0), "boots": 1}),
+    Edge(counted, None),
+    Edge(counted, NOW, {"session": BEGUN, "counted_t_s": NOW_S}),
+    Edge(counted, NOW, {"session": BEGUN, "counted_t_s": None}),
+    Edge(counted, replace(NOW, charged_ah=1 + 10 / 3600, charged_wh=48 + 480 / 3600),
+         {"session": BEGUN, "counted_t_s": ago(1)}),
+    Edge(counted, replace(NOW, charged_ah=1 + 10 * 1.5 / 3600, charged_wh=48 + 10 * 48 * (1.5 / 3600)),
+         {"session": BEGUN, "counted_t_s": ago(9)}),
+    Edge(counted, NOW, {"session": BEGUN, "counted_t_s": ago(1)}, charger={"t_s": ago(9)}),
+    Edge(counted, replace(NOW, energised_s=90.0), {"session": BEGUN, "counted_t_s": ago(1)}, State.STOPPING,
+         charger={"operation": Operation.STOPPED, "current_a": 0.4}),
+    Edge(counted, replace(NOW, soc_pct=49.0), {"session": BEGUN, "counted_t_s": NOW_S}, bmu={"soc_pct": None}),
 )  # fmt: skip
+
+
+def test_the_first_step_lasts_no_time() -> None:
+    f = Edge(goes, None, {"session": BEGUN, "counted_t_s": NOW_S}).facts
+    follow(f, None)
+    assert f.memory.session == replace(NOW, energised_s=90.0)
+
+
+@pytest.mark.parametrize(
+    ("t_s", "value"), [(ago(1.5), 48.0), (ago(1.51), None), (NOW_S + 1.5, 48.0), (NOW_S + 1.51, None)]
+)
+def test_a_value_counts_while_it_is_fresh_and_not_from_the_future(t_s: float, value: float | None) -> None:
+    battery = replace(BMU, voltage_v=Measurement(48.0, t_s))
+    assert Facts(NOW_S, Snapshot(battery=battery), Memory(), Rules.of(bay())).pack_v == value
+
+
+def test_a_fault_of_the_first_moment_is_shown_from_then_on() -> None:
+    (fault,) = latches.shown({"soh_low": FaultMemory(raised_s=0.0)})
+    assert fault.since_s == 0.0
+
+
+def test_a_copy_of_a_memory_is_its_own() -> None:
+    memory = Memory(faults={"soh_low": FaultMemory()})
+    memory.copy().faults.clear()
+    assert memory.faults
 
 
 @pytest.mark.parametrize(
