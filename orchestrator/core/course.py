@@ -197,9 +197,9 @@ def _wanted(f: Facts) -> tuple[bool, str]:
 
 def _qualifying(f: Facts) -> Course:
     memory = f.memory
-    if not f.present or f.volts is None:
+    if not f.present:
         memory.qualified_s = None
-        return None, f"waiting for fresh values: {f.missing or 'the charger’s status'}"
+        return None, f"waiting for fresh values: {f.missing}"
     if not f.connected:
         memory.qualified_s = None
         return None, "waiting for the contactor, behind which charger and battery cannot be compared"

@@ -37,5 +37,5 @@ def gives_up(f: Facts) -> bool:
         return f.state_s >= OBEY_STOP_S
     if f.memory.state is not State.STARTING or f.reading is None:
         return False
-    runs_s = f.now_s - f.memory.runs_s if f.memory.runs_s is not None else 0.0
-    return runs_s >= OBEY_STOP_S or f.state_s >= LOST_S + OBEY_STOP_S
+    runs_s = f.memory.runs_s
+    return (runs_s is not None and f.now_s - runs_s >= OBEY_STOP_S) or f.state_s >= LOST_S + OBEY_STOP_S

@@ -52,11 +52,11 @@ def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  #
 
 def _follow_still(f: Facts) -> None:
     """Since when the charger's volts and amps are the same to the last digit, while current flows."""
-    volts, amps, pack_v, pack_a, still = f.volts, f.amps, f.pack_v, f.pack_a, f.memory.still
-    if volts is None or amps is None or pack_v is None or pack_a is None or amps <= STILL_ABOVE_A:
+    reading, pack_v, pack_a, still = f.reading, f.pack_v, f.pack_a, f.memory.still
+    if reading is None or pack_v is None or pack_a is None or reading.current_a <= STILL_ABOVE_A:
         f.memory.still = None
-    elif still is None or still.volts != volts or still.amps != amps:
-        f.memory.still = Still(f.now_s, volts, amps, pack_v, pack_a)
+    elif still is None or (still.volts, still.amps) != (reading.voltage_v, reading.current_a):
+        f.memory.still = Still(f.now_s, reading.voltage_v, reading.current_a, pack_v, pack_a)
 
 
 def _follow_charge(f: Facts) -> None:

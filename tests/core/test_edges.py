@@ -3,6 +3,7 @@
 The scenes of `test_faults.py` show what a fault leads to; here the rules are asked alone, with facts made by hand.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -138,6 +139,7 @@ CHARGE = (
     Edge(charge.time_limit, None),
     Edge(charge.time_limit, None, session(hours=12)),
     Edge(charge.time_limit, f"charging has taken 12.00 h ({AT('finish.max_hours')})", session(hours=12.001)),
+    Edge(charge.time_limit, f"charging has taken 99.00 h ({AT('finish.max_hours')})", session(hours=99)),
     Edge(charge.ah_limit, None),
     Edge(charge.ah_limit, None, session(ah=44)),
     *(Edge(charge.ah_limit, "44.01 Ah were charged since SOC 0 %: a whole charge may take 44 Ah "
@@ -178,6 +180,8 @@ BATTERY = (
     Edge(battery.heartbeat_lost, None, bmu_link=heart(2.25)),
     Edge(battery.heartbeat_lost, "no heartbeat of the BMU for 2.5 s", bmu_link=heart(2.5)),
     Edge(battery.heartbeat_lost, None, bmu_link=heart(1.25), bmu={"voltage_v": None}),
+    Edge(battery.heartbeat_lost, None, bmu_link=heart(2.0),
+         snapshot={"battery": BatteryReading(voltage_v=Measurement(48.0, ago(1.25)))}),
     Edge(battery.heartbeat_lost, "no heartbeat of the BMU for 1.5 s", bmu_link=heart(1.5), bmu={"voltage_v": None}),
     Edge(battery.not_operational, NOT_OPERATIONAL.format("pre-operational"), bmu_link=heart(0, 0x7F), tpdo_s=0.1),
     Edge(battery.not_operational, NOT_OPERATIONAL.format("stopped"), bmu_link=heart(0, 4), tpdo_s=0.1),
@@ -358,7 +362,7 @@ PAIR = (
     Edge(pair.volts_disagree,
          "the charger reads 49.01 V, the BMU 48.00 V: not the same battery, or a bad connection",
          charger={"voltage_v": 49.01}),
-    Edge(pair.volts_disagree, None, charger={"voltage_v": 53.0}, bmu={"voltage_v": 54.07}),
+    Edge(pair.volts_disagree, None, charger={"voltage_v": 53.0}, bmu={"voltage_v": 54.08}),
     Edge(pair.volts_disagree, None, charger={"voltage_v": 9.0}, snapshot={"connected": False}),
     Edge(pair.volts_disagree, None, charger={"t_s": ago(9)}),
     Edge(pair.volts_disagree, None, bmu={"voltage_v": None}),
@@ -589,6 +593,7 @@ FOLLOWS = (
     Edge(still_values, replace(STILL, amps=1.1), charger={"current_a": 1.1}),
     Edge(still_values, None, {"still": STILL}, charger={"current_a": 1.0}),
     Edge(still_values, None, {"still": STILL}, charger={"t_s": ago(9)}),
+    Edge(still_values, None, {"still": STILL}, charger={"current_a": math.nan}),
     *(Edge(still_values, None, {"still": STILL}, bmu={name: None}) for name in ("voltage_v", "current_a")),
     Edge(peak, (NOW_S, 50.0)),
     Edge(peak, (ago(9), 50.1), {"peak": (ago(9), 50.1)}),
