@@ -19,6 +19,7 @@ import socket
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from types import FrameType
 
 from orchestrator.service.lastopen import open_contactor
@@ -67,7 +68,6 @@ class Guardian:
         self._deadline_s = time.monotonic() + STARTUP_S
         self._systemd = Systemd()
         self._watchdog_s = 0.0  # when systemd was last told that we live
-        self._reason = ""
         self._told = False
 
     def run(self) -> int:
@@ -77,14 +77,15 @@ class Guardian:
                 signal.signal(number, self._pass_on)
         if not has_terminal() and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
             signal.signal(signal.SIGHUP, self._pass_on_reload)
-        self._reason = self._watch()
+        reason = self._watch()
         if self._done or not self._ports:
             self._open()
             return self._status(END_S)
         self._signal(signal.SIGKILL)
         # Without waiting for a gap: what the dying controller has written goes out first, the kernel keeps the order.
         # Was that half a frame, or was it just then in a write, the second stop comes 20 ms later.
-        for name, why in stop_all(self._ports, VERIFY_S, on_stop=self._stopping, on_round=self._open).items():
+        on_stop = partial(self._stopping, reason)
+        for name, why in stop_all(self._ports, VERIFY_S, on_stop=on_stop, on_round=self._open).items():
             say(f"guardian: {name}: {why or 'standby verified'}")
         for name, fd in self._contactors.items():
             say(f"guardian: contactor {name}: {open_contactor(fd)}")
@@ -179,12 +180,12 @@ class Guardian:
         for fd in self._contactors.values():
             open_contactor(fd)
 
-    def _stopping(self) -> None:
+    def _stopping(self, reason: str) -> None:
         """The stops of a round are out; after the first one there is time to tell."""
         self._systemd.tell("WATCHDOG=1")
         if not self._told:
             self._told = True
-            reason = self._reason or f"the controller {self._fate()[1]}"
+            reason = reason or f"the controller {self._fate()[1]}"
             say(f"guardian: {reason}: stopping the chargers on {len(self._ports)} ports")
             self._systemd.tell(f"STATUS={reason}; stopping the chargers")
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.service.guarded import GuardianLink
-from orchestrator.service.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
+from orchestrator.service.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT, Guardian
 from orchestrator.service.lastopen import OPEN, SET_VALUES
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
@@ -324,6 +324,7 @@ def test_it_starts_a_controller_that_nobody_can_freeze_and_ends_with_its_status(
     controller = """
 import os, signal, socket, sys
 link = socket.socket(fileno=int(sys.argv[1]))
+assert link.type == socket.SOCK_SEQPACKET
 link.send(b"B")
 assert link.recv(9) == b"A"
 link.send(b"E")
@@ -338,6 +339,15 @@ sys.exit(3)
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (3, "")
     assert done.stdout == f"['our.yaml'] [True, True, True] {tmp_path}\nset()\n"
+
+
+def test_a_controller_that_does_not_die_is_not_waited_for() -> None:
+    """As one that hangs in a driver: SIGKILL does not end it before the driver returns."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    child = subprocess.Popen([sys.executable, "-c", WAITS], preexec_fn=die_with_parent)
+    with ours, theirs, child:
+        assert Guardian(child.pid, ours)._fate() == (ACTED, "does not die")
+        child.kill()
 
 
 # --- messages --------------------------------------------------------------------------------------------------------

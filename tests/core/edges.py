@@ -1,0 +1,90 @@
+"""A charge in which all is well but for what a test names, and any rule of the core that is asked about it alone."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from orchestrator.config.policy import Policy
+from orchestrator.core.facts import Facts
+from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.rules import Rules
+from orchestrator.model import (
+    BatteryLink,
+    BatteryReading,
+    ChargeMode,
+    ChargerLink,
+    ChargerReading,
+    Connection,
+    ControlMode,
+    Measurement,
+    Operation,
+    Precharge,
+    Session,
+    Snapshot,
+    State,
+)
+from tests.core.bays import POLICY
+from tests.core.world import bay
+
+NOW_S = 100_000.0
+AT = POLICY.source.at
+READING = ChargerReading(
+    NOW_S, 48.0, 10.0, ControlMode.MANUAL, Operation.RUNNING, 4, ChargeMode.CHARGE, Precharge.OFF, Connection.NORMAL
+)
+BMU = BatteryReading(
+    voltage_v=Measurement(48.0, NOW_S), current_a=Measurement(10.0, NOW_S), status=Measurement(0.0, NOW_S),
+    temperature_c=Measurement(20.0, NOW_S), soc_pct=Measurement(50.0, NOW_S), soh_pct=Measurement(100.0, NOW_S),
+)  # fmt: skip
+PULSE, CONTINUOUS, CHARGING = State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS, State.CHARGING
+NO_PRECHARGE = replace(POLICY, precharge=None)
+
+
+def ago(seconds: float) -> float:
+    return NOW_S - seconds
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A charge in which all is well but for what is named here; what the rule says of it, None for nothing."""
+
+    rule: Callable[[Facts], object]
+    says: object
+    memory: dict[str, Any] = field(default_factory=dict)
+    state: State = CHARGING
+    state_s: float = 60.0
+    bmu: dict[str, float | None] = field(default_factory=dict)
+    charger: dict[str, Any] = field(default_factory=dict)
+    bmu_link: dict[str, Any] = field(default_factory=dict)
+    charger_link: dict[str, Any] = field(default_factory=dict)
+    snapshot: dict[str, Any] = field(default_factory=dict)
+    policy: Policy = POLICY
+    control: ControlMode = ControlMode.MANUAL
+    tpdo_s: float | None = None
+
+    @property
+    def facts(self) -> Facts:
+        measured = {name: None if x is None else Measurement(x, NOW_S) for name, x in self.bmu.items()}
+        memory = Memory(**{"state": self.state, "since_s": ago(self.state_s), "ran": True, "runs_s": ago(50),
+                           **self.memory})  # fmt: skip
+        snapshot = Snapshot(
+            charger=replace(READING, **self.charger),
+            charger_link=replace(ChargerLink(online=True), **self.charger_link),
+            battery=replace(BMU, **measured),
+            battery_link=replace(BatteryLink(online=True), **self.bmu_link),
+        )
+        the_bay = bay(self.policy, self.control)
+        the_bay = replace(the_bay, battery=replace(the_bay.battery, tpdo_s=self.tpdo_s))
+        return Facts(NOW_S, replace(snapshot, **self.snapshot), memory, Rules.of(the_bay))
+
+
+def session(hours: float = 1.0, ah: float = 1.0, soc_start_pct: float | None = 0.0) -> dict[str, Any]:
+    return {"session": Session(0.0, energised_s=hours * 3600, charged_ah=ah, soc_start_pct=soc_start_pct)}
+
+
+def marked(minutes: float, volts: float) -> dict[str, Any]:
+    """The pack had this voltage so many minutes ago."""
+    return {"mark_s": ago(minutes * 60), "mark_v": volts}
+
+
+def raised(*names: str) -> dict[str, Any]:
+    return {"faults": {name: FaultMemory(raised_s=1.0, text=f"text of {name}") for name in names}}
