@@ -1,5 +1,7 @@
 """Time that stretches changes no decision: hours in leaps and hours in ticks end alike."""
 
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from dataclasses import replace
 
 import pytest
@@ -12,6 +14,7 @@ from orchestrator.model import Decision, Request, State
 from orchestrator.workbench import simulation
 from orchestrator.workbench.devices import TICK_S
 from orchestrator.workbench.leap import outline
+from orchestrator.workbench.processes import cores
 from orchestrator.workbench.simulation import Run, Simulation, simulate
 from tests.workbench.scenarios import battery, scenario
 
@@ -38,12 +41,23 @@ def same(leaps: Run, ticks: Run) -> None:
     assert leaps.steps < ticks.steps / 2  # even where most of the time is spent in pulses
 
 
-@pytest.mark.timeout(600)  # tens of thousands of steps, on a machine that may be busy
-@pytest.mark.parametrize("name", SHIPPED)
-def test_leaps_decide_what_ticks_decide(name: str) -> None:
+def leaps_and_ticks(name: str) -> tuple[Run, Run]:
     cut = replace(load_scenario(name), hours=SHIPPED[name])
     policy = load_policy("li-ion-48v")
-    same(simulate(policy, cut), simulate(policy, cut, stretch=False))
+    return simulate(policy, cut), simulate(policy, cut, stretch=False)
+
+
+@pytest.fixture(name="played", scope="module")
+def _played() -> Iterator[Mapping[str, Future[tuple[Run, Run]]]]:
+    """Tens of thousands of steps each, on all cores."""
+    with cores() as pool:
+        yield {name: pool.submit(leaps_and_ticks, name) for name in SHIPPED}
+
+
+@pytest.mark.timeout(600)  # on a machine that may be busy
+@pytest.mark.parametrize("name", SHIPPED)
+def test_leaps_decide_what_ticks_decide(played: Mapping[str, Future[tuple[Run, Run]]], name: str) -> None:
+    same(*played[name].result())
 
 
 def test_leaps_decide_what_ticks_decide_to_the_end_of_a_charge() -> None:
