@@ -283,9 +283,8 @@ def faults_after(name: str) -> Callable[[Facts], object]:
     return rule
 
 
-implausible, soh_low, charger_silent, emergency = map(
-    faults_after, ("implausible", "soh_low", "charger_silent", "emergency")
-)
+implausible, soh_low, emergency = map(faults_after, ("implausible", "soh_low", "emergency"))
+charger_silent, bmu_silent = map(faults_after, ("charger_silent", "bmu_silent"))
 UNPLUGGED: dict[str, Any] = {"charger_link": {"online": False, "problem": "unplugged"}}
 DEPARTED: dict[str, Any] = {**SILENT_BMU, "charger": {**STANDS_BY, "voltage_v": 0.0}, "charger_link": STOP_SENT}
 DEBOUNCED = FaultMemory(present_s=ago(9), polls=9, poll_t_s=ago(1))
@@ -295,6 +294,7 @@ def faults(**rows: FaultMemory) -> dict[str, Any]:
     return {"faults": rows}
 
 
+BOTH = faults(bmu_silent=FaultMemory(raised_s=ago(9)), emergency=FaultMemory(raised_s=ago(9)))
 LATCHES = (
     Edge(implausible, FaultMemory(strikes=(ago(3599),)), faults(implausible=FaultMemory(strikes=(ago(3599),)))),
     Edge(implausible, None, faults(implausible=FaultMemory(strikes=(ago(3600),)))),
@@ -309,8 +309,8 @@ LATCHES = (
                                  poll_t_s=NOW_S), faults(charger_silent=DEBOUNCED), **UNPLUGGED),
     Edge(charger_silent, None, faults(charger_silent=DEBOUNCED), STOPPING, **UNPLUGGED),
     Edge(charger_silent, None, {}, STOPPING, **UNPLUGGED),
-    Edge(emergency, FaultMemory(raised_s=ago(9), clean_s=NOW_S), faults(emergency=FaultMemory(raised_s=ago(9))), IDLE,
-         **DEPARTED),
+    Edge(emergency, FaultMemory(raised_s=ago(9), clean_s=NOW_S), BOTH, IDLE, **DEPARTED),
+    Edge(bmu_silent, None, BOTH, IDLE, **DEPARTED),
 )  # fmt: skip
 
 # --- what is ordered --------------------------------------------------------------------------------------------------
