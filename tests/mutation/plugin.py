@@ -7,7 +7,7 @@
 - A test's id is plain ASCII. mutmut collects again and again in one process, pytest escapes an id's other characters
   anew each time, and then finds no such test; what mutmut makes of that is a mutant that was killed.
 - A function that has mutants is run as it stands during a trial, not through mutmut's detour, which asks at each call
-  which mutant is on trial and makes the core's tests five times slower.
+  which mutant is on trial: the core's tests would take three times as long.
 - Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
 """
 
