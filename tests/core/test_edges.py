@@ -11,6 +11,7 @@ import pytest
 from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
 from orchestrator.core.finish import finished, tapers
 from orchestrator.core.memory import Still
+from orchestrator.core.sequence import RESUME, RUN
 from orchestrator.model import (
     Action,
     BatteryReading,
@@ -26,7 +27,7 @@ from orchestrator.model import (
 from tests.core.bays import POLICY
 from tests.core.edges import AT, CONTINUOUS, NO_PRECHARGE, PULSE, Edge, ago, marked, raised, session
 
-RUN, LIMIT_3 = Command(Action.RUN), Command(Action.SET_LIMIT, 3)
+LIMIT_3 = Command(Action.SET_LIMIT, 3)
 
 
 def heart(age_s: float, nmt_state: int | None = 5) -> dict[str, Any]:
@@ -169,7 +170,7 @@ OBEDIENCE = (
     Edge(obedience.will_not_start, None),
     Edge(obedience.will_not_start, None, order(RUN, 4.9)),
     Edge(obedience.will_not_start, UNCONFIRMED.format("run", "5.0"), order(RUN, 5)),
-    Edge(obedience.will_not_start, UNCONFIRMED.format("run", "5.0"), order(Command(Action.RESUME), 5)),
+    Edge(obedience.will_not_start, UNCONFIRMED.format("run", "5.0"), order(RESUME, 5)),
     Edge(obedience.will_not_start, None, order(RUN, 9), State.STOPPING),
     Edge(obedience.will_not_start, None, order(LIMIT_3, 9)),
     Edge(obedience.will_not_start, UNCONFIRMED.format("run", "9.0") + "; the interlock held it back: too old",

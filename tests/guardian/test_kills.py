@@ -72,6 +72,11 @@ OTHERS = (
     "a second one",
     "a terminal",
 )
+#: How those are started that are not started as usual.
+RUNS: Mapping[str, Sequence[str]] = {
+    **{case.name: ("-c", GUARD, case.mode) for case in CASES if case.mode},
+    "without streams": ("-c", WITHOUT_STREAMS),
+}
 BAYS = {name: number for number, name in enumerate([*(case.name for case in CASES), *OTHERS], start=1)}
 
 
@@ -125,9 +130,7 @@ class Services:
         document["bays"][0]["charger"]["port"] = self._plant.bays[number - 1]["port"]
         own = self._directory / str(number)
         own.mkdir()
-        mode = next((case.mode for case in CASES if case.name == name), "")
-        run = ("-c", GUARD, mode) if mode else ("-m", "orchestrator", "run")
-        service = Service(own, document, ("-c", WITHOUT_STREAMS) if name == "without streams" else run)
+        service = Service(own, document, RUNS.get(name, ("-m", "orchestrator", "run")))
         return Charging(self._plant, service.start(), number)
 
     def close(self) -> None:

@@ -50,6 +50,9 @@ def _explored(request: pytest.FixtureRequest, explorations: Mapping[ControlMode,
     return explorations[request.param].result()
 
 
+pytestmark = pytest.mark.timeout(600)  # both explorations may have to share a core
+
+
 def test_every_property_holds(explored: Explored) -> None:
     assert not explored.found, "\n".join(explored.found)
 
