@@ -76,6 +76,10 @@ class Memory:
     limit_s: float = 0.0  #: … and since when it shows this one
     still: Still | None = None  #: the charger's measurements, for as long as they do not change
     closed: bool = False  #: the contactor is to be closed
+    ready: bool = False  #: everything speaks for a charge; it waits for its turn
+    intends: bool = False  #: it is its turn, and a charge begins once that is on disk
+    unverified: bool = False  #: the charger was told to run, perhaps by the last run of the service, and has not been
+    #: seen to stand by since
 
     def copy(self) -> "Memory":
         """An independent copy."""

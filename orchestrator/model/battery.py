@@ -57,3 +57,7 @@ class BatteryLink:
     implausible: Mapping[str, str] = field(default_factory=dict)  #: field → why its newest value was thrown away
     emergency: str = ""  #: newest EMCY that is not "error reset"
     bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers
+    other_master: str = ""  #: what another CANopen master was last seen to do with this node
+    other_master_t_s: float | None = None  #: when that was
+    heartbeat_set: str = ""  #: what somebody else had set this node's heartbeat to when that was last found
+    heartbeat_set_t_s: float | None = None  #: when that was; ours was written again at once

@@ -115,3 +115,6 @@ class ChargerLink:
     error_t_s: float | None = None  #: when that frame came
     bad_frames: int = 0  #: frames dropped since the port was opened: checksum, length, end
     bad_pct: float = 0.0  #: of the last minute's polls, those without a good answer or with a complaint
+    taken_over: str = ""  #: what another program had set this port to when that was last found: "115200 baud"
+    taken_over_t_s: float | None = None  #: when that was; the port was set up again at once
+    locked_by: str = ""  #: which program, none of ours, holds the port's lock now; it is used in spite of that, to stop

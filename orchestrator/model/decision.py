@@ -32,6 +32,9 @@ class Snapshot:
     ending: str = ""  #: why the service is about to end, "" while it is not
     connected: bool = True  #: nothing is between charger and battery, or a contactor that was closed for this reading
     contactor_problem: str = ""  #: why the contactor cannot be driven, for a person: chip, line, what to do
+    waits: str = ""  #: why no charge may begin here right now, though nothing is wrong: another bay begins one
+    moves: str = ""  #: the bay whose BMU has seen the first amperes of this bay's charger, if it is another one
+    running_kept: bool = True  #: it is on disk that this bay's charger may be running
 
 
 class State(StrEnum):
@@ -110,6 +113,10 @@ class Session:
     soc_start_pct: float | None = None
     soc_pct: float | None = None
     step_changes: int = 0
+    pulse_s: float = 0.0  #: spent in pulse precharge …
+    continuous_s: float = 0.0  #: … and in continuous precharge, pauses not counted
+    rise_s: float = 0.0  #: spent in precharge since the pack's rise was last counted from the beginning …
+    rise_v: float | None = None  #: … at this pack voltage; None: precharge has not begun
     result: str = ""  #: why it ended; "" while it goes on
 
 

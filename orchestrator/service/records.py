@@ -23,7 +23,10 @@ Line = tuple[str, dict[str, object]]  #: kind, fields
 #: States in which every step is the same until something happens.
 QUIET = frozenset({State.IDLE, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
 #: What of a snapshot is about this service and its contactor.
-OURS = ("internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem")
+OURS = (
+    "internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem", "waits", "moves",
+    "running_kept",
+)  # fmt: skip
 #: A whole snapshot, with the memory and the bay's rules, at least this often: a reader may begin at each of them.
 WHOLE_EVERY = 250
 

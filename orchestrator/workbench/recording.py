@@ -110,7 +110,7 @@ def _take(line: Fields, steps: list[Recorded], parts: dict[str, Fields]) -> None
     memory: Memory | None = None
     rules: Rules | None = None
     if line.get("whole"):
-        plain = {name: line[name] for name in Snapshot.__slots__}
+        plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
         memory = _CONVERTER.structure(line["memory"], Memory)
         rules = Rules.of(_CONVERTER.structure(line["config"], Bay))
     elif line["bay"] in parts:

@@ -1,0 +1,140 @@
+"""What of a bay's memory survives a restart, and the memory that a restart begins with. Pure: no disk, no clock.
+
+A restart is neither a reset nor a start, and it forgets no limit: what was latched, held, counted or raised goes on. A
+charger that may have been running waits for a person. Times are kept as ages, since monotonic clocks begin anew.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from orchestrator.core.faults import ROW, Clear
+from orchestrator.core.latches import BACKOFF_S
+from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.model import ENERGISED, Session, State
+
+#: In these a charger may be delivering current.
+RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
+UNFINISHED = "the last run of this service ended in mid-charge and did not verify the stop"
+
+Age = float  #: seconds, at the moment when it was written down
+
+
+@dataclass(frozen=True, slots=True)
+class PersistedFault:
+    """One fault in force, or the strikes that are left of one."""
+
+    text: str = ""  #: the evidence; "" where only strikes are left
+    latched: bool = False
+    raised: Age | None = None  #: None: it is not in force
+    clean: Age | None = None  #: since when its cause has been gone; None: it was still there
+    strikes: tuple[Age, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Persisted:
+    """Of one bay."""
+
+    running: bool = False  #: the charger may be running: it was told to, and was not verified to stand by since
+    hold: str = ""  #: why a person must start; as in the core's memory
+    paused: bool = False
+    faults: Mapping[str, PersistedFault] = field(default_factory=dict)
+    resets: tuple[tuple[Age, str], ...] = ()
+    session: Session | None = None  #: the open charge with all that it has counted; `started_s` is an age
+    full_pct: float | None = None
+    soc: tuple[Age, float] | None = None  #: the newest SOC of the battery that is in the bay
+
+    @classmethod
+    def of(cls, memory: Memory, now_s: float) -> "Persisted":
+        """What to keep of a bay's memory."""
+        faults = {
+            name: PersistedFault(
+                text=fault.text if fault.raised_s is not None else "",
+                latched=fault.latched,
+                raised=_age(fault.raised_s, now_s),
+                clean=_age(fault.clean_s, now_s),
+                strikes=tuple(now_s - t_s for t_s in fault.strikes),
+            )
+            for name, fault in memory.faults.items()
+            if fault.raised_s is not None or fault.strikes
+        }
+        soc_s, soc_pct = memory.charge
+        session = memory.session
+        return cls(
+            running=memory.state in RUNNING or memory.intends or memory.unverified,
+            hold=memory.hold,
+            paused=memory.paused,
+            faults=faults,
+            resets=tuple((now_s - t_s, name) for t_s, name in memory.resets),
+            session=replace(session, started_s=now_s - session.started_s) if session is not None else None,
+            full_pct=memory.full_pct,
+            soc=(now_s - soc_s, soc_pct) if soc_pct is not None else None,
+        )
+
+    @property
+    def gist(self) -> tuple[object, ...]:
+        """What must be on disk before it is relied on; the rest are ages and counters, which may be a little older."""
+        faults = frozenset(
+            (name, fault.latched, fault.raised is not None, len(fault.strikes)) for name, fault in self.faults.items()
+        )
+        resets = tuple(name for _, name in self.resets)
+        return self.running, self.hold, self.paused, faults, resets, self.session is not None, self.full_pct is None
+
+    def aged(self, seconds: float) -> "Persisted":
+        """The same so much later."""
+        return replace(
+            self,
+            faults={
+                name: replace(
+                    fault,
+                    raised=None if fault.raised is None else fault.raised + seconds,
+                    clean=None if fault.clean is None else fault.clean + seconds,
+                    strikes=tuple(age_s + seconds for age_s in fault.strikes),
+                )
+                for name, fault in self.faults.items()
+            },
+            resets=tuple((age_s + seconds, name) for age_s, name in self.resets),
+            session=replace(self.session, started_s=self.session.started_s + seconds) if self.session else None,
+            soc=(self.soc[0] + seconds, self.soc[1]) if self.soc is not None else None,
+        )
+
+    def memory(self, now_s: float) -> Memory:
+        """What the bay begins with."""
+        faults = {name: _fault(fault, now_s) for name, fault in self.faults.items() if name in ROW}
+        if self.running:
+            faults["found_running"] = FaultMemory(raised_s=now_s, text=UNFINISHED)
+        unknown = [f"{one.text or name}; start to go on" for name, one in self.faults.items() if name not in ROW]
+        session = self.session
+        memory = Memory(
+            hold=self.hold or "; ".join(unknown),
+            paused=self.paused,
+            faults=faults,
+            resets=tuple((now_s - age_s, name) for age_s, name in self.resets),
+            session=replace(session, started_s=now_s - session.started_s) if session is not None else None,
+            full_pct=self.full_pct,
+            unverified=self.running,
+        )
+        if self.soc is not None:
+            memory.charge = (now_s - self.soc[0], self.soc[1])
+        return memory
+
+
+def _age(t_s: float | None, now_s: float) -> Age | None:
+    return None if t_s is None else now_s - t_s
+
+
+def _fault(fault: PersistedFault, now_s: float) -> FaultMemory:
+    return FaultMemory(
+        raised_s=None if fault.raised is None else now_s - fault.raised,
+        clean_s=None if fault.clean is None else now_s - fault.clean,
+        text=fault.text,
+        latched=fault.latched,
+        strikes=tuple(now_s - age_s for age_s in fault.strikes),
+    )
+
+
+def from_first_format(name: str, text: str) -> PersistedFault:
+    """A fault of the first format, which kept only those that wait for a person, by id and evidence."""
+    row = ROW.get(name)
+    backoff = row is not None and row.clear is Clear.BACKOFF  # it would not have been kept with fewer strikes
+    strikes = (0.0,) * (len(BACKOFF_S) + 1) if backoff else ()
+    return PersistedFault(text, row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes)
