@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
+from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.finish import finished, tapers
 from orchestrator.core.memory import Still
 from orchestrator.core.sequence import RESUME, RUN

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
+from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.keys import Range, Source

@@ -90,6 +90,11 @@ class Charger:
                 self.run = self.run or not self.resting
 
 
+def fitting_soc_pct(pack_v: float) -> float:
+    """What a healthy pack of 13 cells has at this voltage: nothing when it is deeply discharged, else half of it."""
+    return 2.0 if pack_v < 42.0 else 50.0
+
+
 class World:
     """Everything true of one bay; `run` lets time pass in ticks, `decision` is the newest."""
 
@@ -114,7 +119,7 @@ class World:
             "current_a": 0.0,
             "status": 0.0,
             "temperature_c": 20.0,
-            "soc_pct": 50.0,
+            "soc_pct": fitting_soc_pct(battery.get("voltage_v", 48.0)),
             "soh_pct": 100.0,
             **battery,
         }
