@@ -10,6 +10,7 @@ from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.witnesses.followed import Witnessed
 from orchestrator.model import (
+    ENERGISED,
     BatteryLink,
     BatteryReading,
     ChargeMode,
@@ -64,9 +65,11 @@ class Edge:
 
     @property
     def facts(self) -> Facts:
-        measured = {name: None if x is None else Measurement(x, NOW_S) for name, x in self.bmu.items()}
+        values = self.bmu if self.state in ENERGISED else {"current_a": 0.0, **self.bmu}
+        measured = {name: None if x is None else Measurement(x, NOW_S) for name, x in values.items()}
+        proof = witnessed() if "stop_sent_s" in self.charger_link else {}
         memory = Memory(**{"state": self.state, "since_s": ago(self.state_s), "ran": True, "runs_s": ago(50),
-                           **self.memory})  # fmt: skip
+                           **proof, **self.memory})  # fmt: skip
         snapshot = Snapshot(
             charger=replace(READING, **self.charger),
             charger_link=replace(ChargerLink(online=True), **self.charger_link),

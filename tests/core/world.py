@@ -92,7 +92,7 @@ class Charger:
 
 
 #: A pack that fits its SOC is this far inside of what belongs to it.
-WELL_INSIDE_V = 0.02
+WELL_INSIDE_V = 0.005
 
 
 def fitting_soc_pct(pack_v: float, cells: int = 13) -> float:
@@ -137,9 +137,10 @@ class World:
         }
         self._fitted_pct = self.values["soc_pct"] if "voltage_v" in battery else None
         self._fitted_v = self.values["voltage_v"]
-        self.counted_ah = 20.0  #: what a BMU counts goes on moving, whatever stands still
+        self.counted_min = 60.0  #: what a BMU counts goes on moving, whatever stands still
         self.frozen: set[str] = set()  #: values that are not read any more
         self.pack_amps: float | None = None  #: what the BMU measures, if not what flows
+        self.shunt = 1.0  #: what share of it the BMU measures
         self.reading: ChargerReading | None = None
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
@@ -231,7 +232,7 @@ class World:
             self.reading = self._reading()
         if self.battery_answers:
             self.heard_s = self.now_s
-            for name, value in ({"remaining_ah": self.counted_ah} | self.values).items():
+            for name, value in ({"time_to_empty_min": self.counted_min} | self.values).items():
                 if value is None:
                     self.measured.pop(name, None)
                 elif name not in self.frozen:
@@ -287,8 +288,8 @@ class World:
             if command.action not in self.deaf:
                 self.charger.obey(command)
         if self.values["current_a"] is not None:
-            self.values["current_a"] = self._amps() if self.pack_amps is None else self.pack_amps
-        self.counted_ah += self._amps() * dt_s / 3600
+            self.values["current_a"] = self._amps() * self.shunt if self.pack_amps is None else self.pack_amps
+        self.counted_min += self._amps() * dt_s / 60
 
     def _fit(self) -> None:
         """Where a test has set the SOC alone, the voltage follows it."""

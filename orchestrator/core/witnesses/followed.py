@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from orchestrator.core.drain import drained
-from orchestrator.core.witnesses.standby import sees_current
+from orchestrator.core.witnesses.standby import UNORDERED_MOST_S, sees_current
 
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
@@ -60,7 +60,9 @@ def follow(f: "Facts", passed_s: float) -> Witnessed:
         _first_amperes(f, known, passed_s),
         stop_s=stop_s,
         proof=_proof(f, stop_s, known.proof if stop_s == known.stop_s else ()),
-        unordered_s=0.0 if f.energised else drained(known.unordered_s, passed_s, holds=sees_current(f)),
+        unordered_s=0.0
+        if f.energised
+        else min(UNORDERED_MOST_S, drained(known.unordered_s, passed_s, holds=sees_current(f))),
         trail=_trail(f, known.trail),
         frozen=_frozen(f, known.frozen),
     )

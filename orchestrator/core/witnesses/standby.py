@@ -11,8 +11,9 @@ if TYPE_CHECKING:
 
 #: Current into the pack of more than this is no offset of a measurement (FAULTS C29).
 CHARGING_A = 1.0
-#: For so long a BMU may still say what was: its own averaging.
-UNORDERED_S = 2.0
+#: For so long a BMU may still say what was: its own averaging. What lasts for longer counts as this much, so that it is
+#: forgotten again within half a minute.
+UNORDERED_S, UNORDERED_MOST_S = 2.0, 6.0
 
 
 def sees_current(f: "Facts") -> bool:
@@ -31,7 +32,7 @@ def proved(f: "Facts") -> bool:
 
 def current_without_order(f: "Facts") -> str | None:
     """FAULTS C29."""
-    if f.memory.witnessed.unordered_s < UNORDERED_S or f.pack_a is None:
+    if not f.unordered:
         return None
     if f.reading is None:
         return f"the BMU sees {f.pack_a:.2f} A flow into the pack, nothing was commanded, and the charger is not heard"
