@@ -44,7 +44,8 @@ class Witnessed:
     stop_s: float | None = None  #: when the first whole stop of the present state was handed to the port
     proof: tuple[float, ...] = ()  #: when the first and the newest of the status replies since then were asked for that
     #: showed standby, without a break
-    unordered_s: float = 0.0  #: for how long the BMU has seen a charging current that nobody ordered; drains
+    sees: bool = False  #: the BMU sees a charging current that nobody ordered …
+    unordered_s: float = 0.0  #: … and for how long it has; drains
     trail: tuple[Sample, ...] = ()  #: of the last seconds under current, oldest first
     frozen: Frozen | None = None
     before_a: float = 0.0  #: what the BMU saw before this charge began
@@ -56,14 +57,21 @@ def follow(f: "Facts", passed_s: float) -> Witnessed:
     """What is known after this step's facts; `passed_s` since the step before."""
     known = f.memory.witnessed
     stop_s = _stop_s(f)
+    sees = sees_current(f) and not f.energised
     return replace(
         _first_amperes(f, known, passed_s),
         stop_s=stop_s,
         proof=_proof(f, stop_s, known.proof if stop_s == known.stop_s else ()),
-        unordered_s=0.0 if f.energised else drained(known.unordered_s, passed_s, holds=sees_current(f)),
+        sees=sees,
+        unordered_s=0.0 if f.energised else _unordered_s(known, passed_s, sees=sees),
         trail=_trail(f, known.trail),
         frozen=_frozen(f, known.frozen),
     )
+
+
+def _unordered_s(known: Witnessed, passed_s: float, *, sees: bool) -> float:
+    """The time before it was first seen is nobody's: it may have begun just now."""
+    return known.unordered_s if sees and not known.sees else drained(known.unordered_s, passed_s, holds=sees)
 
 
 def _stop_s(f: "Facts") -> float | None:

@@ -31,7 +31,7 @@ def proved(f: "Facts") -> bool:
 
 def current_without_order(f: "Facts") -> str | None:
     """FAULTS C29."""
-    if f.memory.witnessed.unordered_s < UNORDERED_S or f.pack_a is None:
+    if not f.unordered or f.pack_a is None:
         return None
     if f.reading is None:
         return f"the BMU sees {f.pack_a:.2f} A flow into the pack, nothing was commanded, and the charger is not heard"
