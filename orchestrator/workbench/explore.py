@@ -10,14 +10,17 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from orchestrator.core.latches import effect, raised
+from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
-from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.step import step
 from orchestrator.model import ENERGISED, Decision, Snapshot, State
 from orchestrator.workbench.properties import Property
 from orchestrator.workbench.story import BEGIN_S, Counterexample, Move, Taken
+
+#: In these standby is yet to be proved.
+WAITS = frozenset({*UNVERIFIED, State.OFFLINE, State.QUALIFYING})
 
 Step = Callable[[float, Snapshot, Memory, Rules], tuple[Decision, Memory]]
 T = TypeVar("T")
@@ -57,10 +60,9 @@ def gist(memory: Memory) -> tuple[object, ...]:
         memory.full_pct is not None,
         memory.qualified_s is not None,
         energised and (memory.resumed, memory.ran, memory.order and memory.order.action, witnessed.proved),
-        len(witnessed.proof),
+        memory.state in WAITS and len(witnessed.proof),
         memory.unverified,
         memory.intends,
-        memory.verified_s is not None and memory.last_s is not None and memory.last_s - memory.verified_s < LASTS_S,
     )
 
 

@@ -24,6 +24,7 @@ class Sample:
     t_s: float
     pack_v: float
     pack_a: float
+    charger_v: float
     charger_a: float
 
 
@@ -92,11 +93,11 @@ def _proof(f: "Facts", stop_s: float | None, proof: tuple[float, ...]) -> tuple[
 
 
 def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
-    if not f.energised or f.pack_v is None or f.pack_a is None or f.amps is None:
+    if not f.energised or f.pack_v is None or f.pack_a is None or f.volts is None or f.amps is None:
         return () if not f.energised else trail
     if trail and f.now_s - trail[-1].t_s < TRAIL_EVERY_S:
         return trail
-    sample = Sample(f.now_s, f.pack_v, f.pack_a, f.amps)
+    sample = Sample(f.now_s, f.pack_v, f.pack_a, f.volts, f.amps)
     return (*(one for one in trail if f.now_s - one.t_s <= TRAIL_S), sample)
 
 
