@@ -60,7 +60,7 @@ def gist(memory: Memory) -> tuple[object, ...]:
         memory.full_pct is not None,
         memory.qualified_s is not None,
         energised and (memory.resumed, memory.ran, memory.order and memory.order.action, witnessed.proved),
-        memory.state in WAITS and len(witnessed.proof),
+        memory.state in WAITS and bool(witnessed.proof),
         memory.unverified,
         memory.intends,
     )
