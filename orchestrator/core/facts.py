@@ -160,7 +160,7 @@ class Facts:
     @property
     def unordered(self) -> bool:
         """The BMU goes on to see a charging current that nobody ordered: whatever the charger says, something runs."""
-        return standby.sees_current(self) and self.memory.witnessed.unordered_s >= standby.UNORDERED_S
+        return self.memory.witnessed.unordered_s >= standby.UNORDERED_S and standby.sees_current(self)
 
     @property
     def stopped(self) -> bool:

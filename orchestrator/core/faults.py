@@ -196,7 +196,7 @@ FAULTS: tuple[Row, ...] = (
     Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, pack.another_pack, ALWAYS - ENERGISED,
         "give the bay the policy of this battery, or have its BMU calibrated", for_s=1, clean_s=5),
     Row("another_pack", "B25", E.STOP, Clear.OPERATOR, pack.another_pack, ENERGISED,
-        "look which battery is in the bay, and have its BMU calibrated, then start", for_s=2),
+        "look which battery is in the bay, and have its BMU calibrated, then start", for_s=5),
     # who else is on the bus
     Row("other_master", "B27", E.WARN, Clear.AUTO, battery.other_master, ALWAYS,
         "it does no harm as long as it only reads; keep other tools off this bus while batteries charge", clean_s=10),

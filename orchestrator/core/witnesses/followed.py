@@ -24,6 +24,7 @@ class Sample:
     t_s: float
     pack_v: float
     pack_a: float
+    charger_v: float
     charger_a: float
 
 
@@ -44,7 +45,8 @@ class Witnessed:
     stop_s: float | None = None  #: when the first whole stop of the present state was handed to the port
     proof: tuple[float, ...] = ()  #: when the first and the newest of the status replies since then were asked for that
     #: showed standby, without a break
-    unordered_s: float = 0.0  #: for how long the BMU has seen a charging current that nobody ordered; drains
+    sees: bool = False  #: the BMU sees a charging current that nobody ordered …
+    unordered_s: float = 0.0  #: … and for how long it has; drains
     trail: tuple[Sample, ...] = ()  #: of the last seconds under current, oldest first
     frozen: Frozen | None = None
     before_a: float = 0.0  #: what the BMU saw before this charge began
@@ -56,16 +58,23 @@ def follow(f: "Facts", passed_s: float) -> Witnessed:
     """What is known after this step's facts; `passed_s` since the step before."""
     known = f.memory.witnessed
     stop_s = _stop_s(f)
+    sees = sees_current(f) and not f.energised
     return replace(
         _first_amperes(f, known, passed_s),
         stop_s=stop_s,
         proof=_proof(f, stop_s, known.proof if stop_s == known.stop_s else ()),
-        unordered_s=0.0
-        if f.energised
-        else min(UNORDERED_MOST_S, drained(known.unordered_s, passed_s, holds=sees_current(f))),
+        sees=sees,
+        unordered_s=0.0 if f.energised else _unordered_s(known, passed_s, sees=sees),
         trail=_trail(f, known.trail),
         frozen=_frozen(f, known.frozen),
     )
+
+
+def _unordered_s(known: Witnessed, passed_s: float, *, sees: bool) -> float:
+    """The time before it was first seen is nobody's: it may have begun just now."""
+    if sees and not known.sees:
+        return known.unordered_s
+    return min(UNORDERED_MOST_S, drained(known.unordered_s, passed_s, holds=sees))
 
 
 def _stop_s(f: "Facts") -> float | None:
@@ -86,11 +95,11 @@ def _proof(f: "Facts", stop_s: float | None, proof: tuple[float, ...]) -> tuple[
 
 
 def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
-    if not f.energised or f.pack_v is None or f.pack_a is None or f.amps is None:
+    if not f.energised or f.pack_v is None or f.pack_a is None or f.volts is None or f.amps is None:
         return () if not f.energised else trail
     if trail and f.now_s - trail[-1].t_s < TRAIL_EVERY_S:
         return trail
-    sample = Sample(f.now_s, f.pack_v, f.pack_a, f.amps)
+    sample = Sample(f.now_s, f.pack_v, f.pack_a, f.volts, f.amps)
     return (*(one for one in trail if f.now_s - one.t_s <= TRAIL_S), sample)
 
 

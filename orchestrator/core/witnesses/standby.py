@@ -24,7 +24,7 @@ def sees_current(f: "Facts") -> bool:
 def proved(f: "Facts") -> bool:
     """The only proof of standby that is taken."""
     known = f.memory.witnessed
-    if len(known.proof) < 2 or known.stop_s is None or not f.standby:
+    if len(known.proof) < 2 or known.stop_s is None or not f.standby or not f.charger.online:
         return False
     measured = f.snapshot.battery.current_a
     return f.pack_a is None or measured is None or (measured.t_s >= known.stop_s and not sees_current(f))
@@ -32,7 +32,7 @@ def proved(f: "Facts") -> bool:
 
 def current_without_order(f: "Facts") -> str | None:
     """FAULTS C29."""
-    if not f.unordered:
+    if not f.unordered or f.pack_a is None:
         return None
     if f.reading is None:
         return f"the BMU sees {f.pack_a:.2f} A flow into the pack, nothing was commanded, and the charger is not heard"
