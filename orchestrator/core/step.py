@@ -106,8 +106,8 @@ def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
 
 def _is_over(f: Facts, before: State) -> bool:
     """Whether the open charge has ended. One that the last run of the service left open ends with its battery."""
-    exchange = f.memory.exchange
-    another = f.departed or (exchange is not None and exchange[0] == f.now_s)
+    exchanged = f.memory.faults.get("battery_exchanged")
+    another = f.departed or (exchanged is not None and exchanged.raised_s is not None)
     goes_on = f.memory.state is before or before is State.STARTING
     return f.memory.state in SESSION_ENDS and (another or not goes_on)
 
