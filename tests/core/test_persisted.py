@@ -162,7 +162,7 @@ def test_no_number_of_breaks_lets_more_in_than_the_policy_allows(breaks: Callabl
         number += 1
         assert number < 12, world.decision
     assert number >= 4
-    assert 0.29 <= flowed_as / 3600 <= 0.33
+    assert 0.25 <= flowed_as / 3600 <= 0.31  # some of it flows in the breaks
 
 
 @every_break
@@ -178,7 +178,7 @@ def test_no_number_of_breaks_lets_a_charge_last_longer(breaks: Callable[[World],
             breaks(world)
         number += 1
         assert number < 12, world.decision
-    assert 70 <= energised * 0.25 <= 80
+    assert 60 <= energised * 0.25 <= 75  # some of it passes in the breaks
 
 
 def short_precharge() -> Policy:
@@ -209,11 +209,12 @@ def test_no_number_of_breaks_lets_a_precharge_last_longer(breaks: Callable[[Worl
     world = World(bay(short_precharge()), voltage_v=33.0)
     seconds, number = {State.PRECHARGE_PULSE: 0.0, State.PRECHARGE_CONTINUOUS: 0.0}, 0
     while not tripped_by(world, "precharge_too_long"):
+        end_s = world.now_s + 60
         while world.tick().state not in ENERGISED:
-            pass
+            assert world.now_s < end_s, (world.decision, seconds)
         for _ in range(32):
             world.tick()
-            world.values["voltage_v"] = 33.0 + world.counted_min / 300  # it rises enough, and not to the end
+            world.values["voltage_v"] = 33.0 + 0.022 * sum(seconds.values())  # it rises enough, and not to the end
             if world.state in seconds:
                 seconds[world.state] += 0.25
         if world.state in ENERGISED:
