@@ -37,8 +37,9 @@ def update(f: Facts) -> dict[str, FaultMemory]:
             continue
         left = departed and row.departs
         if left and not (fault is not None and fault.latched):
-            if fault is not None and fault.strikes:
-                after[row.id] = FaultMemory(strikes=fault.strikes)  # it was no fault, but it may come back like this
+            strikes = tuple(t for t in fault.strikes if t != fault.raised_s) if fault is not None else ()
+            if strikes:  # what it has just done was no fault; what it did before was
+                after[row.id] = FaultMemory(strikes=strikes)
             continue
         looked_for = not left and (state in row.where or (fault is not None and fault.raised_s is not None))
         seen = _seen(row, f) if looked_for else None

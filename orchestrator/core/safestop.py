@@ -49,7 +49,7 @@ def follow_stop(f: Facts, before: State) -> None:
 def proved_to_last(f: Facts) -> bool:
     """The charger, which did not obey before, has stood by for long enough to be believed."""
     proof = f.memory.witnessed.proof
-    return f.stopped and f.now_s - proof[0] >= LASTS_S
+    return f.stopped and f.charger.online and f.now_s - proof[0] >= LASTS_S
 
 
 def gives_up(f: Facts) -> bool:
@@ -65,7 +65,9 @@ def gives_up(f: Facts) -> bool:
         )
     if memory.state is not State.STARTING:
         return False
-    if f.reading is None and not f.unordered:
+    if f.unordered and f.state_s >= OBEY_STOP_S:
+        return True
+    if f.reading is None:
         return memory.unverified and f.state_s >= LOST_S
     runs_s = memory.runs_s
-    return (runs_s is not None and f.now_s - runs_s >= OBEY_STOP_S) or f.unordered or f.state_s >= LOST_S + OBEY_STOP_S
+    return (runs_s is not None and f.now_s - runs_s >= OBEY_STOP_S) or f.state_s >= LOST_S + OBEY_STOP_S

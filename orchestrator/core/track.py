@@ -202,7 +202,9 @@ def follow_state(f: Facts, before: State) -> None:
     memory.unverified, memory.stopping_s, memory.verified_s = True, None, None
     if before not in ENERGISED:
         memory.resumed, memory.resume_s, memory.order, memory.full_pct = False, f.now_s, None, None
+        memory.search_s = memory.idle_s = 0.0  # after a pause the charger looks for the battery anew
         if memory.session is None:
+            memory.wake_s = 0.0
             memory.session = Session(started_s=f.now_s, soc_start_pct=f.soc, soc_pct=f.soc)
             memory.counted_t_s = f.reading.t_s if f.reading else None
     if memory.state is not State.CHARGING and memory.session is not None and memory.session.rise_v is None:

@@ -39,7 +39,10 @@ def warm(celsius: float) -> Callable[[], World]:
 
 
 def nearly_at_90() -> World:
-    return World(soc_pct=88.0).charging()
+    """With a pack that takes little by now, so that nothing flows above the lower step."""
+    world = World(soc_pct=88.0)
+    world.amps = 7.0
+    return world.charging()
 
 
 def hot() -> World:
@@ -267,11 +270,11 @@ SCENES: tuple[Scene, ...] = (
     Scene("early_full", shows(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED), shows_truth,
           ("mode 5", "only 50 %"), S.IDLE, 0.5, anywhere=False),
     Scene("open_circuit", world_has(amps=0.09), world_has(amps=None), ("delivered nothing for 10 s",), S.SUSPENDED,
-          10.5, anywhere=False),
+          10.25, anywhere=False),
     Scene("no_battery", shows(charge_mode=ChargeMode.BATTERY_SEARCH), shows_truth, ("looking for a battery for 1 min",),
-          S.SUSPENDED, 60.5, anywhere=False),
+          S.SUSPENDED, 60.25, anywhere=False),
     Scene("wakes_too_long", shows(charge_mode=ChargeMode.BATTERY_RECOVERY), shows_truth, ("for 30 min",), S.TRIPPED,
-          1800.5, anywhere=False),
+          1800.25, anywhere=False),
     Scene("over_voltage", world_has(volts=55.21), world_has(volts=None), ("55.21 V at the charger", "55.2 V"),
           S.TRIPPED),
     Scene("over_voltage", value(voltage_v=55.21), AS_BEFORE, ("55.21 V at the charger",), S.TRIPPED),
@@ -281,7 +284,7 @@ SCENES: tuple[Scene, ...] = (
           anywhere=False),
     Scene("not_paired", world_has(volts=46.99), world_has(volts=None), ("46.99 V", "48.00 V"), S.SUSPENDED, 1.25,
           begin=qualifying, anywhere=False),
-    Scene("amps_disagree", world_has(pack_amps=12.59), world_has(pack_amps=None), ("14.00 A", "12.59 A"), S.TRIPPED,
+    Scene("amps_disagree", world_has(shunt=12.59 / 14), world_has(shunt=1.0), ("14.00 A", "12.59 A"), S.TRIPPED,
           5.25, anywhere=False),
     Scene("charger_frozen", still(voltage_v=48.21), measures_again,
           ("48.00 V and 14.00 A for 60 s", "0.21 V"), S.UNCONTROLLABLE, 60.0, anywhere=False),
@@ -330,8 +333,8 @@ SCENES: tuple[Scene, ...] = (
     Scene("implausible", bmu(implausible={"soc_pct": "SOC 140 %", "temperature_c": "x"}), bmu(implausible={}),
           ("SOC 140 %",), S.TRIPPED),
     Scene("implausible", bmu(implausible={"soc_pct": "SOC 141 %"}), bmu(implausible={}), ("SOC 141 %",), S.SUSPENDED),
-    Scene("under_voltage", value(voltage_v=25.99), AS_BEFORE, ("25.99 V", "26 V", PACK_V), S.CHARGING,
-          1.25, anywhere=False),
+    Scene("under_voltage", value(voltage_v=25.99), value(voltage_v=33.0), ("25.99 V", "26 V", PACK_V),
+          S.PRECHARGE_PULSE, 1.25, begin=pulse, anywhere=False),
     Scene("needs_precharge", value(status=BIT[BatteryStatus.LOW_VOLTAGE]), AS_BEFORE, ("no precharge",), S.CHARGING,
           1.25, begin=with_policy(NO_PRECHARGE), anywhere=False),
     Scene("soh_low", value(soh_pct=59.0), AS_BEFORE, ("59 %", "60 %", SOH), S.CHARGING),
@@ -345,8 +348,11 @@ SCENES: tuple[Scene, ...] = (
     Scene("soc_not_believed", falls_with_odd_figures, NO_FIGURES, ("fallen from 50 to 48 %", "10.00 Ah"), S.IDLE, 0.5,
           anywhere=False, lapse=False),
     Scene("battery_exchanged", returns_as_another, nothing, ("from 50 to 80 % in 5 s",), S.IDLE, anywhere=False),
-    Scene("wrong_policy", value(voltage_v=38.99, soc_pct=51.0), AS_BEFORE, ("38.99 V at SOC 51 %", "39 V", "13 cells"),
-          S.CHARGING, 1.25, anywhere=False),
+    Scene("wrong_policy", value(voltage_v=45.0, soc_pct=51.0), AS_BEFORE,
+          ("45.00 V at SOC 51 %", "13 NMC/NCA cells", "3.46 V a cell", "at least 3.50 V"), S.SUSPENDED, 1.25,
+          begin=qualifying, anywhere=False),
+    Scene("another_pack", value(voltage_v=52.5), AS_BEFORE, ("52.50 V at SOC 50 %", "4.04 V a cell", "at most 4.00 V"),
+          S.IDLE, 2.25, anywhere=False),
     Scene("precharge_no_rise", value(voltage_v=33.29), value(voltage_v=34.0), ("0.29 V in 5.0 min", "0.3 V"),
           S.TRIPPED, 299.0, begin=pulse, anywhere=False),
     Scene("precharge_too_long", nothing, nothing, ("4.0 min", "39 V"), S.TRIPPED, 240.0, begin=short_continuous,

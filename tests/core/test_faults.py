@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
-from orchestrator.core.faults import FAULTS, ROW, Clear, Row
+from orchestrator.core.faults import FAULTS, ROW, Check, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
+from orchestrator.core.witnesses import measured, pack, paired, standby
 from orchestrator.keys import Range, Source
 from orchestrator.model import ENERGISED, STOP, Effect, Request, State
 from tests.core.bays import IN, running_at_the_start
@@ -21,9 +22,9 @@ from tests.core.world import TICK_S, World, bay
 ENDS = {
     Effect.WARN: {Clear.AUTO},
     Effect.LIMIT: {Clear.AUTO},
-    Effect.NO_START: {Clear.AUTO},
+    Effect.NO_START: {Clear.AUTO, Clear.BACKOFF},
     Effect.PAUSE: {Clear.AUTO},
-    Effect.STOP: {Clear.BACKOFF, Clear.OPERATOR},
+    Effect.STOP: {Clear.AUTO, Clear.BACKOFF, Clear.OPERATOR},
     Effect.TRIP: {Clear.RESET},
 }
 
@@ -50,13 +51,14 @@ def test_the_rows_are_one_each() -> None:
 
 
 def test_every_predicate_is_in_the_table_and_says_where_it_comes_from() -> None:
-    modules = (battery, charge, obedience, ourselves, pair, reports, state_of_charge)
-    predicates = {
+    modules = (battery, charge, obedience, ourselves, reports, state_of_charge, measured, pack, paired)
+    predicates: set[Check] = {
         function
         for module in modules
         for name, function in inspect.getmembers(module, inspect.isfunction)
         if function.__module__ == module.__name__ and not name.startswith("_")
     }
+    predicates.add(standby.current_without_order)  # the rest of its module asks without being a fault
     assert {row.check for row in FAULTS} == predicates
     assert all(function.__doc__ for function in predicates)
 
@@ -105,7 +107,8 @@ def test_it_is_raised_in_time_with_its_evidence(scene: Scene) -> None:
     text = world.raised[scene.fault]
     for evidence in scene.evidence:
         assert evidence in text
-    assert text.endswith(ROW[scene.fault].advice)
+    row = ROW[scene.fault]
+    assert text.startswith(f"{row.advice} – ") if row.effect is Effect.TRIP else text.endswith(f"; {row.advice}")
 
 
 @every_scene

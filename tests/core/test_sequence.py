@@ -321,7 +321,8 @@ def test_a_lost_half_of_a_stop_lets_no_charger_run_on_its_old_values() -> None:
     site.until(State.CHARGING, 10)
     site.run(10)
     site.count, site.at = 1, site.frames
-    assert site.run(1, Request.PAUSE).state is State.SUSPENDED
+    site.run(0.5, Request.PAUSE)
+    site.until(State.SUSPENDED, 1.5)
     assert site.charger.run, "the second frame was to be lost"
     site.pack.set_soc(92)  # on its way to step 2
     site.run(1)

@@ -51,14 +51,18 @@ def rogue_run(f: Facts) -> str | None:
 
 
 def will_not_stop(f: Facts) -> str | None:
-    """FAULTS C6: it answers, and the answer is that it goes on; or the BMU says so. (A line that is cut is no
-    disobedience.)"""
-    if f.reading is not None and f.runs:
+    """FAULTS C6: it answers, and its answer or the BMU says that it goes on. (A line that is cut is no disobedience: it
+    is given up, too, but goes on by itself once it is mended.)"""
+    if f.reading is None:
+        return None
+    if f.runs:
         return f"the charger does not obey the stop, which is repeated: it still delivers {f.reading.current_a:.2f} A"
     if not sees_current(f):
         return None
-    says = f"says {f.reading.current_a:.2f} A" if f.reading is not None else "is not heard"
-    return f"the stop, which is repeated, is not obeyed: the BMU still sees {f.pack_a:.2f} A, the charger {says}"
+    return (
+        f"the stop, which is repeated, is not obeyed: the BMU still sees {f.pack_a:.2f} A, the charger says "
+        f"{f.reading.current_a:.2f} A"
+    )
 
 
 def will_not_start(f: Facts) -> str | None:
@@ -76,7 +80,7 @@ def stopped_by_itself(f: Facts) -> str | None:
         return None
     if not f.full_mode:
         return "the charger stopped though it was told to run"
-    if f.rules.policy.finish.charger_full and ends_full(f):
+    if early_full(f) is not None or (f.rules.policy.finish.charger_full and ends_full(f)):
         return None
     return (
         "the charger stopped though it was told to run, and its mode 5 is not taken for full: the current had not "

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from orchestrator.core.drain import drained
-from orchestrator.core.witnesses.standby import sees_current
+from orchestrator.core.witnesses.standby import UNORDERED_MOST_S, sees_current
 
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
@@ -72,7 +72,9 @@ def follow(f: "Facts", passed_s: float) -> Witnessed:
 
 def _unordered_s(known: Witnessed, passed_s: float, *, sees: bool) -> float:
     """The time before it was first seen is nobody's: it may have begun just now."""
-    return known.unordered_s if sees and not known.sees else drained(known.unordered_s, passed_s, holds=sees)
+    if sees and not known.sees:
+        return known.unordered_s
+    return min(UNORDERED_MOST_S, drained(known.unordered_s, passed_s, holds=sees))
 
 
 def _stop_s(f: "Facts") -> float | None:

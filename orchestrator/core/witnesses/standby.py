@@ -11,8 +11,9 @@ if TYPE_CHECKING:
 
 #: Current into the pack of more than this is no offset of a measurement (FAULTS C29).
 CHARGING_A = 1.0
-#: For so long a BMU may still say what was: its own averaging.
-UNORDERED_S = 2.0
+#: For so long a BMU may still say what was: its own averaging. What lasts for longer counts as this much, so that it is
+#: forgotten again within half a minute.
+UNORDERED_S, UNORDERED_MOST_S = 2.0, 6.0
 
 
 def sees_current(f: "Facts") -> bool:
@@ -23,7 +24,7 @@ def sees_current(f: "Facts") -> bool:
 def proved(f: "Facts") -> bool:
     """The only proof of standby that is taken."""
     known = f.memory.witnessed
-    if len(known.proof) < 2 or known.stop_s is None or not f.standby or not f.charger.online:
+    if len(known.proof) < 2 or known.stop_s is None or not f.standby:
         return False
     measured = f.snapshot.battery.current_a
     return f.pack_a is None or measured is None or (measured.t_s >= known.stop_s and not sees_current(f))
