@@ -46,6 +46,8 @@ def _energised(f: Facts, faults: Faults) -> Course:
         return Trigger.STOP, faults[0].text
     if f.memory.hold or f.memory.paused:
         return Trigger.STOP, f.memory.hold or "paused by the operator"
+    if f.snapshot.ending:
+        return Trigger.STOP, f.snapshot.ending
     if f.memory.state is State.CHARGING:
         full = finished(f)
         if full is not None:
@@ -151,8 +153,8 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
     if waits is not None:
         return Trigger.REST, waits.text
-    if memory.hold:
-        return Trigger.REST, memory.hold
+    if memory.hold or f.snapshot.ending:
+        return Trigger.REST, memory.hold or f.snapshot.ending
     if memory.paused:
         return Trigger.SUSPEND, "paused by the operator; start to go on"
     absent = _absent(f)
