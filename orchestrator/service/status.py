@@ -1,5 +1,7 @@
 """The status document: what `status --json` prints and everything north of the service reads. Its names are fixed."""
 
+from collections.abc import Mapping, Sequence
+
 from orchestrator.config.station import Station
 from orchestrator.model import BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
 from orchestrator.service.records import command_fields, session_fields
@@ -42,9 +44,21 @@ def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, 
     }
 
 
-def station_status(station: Station, bays: list[dict[str, object]], journal_problem: str) -> dict[str, object]:
-    """The whole station."""
-    return {"station": station.station, "bays": bays, "journal": {"problem": journal_problem}}
+def station_status(
+    station: Station,
+    bays: list[dict[str, object]],
+    journal_problem: str,
+    unkept: str = "",
+    strays: Sequence[Mapping[str, object]] = (),
+) -> dict[str, object]:
+    """The whole station. `strays` are chargers of bays that the station file has not any more."""
+    return {
+        "station": station.station,
+        "bays": bays,
+        "strays": list(strays),
+        "journal": {"problem": journal_problem},
+        "persisted": {"problem": unkept},
+    }
 
 
 def _setpoint(setpoint: Setpoint) -> dict[str, object]:

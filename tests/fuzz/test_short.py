@@ -17,13 +17,13 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from orchestrator.config import ports, yamltree
+from orchestrator.core import persisted
 from orchestrator.devices import battery, dialogue
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.model import Measurement
 from orchestrator.protocol import frame, standby, words
-from orchestrator.service import control, kept, laststop
+from orchestrator.service import control, laststop, typed
 from orchestrator.service.guardian import Guardian
-from orchestrator.service.kept import Kept
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz import __main__ as runner
 from tests.fuzz.__main__ import NAMES, main, the_target, unguided
@@ -173,11 +173,11 @@ def waits_for_the_line(patch: Patch) -> None:
 
 
 def any_record(patch: Patch) -> None:
-    patch.setattr(kept, "_kept", lambda values: Kept(**values))
+    patch.setattr(typed, "_plain", lambda value, _kind: value)
 
 
 def latches_lost(patch: Patch) -> None:
-    patch.setattr(kept, "ROW", {})
+    patch.setattr(persisted, "ROW", {})
 
 
 def keeps_old_ports(patch: Patch) -> None:
