@@ -8,6 +8,7 @@ from time import time
 from typing import Protocol
 
 from orchestrator.config.station import Bay
+from orchestrator.core.failed import carry_on
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
@@ -31,6 +32,7 @@ from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.records import SnapshotRecorder, decision_lines
+from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status
 from orchestrator.service.store import Store
 
@@ -72,6 +74,7 @@ class BayRunner:
         say: Callable[[str], None],
         *,
         contactor: Contactor | None = None,
+        starts: Starts | None = None,
         snapshots: bool = True,
     ) -> None:
         self.name, self.place = bay.name, Place.of(bay)
@@ -87,6 +90,7 @@ class BayRunner:
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
+        self._starts = starts or Starts(0.0, "")  # nobody to wait for
         self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
         self._snapshot = Snapshot()
         self._recorder = SnapshotRecorder(bay) if snapshots else None
@@ -151,32 +155,38 @@ class BayRunner:
             self._step(now_s, asleep_s, asked.request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
             self._charger.order(STOP)
-            self._drive(now_s, closed=False)
-            self._failed(error, now_s)
-            if asked:
-                asked.answer = f"internal error: {self._internal}"
+            self._failed(error, now_s, asked.request if asked else None)
+            self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         if asked:
             answer = asked.answer or (self.decision.answer if self.decision else "")
             self._answers.give(asked, answer, self._revision, now_s)
         self._answers.look(now_s)
 
-    def _failed(self, error: Exception, now_s: float) -> None:
+    def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:
+        """Go on from a memory that knows since when the bay is being stopped; where even that fails, from none."""
         where = traceback.extract_tb(error.__traceback__)[-1]
         internal = f"{error!r} in {where.name}, line {where.lineno}"
         if internal != self._internal:
             self._say(f"{self.name}: internal error, stopping: {internal}")
         self._internal, self.last_s = internal, now_s
-        self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
+        try:
+            snapshot, memory = replace(self._snapshot, request=request), self._memory
+            memory = memory or self._store.past(self.place).memory(now_s)
+            self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)
+            self._keep(self._memory, now_s)
+        except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
+            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         self._take_over()
-        snapshot = self._look(now_s, asleep_s, request)
+        snapshot = self._snapshot = self._look(now_s, asleep_s, request)
         before = self.decision
         memory = self._memory or self._store.past(self.place).memory(now_s)
         decision, self._memory = step(now_s, snapshot, memory, self._rules)
         self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
         self._drive(now_s, closed=decision.closed)
-        self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
+        self._starts.follow(self.name, now_s, self._memory, snapshot)
+        self.decision, self._internal, self.last_s = decision, "", now_s
         lines = list(decision_lines(before, decision)) if before is None or decision != before else []
         if self._recorder is not None:
             recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
@@ -206,6 +216,8 @@ class BayRunner:
             slept_s=slept_s if slept_s > TICK_S else 0.0,
             unkept=self._store.unkept(now_s),
             ending=self._ending,
+            waits=self._starts.waits(self.name, now_s),
+            moves=self._starts.moves(self.name),
             running_kept=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
         )
         if self._contactor is not None:

@@ -34,6 +34,7 @@ from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLin
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.reload import Reload
+from orchestrator.service.starts import Starts
 from orchestrator.service.status import station_status
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
@@ -90,6 +91,8 @@ class Supervisor:
             for name, settings in self._station.can.items()
         }
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
+        alone = len(self._station.bays) == 1
+        starts = Starts(0.0 if alone else self._station.stagger_s, self._station.source.at("stagger_s"))
         for number, bay in enumerate(self._station.bays):
             poke: Callable[[], None] = partial(self._wake.put, number)
             port = _port(bay.charger, bay.limits, poke, self._guardian)
@@ -98,8 +101,9 @@ class Supervisor:
             self._ports.append(port)
             contactor, snapshots = _contactor(bay, self._guardian), self._station.journal.snapshots
             runner = BayRunner(
-                bay, port, node, self._journal, self._store, self._say, contactor=contactor, snapshots=snapshots
-            )
+                bay, port, node, self._journal, self._store, self._say,
+                contactor=contactor, starts=starts, snapshots=snapshots,
+            )  # fmt: skip
             self._bays.append(runner)
         self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
 
