@@ -4,7 +4,7 @@ import json
 
 from orchestrator.core.faults import ROW
 from orchestrator.core.memory import Memory
-from orchestrator.service import control
+from orchestrator.service.answers import encode
 from orchestrator.service.kept import FILE, Kept, read_kept, write_kept
 from tests.fuzz.control import TOKEN
 from tests.fuzz.target import Target, kind_of_word, scratch
@@ -23,7 +23,7 @@ def one(data: bytes) -> None:
         memory = one_kept.memory(NOW_S)
         _is_no_free_start(one_kept, memory)
         shown = {"reason": memory.hold, "faults": [fault.text for fault in memory.faults.values()]}
-        assert json.loads(control._line(shown)) == shown
+        assert json.loads(encode(shown)) == shown
     write_kept(DIRECTORY, kept)
     assert read_kept(DIRECTORY, BAYS) == kept
 
