@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from threading import Event, Lock
-from time import time
+from time import monotonic, time
 from typing import Protocol
 
 from orchestrator.config.station import Bay
@@ -257,7 +257,7 @@ class BayRunner:
         decision = self.decision
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
-        status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
+        status = bay_status(self.name, self._snapshot, decision, monotonic(), time())
         bay, offered, contactor = self._rules.bay, self._offered, self._contactor
         return {
             **status,
