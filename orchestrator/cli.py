@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from orchestrator import __version__
-from orchestrator.errors import ConfigError, HexError, OrchestratorError, ServiceError, UsageError
+from orchestrator.errors import ConfigError, HexError, NoServiceError, OrchestratorError, ServiceError, UsageError
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
 if TYPE_CHECKING:
@@ -180,7 +180,11 @@ def _request(arguments: argparse.Namespace) -> int:
     if bool(arguments.bay) == arguments.all:
         raise UsageError(f"{arguments.verb}: name bays, or --all")
     bays, path = None if arguments.all else arguments.bay, find_socket(arguments.socket)
-    results = cast("dict[str, str]", ask(path, {"verb": arguments.verb, "bays": bays})["results"])
+    try:
+        results = cast("dict[str, str]", ask(path, {"verb": arguments.verb, "bays": bays})["results"])
+    except NoServiceError as error:
+        without = "; to stop chargers without a service: orchestrator estop" if arguments.verb in STOPS else ""
+        raise ServiceError(f"{error}{without}") from None
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified, then = {}, ""
     if arguments.verb in STOPS:
@@ -200,7 +204,9 @@ def _wait_for_standby(path: Path, names: Sequence[str]) -> dict[str, str]:
     end_s = time.monotonic() + STANDBY_S
     while True:
         try:
-            found = cast("list[dict[str, object]]", ask(path, {"verb": "status"}, STANDBY_S)["bays"])
+            found = cast(
+                "list[dict[str, object]]", ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S))["bays"]
+            )
         except ServiceError as error:
             return {name: f"{name}: NOT verified, run `orchestrator estop`: {error}" for name in names}
         bays = [bay for bay in found if bay["name"] in names and not stands_by(bay)]

@@ -1,5 +1,6 @@
 """One client of the control socket: its request as it comes, its answer as it goes. Nothing here ever waits."""
 
+import json
 import socket
 import struct
 from collections.abc import Mapping
@@ -68,3 +69,14 @@ class Client:
         """Let it go."""
         self._left.release()
         self._connection.close()
+
+
+def parse_request(line: bytes) -> Mapping[str, object]:
+    """A request's object; ServiceError for anything else."""
+    try:
+        request = json.loads(line)
+    except (ValueError, RecursionError):
+        raise ServiceError("a request is one JSON object on one line") from None
+    if not isinstance(request, dict):
+        raise ServiceError("a request is one JSON object on one line")
+    return request

@@ -19,9 +19,9 @@ from math import inf
 from pathlib import Path
 from time import monotonic, sleep, thread_time
 
-from orchestrator.errors import OrchestratorError, ServiceError
+from orchestrator.errors import NoServiceError, OrchestratorError, ServiceError
 from orchestrator.service.answers import Answers, Handler, encode, refusal
-from orchestrator.service.client import Client
+from orchestrator.service.client import Client, parse_request
 from orchestrator.service.socketfile import identity, listen, owner, remove
 
 #: So many clients are served at once; for one more the longest idle one goes.
@@ -54,6 +54,7 @@ class ControlSocket:
         self._turn_s: float | None = None  # since when a turn lasts
         self._closing = False
         self._clients: set[Client] = set()
+        self._handler = handler
         self._answers = Answers(handler, self._reply)
         self._accept_s = -inf  # nobody is taken in before
         self._selector = selectors.DefaultSelector()
@@ -85,7 +86,10 @@ class ControlSocket:
                 self._listen_again(self._clock())
                 ready = self._selector.select(self._patience_s)
                 self._turn_s, began_s = self._clock(), thread_time()
-                self._turn([key.fileobj for key, _ in ready], self._turn_s)
+                try:
+                    self._turn([key.fileobj for key, _ in ready], self._turn_s)
+                except Exception as error:  # noqa: BLE001 - a defect here must not keep the next one from stopping a bay
+                    self._begin_anew(error)
                 self._turn_s = None
                 sleep(min(REST * (thread_time() - began_s), REST_S))
         finally:
@@ -93,6 +97,13 @@ class ControlSocket:
                 self._drop(client)
             self._listener.close()
             self._selector.close()
+
+    def _begin_anew(self, error: Exception) -> None:
+        """Without those who were here when it happened."""
+        self._complain(f"internal error, its clients are sent away: {error!r}")
+        for client in tuple(self._clients):
+            self._drop(client)
+        self._answers = Answers(self._handler, self._reply)
 
     @property
     def _patience_s(self) -> float:
@@ -135,10 +146,24 @@ class ControlSocket:
                 if error.errno not in CLOSED:
                     self._pause_accepting(now_s)
                 return
-            client = Client(connection, now_s)
-            self._clients.add(client)
-            self._selector.register(client, selectors.EVENT_READ)
-            self._welcome(client, now_s)
+            try:
+                self._take_in(Client(connection, now_s), now_s)
+            except OSError:
+                connection.close()
+
+    def _take_in(self, client: Client, now_s: float) -> None:
+        """Turn strangers away; who has something to say has mostly said it already."""
+        pid, uid, _ = client.peer()
+        self._selector.register(client, selectors.EVENT_READ)
+        self._clients.add(client)
+        if uid in (0, os.getuid()):
+            self._serve(client, now_s)
+            return
+        self._strangers += 1
+        if now_s - self._said_s >= SAY_S:
+            self._say(f"control socket: turned user {uid} away (process {pid}; {self._strangers} since last said)")
+            self._strangers, self._said_s = 0, now_s
+        self._reply(client, refusal("only the owner of the service may use this socket"), now_s)
 
     def _pause_accepting(self, now_s: float) -> None:
         self._accept_s = now_s + RETRY_S
@@ -157,18 +182,6 @@ class ControlSocket:
         with suppress(KeyError, ValueError):
             self._selector.unregister(client)
         client.close()
-
-    def _welcome(self, client: Client, now_s: float) -> None:
-        """Turn strangers away; who has something to say has mostly said it already."""
-        pid, uid, _ = client.peer()
-        if uid in (0, os.getuid()):
-            self._serve(client, now_s)
-            return
-        self._strangers += 1
-        if now_s - self._said_s >= SAY_S:
-            self._say(f"control socket: turned user {uid} away (process {pid}; {self._strangers} since last said)")
-            self._strangers, self._said_s = 0, now_s
-        self._reply(client, refusal("only the owner of the service may use this socket"), now_s)
 
     # --- what they say, and are told ---
 
@@ -230,21 +243,10 @@ class ControlSocket:
             self._say(f"control socket: {trouble}")
 
 
-def parse_request(line: bytes) -> Mapping[str, object]:
-    """A request's object; ServiceError for anything else."""
-    try:
-        request = json.loads(line)
-    except (ValueError, RecursionError):
-        raise ServiceError("a request is one JSON object on one line") from None
-    if not isinstance(request, dict):
-        raise ServiceError("a request is one JSON object on one line")
-    return request
-
-
 def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> dict[str, object]:
     """Send one request to a running service and return its answer, all within `timeout_s`.
 
-    Raises ServiceError where no service answers, or where the answer is no.
+    Raises NoServiceError where no service answers, ServiceError where the answer is no.
     """
     end_s = monotonic() + timeout_s
     try:
@@ -254,10 +256,10 @@ def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> di
             client.sendall(encode(request))
             answer = json.loads(_read_line(client, end_s))
     except PermissionError:
-        raise ServiceError(f"{path}: permission denied: only {owner(path)} and root may use it (sudo)") from None
+        raise NoServiceError(f"{path}: permission denied: only {owner(path)} and root may use it (sudo)") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or "no answer"
-        raise ServiceError(
+        raise NoServiceError(
             f"no service answers on {path} ({reason}): is it running, and is this its control.socket? "
             "Name it with --socket or $ORCHESTRATOR_SOCKET"
         ) from None

@@ -17,7 +17,7 @@ Identity = tuple[int, int]  #: device and inode
 
 def listen(path: Path) -> socket.socket:
     """The listening socket, owner-only from the first moment on; a dead one in its place is removed."""
-    if path.exists() and not path.is_socket():
+    if not _is_free(path):
         raise ServiceError(f"{path} is there already and is no socket: give this station another control.socket")
     if is_alive(path):
         raise ServiceError(
@@ -35,13 +35,18 @@ def listen(path: Path) -> socket.socket:
     return listener
 
 
-def _bind(listener: socket.socket, path: Path) -> None:
-    mask = os.umask(0o177)
+def _is_free(path: Path) -> bool:
+    """Whether there is a socket or nothing; what we may not look at is said by `bind`."""
     try:
-        path.unlink(missing_ok=True)
-        listener.bind(str(path))
-    finally:
-        os.umask(mask)
+        return path.is_socket() or not os.path.lexists(path)
+    except OSError:
+        return True
+
+
+def _bind(listener: socket.socket, path: Path) -> None:
+    path.unlink(missing_ok=True)
+    os.fchmod(listener.fileno(), 0o600)  # Linux gives the name the mode that the socket has; the umask is all threads'
+    listener.bind(str(path))
 
 
 def is_alive(path: Path) -> bool:
@@ -50,8 +55,10 @@ def is_alive(path: Path) -> bool:
         try:
             probe.settimeout(PROBE_S)
             probe.connect(str(path))
-        except (BlockingIOError, TimeoutError, PermissionError):
-            return True  # there are more clients than it has answered yet, or it is another user's
+        except (BlockingIOError, TimeoutError):
+            return True  # there are more clients than it has answered yet
+        except PermissionError:
+            return identity(path) is not None  # another user's; or we may not even look into the folder
         except OSError:
             return False
     return True

@@ -10,7 +10,7 @@ from typing import Any
 
 from orchestrator.config.load import load_station
 from orchestrator.model import Request
-from orchestrator.service import client, control
+from orchestrator.service import client
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz.target import Target, kind_of_word, scratch
@@ -75,7 +75,7 @@ def one(data: bytes) -> None:
     said: dict[str, Any] = json.loads(line)
     assert said["ok"] in (True, False)
     if said["ok"]:
-        _is_what_was_asked(control.parse_request(data[: client.MAX_REQUEST]), said)
+        _is_what_was_asked(client.parse_request(data[: client.MAX_REQUEST]), said)
     else:
         assert said["error"] and not said["error"].startswith("internal"), said["error"]
     for bay in SUPERVISOR._bays:

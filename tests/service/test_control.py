@@ -21,7 +21,7 @@ from orchestrator.errors import ServiceError
 from orchestrator.service import answers as answers_module
 from orchestrator.service import control as control_module
 from orchestrator.service.answers import PAUSE_S, SHARED_S, Answer, Handler, Later
-from orchestrator.service.client import CLIENT_S, MAX_REQUEST, Client
+from orchestrator.service.client import CLIENT_S, MAX_REQUEST, Client, parse_request
 from orchestrator.service.control import (
     MAX_CLIENTS,
     REST_S,
@@ -30,7 +30,6 @@ from orchestrator.service.control import (
     STALL_S,
     ControlSocket,
     ask,
-    parse_request,
 )
 from orchestrator.service.socketfile import is_alive
 from tests.waiting import wait_until
@@ -659,3 +658,19 @@ def test_a_name_that_is_anothers_by_now_is_left_to_him_and_that_is_said_once(
     finally:
         control.close()
     assert path.exists()
+
+
+def test_a_defect_in_a_turn_sends_its_clients_away_and_the_next_one_is_served(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as broken:
+        broken.setattr(Client, "hear", lambda *_: [].pop())
+        with client(path) as there:
+            assert there.recv(1) == b""
+    answered_soon(path)
+
+
+def test_a_link_to_nowhere_in_its_place_is_left_to_its_owner(tmp_path: Path) -> None:
+    (tmp_path / "control.sock").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(ServiceError, match="is no socket"):
+        ControlSocket(tmp_path / "control.sock", answer, time.monotonic)

@@ -1,12 +1,13 @@
 """Which service is asked, when nobody says which."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from orchestrator.errors import ServiceError, UsageError
-from orchestrator.service.control import ask
+from orchestrator.service.control import ControlSocket, ask
 from orchestrator.service.where import find_socket
 
 
@@ -40,22 +41,35 @@ def test_a_station_file_that_names_none_is_passed_over(folder: Path, content: by
     assert found(folder) == str(folder / "installed.sock")
 
 
-def test_who_may_not_use_it_is_told_who_may(folder: Path) -> None:
-    """As another user than root, who may everything: in a process of its own."""
-    (folder / "closed").mkdir(mode=0o700)
+def as_nobody(folder: Path, do: Callable[[Path], object]) -> str:
+    """What it complains of when a user who may not look into the folder `closed` does it; in a process of its own."""
+    closed = folder / "closed"
+    closed.mkdir(mode=0o700)
+    folder.chmod(0o711)
+    reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
         try:
             if os.getuid() == 0:
-                os.chmod(folder, 0o711)  # noqa: PTH101 - no more may be imported here
                 os.setuid(65534)
             else:
-                (folder / "closed").chmod(0)
-            socket = find_socket(None, Path("none"), folder / "closed" / "control.sock")
-            ask(socket, {"verb": "status"})
+                closed.chmod(0)
+            do(closed / "control.sock")
         except ServiceError as error:
-            says_so = "permission denied: only " in str(error) and "root may use it" in str(error)
-            os._exit(0 if says_so else 1)
+            os.write(writer, str(error).encode())
         finally:
-            os._exit(2)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+            os._exit(0)
+    os.close(writer)
+    os.waitpid(child, 0)
+    with os.fdopen(reader) as stream:
+        return stream.read()
+
+
+def test_who_may_not_use_it_is_told_who_may(folder: Path) -> None:
+    said = as_nobody(folder, lambda socket: ask(find_socket(None, Path("none"), socket), {"verb": "status"}))
+    assert "closed/control.sock: permission denied: only " in said and "and root may use it" in said
+
+
+def test_a_service_that_may_not_make_its_socket_says_so(folder: Path) -> None:
+    said = as_nobody(folder, lambda socket: ControlSocket(socket, lambda _: {}, lambda: 0.0))
+    assert "control.sock cannot be opened: Permission denied" in said
