@@ -3,8 +3,10 @@
 import traceback
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import takewhile
 from math import inf
-from time import time
+from threading import Lock
+from time import monotonic, time
 from typing import Protocol
 
 from orchestrator.config.station import Bay
@@ -95,6 +97,7 @@ class BayRunner:
         self._snapshot = Snapshot()
         self._recorder = SnapshotRecorder(bay) if snapshots else None
         self._asked: list[Asked] = []
+        self._asking = Lock()
         self._internal = ""
 
     @property
@@ -142,24 +145,39 @@ class BayRunner:
             self._write_down_contactor(self._contactor)
 
     def ask(self, asked: Asked) -> None:
-        """Hand in an operator's request; it is answered by the next step."""
-        self._asked.append(asked)
+        """Hand in an operator's request; it is answered by the next step.
+
+        A stop waits for nothing: what was asked before it and is not done yet is refused.
+        """
+        with self._asking:
+            if asked.request is Request.STOP:
+                for early in (one for one in self._asked if one.request is not Request.STOP):
+                    early.answer = "a stop came meanwhile: ask again if it is still wanted"
+                    early.done.set()
+                self._asked = [one for one in self._asked if one.request is Request.STOP]
+            self._asked.append(asked)
+
+    def _take_asked(self) -> list[Asked]:
+        """The request whose turn it is, as often as it was made in a row: one step answers all of them."""
+        with self._asking:
+            taken = list(takewhile(lambda one: one.request is self._asked[0].request, self._asked))
+            del self._asked[: len(taken)]
+            return taken
 
     def run(self, now_s: float, asleep_s: float = 0.0) -> None:
         """Take one step. An exception of our own code stops the bay and is told to the next step.
 
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
-        asked = self._asked.pop(0) if self._asked else None
+        asked = self._take_asked()
         try:
-            self._step(now_s, asleep_s, asked.request if asked else None)
+            self._step(now_s, asleep_s, asked[0].request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
             self._charger.order(STOP)
-            self._failed(error, now_s, asked.request if asked else None)
+            self._failed(error, now_s, asked[0].request if asked else None)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
-        if asked:
-            answer = asked.answer or (self.decision.answer if self.decision else "")
-            self._answers.give(asked, answer, self._revision, now_s)
+        for one in asked:
+            self._answers.give(one, self.decision.answer if self.decision else "", self._revision, now_s)
         self._answers.look(now_s)
 
     def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:
@@ -257,7 +275,7 @@ class BayRunner:
         decision = self.decision
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
-        status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
+        status = bay_status(self.name, self._snapshot, decision, monotonic(), time())
         bay, offered, contactor = self._rules.bay, self._offered, self._contactor
         return {
             **status,

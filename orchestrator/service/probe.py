@@ -18,8 +18,8 @@ from orchestrator.model import ChargerReading
 from orchestrator.protocol.explain import explain
 from orchestrator.protocol.hextext import hex_of
 from orchestrator.protocol.sdo import NmtCommand
-from orchestrator.service.control import is_alive
 from orchestrator.service.probe_bmu import BmuProbe
+from orchestrator.service.socketfile import is_alive
 
 #: As the service waits for a reply.
 REPLY_S = 0.12

@@ -23,6 +23,7 @@ from orchestrator.link.can import CanBus, load
 from orchestrator.link.gpio import OutputLine, need_gpiod
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
+from orchestrator.service.answers import Answer, Later
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
@@ -224,7 +225,7 @@ class Supervisor:
 
     # --- what the control socket asks, in its own thread ---
 
-    def _answer(self, request: Mapping[str, object]) -> dict[str, object]:
+    def _answer(self, request: Mapping[str, object]) -> Answer | Later:
         verb = request.get("verb")
         if verb == "status":
             name = request.get("bay")
@@ -236,8 +237,7 @@ class Supervisor:
         if isinstance(verb, str) and verb in set(Request):
             names = request.get("bays")
             bays = self._bays if names is None else [self._named(name) for name in _names(names)]
-            # Once each: a request that waits behind itself would make a stop that comes after it wait, too.
-            return {"results": self._ask(list(dict.fromkeys(bays)), Request(verb))}
+            return self._ask(list(dict.fromkeys(bays)), Request(verb))
         raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
 
     def _named(self, name: object) -> BayRunner:
@@ -246,15 +246,21 @@ class Supervisor:
                 return bay
         raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
 
-    def _ask(self, bays: list[BayRunner], request: Request) -> dict[str, str]:
-        """Hand the request to each bay and gather what they say; "" is yes."""
+    def _ask(self, bays: list[BayRunner], request: Request) -> Later:
+        """Hand the request to each bay; what they say is there later, "" is yes."""
         asked = {bay.name: Asked(request) for bay in bays}
         for bay in bays:
             bay.ask(asked[bay.name])
             self._wake.put(self._bays.index(bay))
         end_s = monotonic() + ANSWER_S
         late = "the control loop has not answered: look at the service's log"
-        return {name: one.answer if one.done.wait(end_s - monotonic()) else late for name, one in asked.items()}
+
+        def results() -> Answer | None:
+            if not all(one.done.is_set() for one in asked.values()) and monotonic() < end_s:
+                return None
+            return {"results": {name: one.answer if one.done.is_set() else late for name, one in asked.items()}}
+
+        return results
 
 
 def boottime() -> float:

@@ -103,7 +103,7 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("P5", "start while latched or unknown", "`core/operator.py`: refused, and the cause named"),
     Entry("P6", "resets without a remedy", "`core/operator.py`: the fourth within an hour is refused, with the time"),
     Entry("P7", "control socket: strangers, floods",
-          "`service/control.py`: owner and root only, bounded; a stop goes before all else; who is turned away is said"),
+          "`service/control.py`: owner and root only, bounded; a stop goes first; who is turned away is said"),
     Entry("P8", "pairing not proved", "`service/starts.py`: charges of one station begin one after another"),
     Entry("P9", "not kept", "`service/store.py`: what must survive and is not on disk after 2 s lets no charge begin"),
     Entry("P10", "bay without its past", "`service/past.py`: held; a person starts it"),

@@ -59,6 +59,21 @@ def test_requests_are_answered_one_a_step_in_their_order(bench: Bench) -> None:
     assert (stop.answer, pause.answer) == ("", f"not running: {HELD}")
 
 
+def test_a_stop_waits_for_nothing_and_what_it_overtook_is_refused(bench: Bench) -> None:
+    """However much was asked before it, and however often it is asked itself: the next step does it."""
+    bench.charging()
+    early = [Asked(Request.PAUSE), *(Asked(Request.START) for _ in range(5))]
+    stops, late = [Asked(Request.STOP), Asked(Request.STOP)], Asked(Request.PAUSE)
+    for one in (*early, *stops, late):
+        bench.bay.ask(one)
+    bench.step()
+    assert [one.done.is_set() for one in (*early, *stops, late)] == [True] * 8 + [False]
+    assert {one.answer for one in early} == {"a stop came meanwhile: ask again if it is still wanted"}
+    assert {one.answer for one in stops} == {""}
+    bench.step()
+    assert late.answer == "not running: stopped by the operator; start to go on"
+
+
 def test_every_change_of_state_is_said_once(bench: Bench) -> None:
     bench.charging()
     assert [line.split(": ")[1] for line in said(bench)] == [
