@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ServiceError
+from orchestrator.link.holder import control_socket
 from orchestrator.service.control import ask
-from orchestrator.service.holder import control_socket
 
 #: A service that hangs must not keep `estop` from verifying by itself. Its own guardian gives it as long.
 ANSWER_S = 0.5

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.link.holder import control_socket
 from orchestrator.protocol.standby import STOP_FRAME
-from orchestrator.service.holder import control_socket
 from orchestrator.sim.client import PlantProcess
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
