@@ -126,20 +126,13 @@ class ChargerPort:
             return False
         return not self._thread.is_alive() or (self._line is not None and now_s - self._turn_s > STALL_S)
 
-    def end(self) -> None:
-        """Let the thread end and give the port back, without waiting. A stop that is ordered is written whole first."""
+    def close(self) -> None:
+        """End the thread and give the port back. A stop that is ordered is written whole first."""
         if self._close_by_s is None:
             self._close_by_s = self._clock() + CLOSE_S
         self._wake.set()
-
-    def close(self) -> None:
-        """`end`, and wait for it: no longer than twice CLOSE_S since `end`, since a driver may take for ever.
-
-        So ports that were all told to end first close side by side, and one that hangs costs the others nothing.
-        """
-        self.end()
-        if self._thread.is_alive() and self._close_by_s is not None:
-            self._thread.join(max(0.0, self._close_by_s + CLOSE_S - self._clock()))
+        if self._thread.is_alive():
+            self._thread.join(2 * CLOSE_S)
 
     # --- the thread ------------------------------------------------------------------------------------------------
 

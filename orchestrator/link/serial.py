@@ -64,7 +64,7 @@ class SerialLine:
     """One open serial port, used by one thread. Every method but `close` raises LinkError once the port fails."""
 
     def __init__(self, port: serial.Serial, *, locked: bool = True) -> None:
-        self._port = port
+        self._port, self._path = port, str(port.port)
         self._fd: int = port.fileno()
         self._locked = locked
         self._readable = select.poll()
@@ -121,7 +121,7 @@ class SerialLine:
                 fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._locked = True
         except BlockingIOError:
-            return str(holder(self._port.port, (os.getpid(), os.getppid())))
+            return str(holder(self._path, (os.getpid(), os.getppid())))
         except _FAILURES as error:
             raise self._failed(error) from error
         return ""
@@ -135,7 +135,7 @@ class SerialLine:
                 raise serial.SerialTimeoutException
         except (serial.SerialTimeoutException, BlockingIOError) as error:
             self._forget_output()
-            raise LinkError(f"{self._port.port}: {_STALLED}") from error
+            raise LinkError(f"{self._path}: {_STALLED}") from error
         except _FAILURES as error:
             raise self._failed(error) from error
 
@@ -181,7 +181,7 @@ class SerialLine:
             return  # then there is no port left that could send it
 
     def _failed(self, error: Exception) -> LinkError:
-        return LinkError(f"{self._port.port}: {_sentence(error, self._port.port, otherwise=_GONE)}")
+        return LinkError(f"{self._path}: {_sentence(error, self._path, otherwise=_GONE)}")
 
 
 def _open(path: str, *, exclusive: bool | None) -> serial.Serial:

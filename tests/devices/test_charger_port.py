@@ -7,15 +7,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from threading import Event
 
 import pytest
 
 from orchestrator.config.station import ChargerConfig, Limits
 from orchestrator.devices import line_quality
-from orchestrator.devices.charger import CLOSE_S, LOOK_S, REOPEN_S, ChargerPort, Line
+from orchestrator.devices.charger import LOOK_S, REOPEN_S, ChargerPort, Line
 from orchestrator.errors import LinkError
 from orchestrator.interlock import Grant
 from orchestrator.keys import Range
@@ -594,30 +592,6 @@ def test_settings_that_cannot_be_asked_for_keep_no_stop_back(
     with running(pty.path, open_line=lambda: line) as bench:
         assert wait_frames(charger, 3) == [REST_STOP, OPERATION_STOP, POLL]
         bench.wait_online()
-
-
-def test_a_close_that_hangs_costs_the_others_nothing(tmp_path: Path) -> None:
-    hangs = Event()
-
-    class Stuck(SerialLine):
-        def close(self) -> None:
-            hangs.wait(30)
-            super().close()
-
-    with ExitStack() as stack:
-        ptys = [stack.enter_context(plugged(tmp_path / str(number))) for number in range(4)]
-        benches = [Bench(pty.path, ControlMode.MANUAL, partial(Stuck.open, pty.path)) for pty in ptys]
-        for bench in benches:
-            bench.port.start()
-            wait_until(lambda bench=bench: bench.link.stop_sent_s is not None)  # type: ignore[misc]
-        began_s = time.monotonic()
-        for bench in benches:
-            bench.port.end()
-        for bench in benches:
-            bench.port.close()
-        assert time.monotonic() - began_s < 2 * CLOSE_S + 1
-        hangs.set()
-        wait_until(lambda: not any(bench.port._thread.is_alive() for bench in benches))
 
 
 def test_a_stalled_line_is_a_problem_and_stops_first_when_it_moves_again(

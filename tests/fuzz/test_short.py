@@ -21,7 +21,7 @@ from orchestrator.devices import battery, dialogue
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.model import Measurement
 from orchestrator.protocol import frame, standby, words
-from orchestrator.service import control, kept, laststop
+from orchestrator.service import control, kept, lastline
 from orchestrator.service.guardian import Guardian
 from orchestrator.service.kept import Kept
 from orchestrator.service.supervisor import Supervisor
@@ -185,7 +185,7 @@ def keeps_old_ports(patch: Patch) -> None:
 
 
 def any_name(patch: Patch) -> None:
-    patch.setattr(laststop, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
+    patch.setattr(lastline, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
 
 
 #: Target → what somebody might get wrong there.
