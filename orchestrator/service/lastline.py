@@ -99,12 +99,13 @@ class LastLine:
 
     def _run(self) -> None:
         while not self._over.is_set() and self.why != HELD:
-            began_s = time.monotonic()
+            began_s, stood_by = time.monotonic(), bool(self._proofs)
             try:
                 self._round(began_s)
             except Exception as error:  # noqa: BLE001 - a thread that dies here is a charger that nobody stops
                 self._fail(f"internal: {error!r}")
-            self._pause_until(began_s + (AGAIN_S if self._proofs else ROUND_S))
+            if self._proofs or not stood_by:  # one that runs again is stopped at once
+                self._pause_until(began_s + (AGAIN_S if self._proofs else ROUND_S))
         self._close()
 
     def _round(self, began_s: float) -> None:
