@@ -21,7 +21,7 @@ from orchestrator.devices import battery, dialogue
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.model import Measurement
 from orchestrator.protocol import frame, standby, words
-from orchestrator.service import answers, control, laststop, typed
+from orchestrator.service import answers, control, lastline, typed
 from orchestrator.service.answers import Later
 from orchestrator.service.client import Client
 from orchestrator.service.guardian import Guardian

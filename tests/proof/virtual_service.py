@@ -36,6 +36,7 @@ from orchestrator.devices import charger as charger_module
 from orchestrator.keys import Range
 from orchestrator.link import can as can_module
 from orchestrator.link import serial as serial_module
+from orchestrator.link import settings as settings_module
 from orchestrator.model import ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
 from orchestrator.service import reload as reload_module
@@ -303,7 +304,11 @@ class World:
             reload_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
             charger_module: {"Event": event, "Thread": thread},
             bus_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
-            serial_module: {"time": SimpleNamespace(sleep=self._sleep), "select": fake["select"], "os": fake["os"]},
+            serial_module: {
+                "time": SimpleNamespace(sleep=self._sleep),
+                **{name: fake[name] for name in ("select", "os", "fcntl")},
+            },
+            settings_module: {name: fake[name] for name in ("termios", "fcntl")},
             can_module: {"_open_bus": lambda _: Driver(self.bus, time)},
             serial.serialposix: fake,
             serial.serialutil.Timeout: {"TIME": time.clock},

@@ -8,6 +8,7 @@ import os
 import select
 import termios
 from collections.abc import Callable, Iterable
+from copy import deepcopy
 from dataclasses import dataclass, field
 from itertools import count
 from math import inf
@@ -45,6 +46,7 @@ class Tty:
     listener: Callable[[bytes], None] = lambda _: None
     on_delivered: Callable[[int], None] = lambda _: None  #: so many bytes have come in
     opened: int = 0  #: how many descriptors
+    settings: list[Any] = field(default_factory=lambda: [0, 0, 0, 0, 0, 0, [b"\0"] * 32])  #: as tcgetattr gives them
     locked: bool = False
     news: Waiting = field(init=False)
 
@@ -83,7 +85,8 @@ class Kernel:
         fake_os.pipe = self.pipe
         fake_termios = SimpleNamespace(**vars(termios))
         fake_termios.tcgetattr = self._tcgetattr
-        fake_termios.tcsetattr = lambda fd, *_: self._touch("tcsetattr", fd)
+        fake_termios.tcsetattr = self._tcsetattr
+        fake_termios.tcflow = lambda fd, _: self._touch("tcflow", fd)
         fake_termios.tcflush = self._tcflush
         fake_select = SimpleNamespace(**vars(select))
         fake_select.select, fake_select.poll = self.select, lambda: Poll(self)
@@ -190,7 +193,11 @@ class Kernel:
 
     def _tcgetattr(self, fd: int) -> list[Any]:
         self._touch("tcgetattr", fd)
-        return [0, 0, 0, 0, 0, 0, [b"\0"] * 32]
+        return deepcopy(self._tty(fd).settings)
+
+    def _tcsetattr(self, fd: int, _when: int, settings: list[Any]) -> None:
+        self._touch("tcsetattr", fd)
+        self._tty(fd).settings = deepcopy(settings)
 
     def _tcflush(self, fd: int, queue: int) -> None:
         self._touch("tcflush", fd)
