@@ -40,6 +40,8 @@ QUALIFYING = frozenset({State.QUALIFYING})
 UNSTOPPED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
 #: A heartbeat, the NMT start that answers it, and the next heartbeat, at the longest period that can be asked for.
 NMT_OBEY_S = 4.0
+#: Steady values that all change at once are read from the one a moment before the other.
+FOLLOWS_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,11 +135,11 @@ FAULTS: tuple[Row, ...] = (
     Row("amps_disagree", "B16", E.TRIP, Clear.RESET, measured.amps_disagree, ENERGISED,
         "check for loads on the battery and for a wrong node id, then reset", for_s=5),
     Row("charger_frozen", "C20", E.STOP, Clear.BACKOFF, measured.charger_frozen, ENERGISED,
-        "switch the charger off and on again; if it comes back, replace it"),
+        "switch the charger off and on again; if it comes back, replace it", for_s=FOLLOWS_S),
     Row("charger_frozen_at_rest", "C31", E.NO_START, Clear.BACKOFF, measured.charger_frozen_at_rest, AT_REST,
-        "switch the charger off and on again; if it comes back, replace it"),
+        "switch the charger off and on again; if it comes back, replace it", for_s=FOLLOWS_S),
     Row("bmu_frozen", "B23", E.STOP, Clear.BACKOFF, measured.bmu_frozen, ENERGISED,
-        "restart the BMU; if it comes back, have it replaced"),
+        "restart the BMU; if it comes back, have it replaced", for_s=FOLLOWS_S),
     Row("pack_collapsed", "B24", E.TRIP, Clear.RESET, pack.collapsed, ENERGISED,
         "keep people away; inspect the pack and its contacts, then reset"),
     Row("back_feed", "C12", E.TRIP, Clear.RESET, measured.back_feed, ENERGISED,

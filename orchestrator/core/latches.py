@@ -88,7 +88,7 @@ def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMem
     now_s = f.now_s
     if fault.raised_s is None:
         remembered = tuple(t for t in fault.strikes if now_s - t < STRIKES_S)
-        seen_s = drained(fault.seen_s, passed_s, holds=False)
+        seen_s = drained(fault.seen_s, passed_s, holds=False) if row.for_s else 0.0
         polls, poll_t_s = _polls(fault, f, holds=False) if row.polls > 1 else (0.0, 0.0)
         if not (remembered or seen_s or polls):
             return None

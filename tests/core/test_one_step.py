@@ -388,7 +388,7 @@ def test_from_stage_to_stage_the_charge_goes_on() -> None:
     decision, after = whole(Edge(goes, None, memory, PULSE, bmu={"voltage_v": 35.1}, charger={"voltage_v": 35.1}))
     assert decision.state is CONTINUOUS
     assert after.resumed
-    assert decision.session == NOW
+    assert decision.session == replace(NOW, pulse_s=0.25, rise_s=0.0, rise_v=35.1)
 
 
 def test_a_charge_that_ends_at_rest_says_why_it_ends_there() -> None:

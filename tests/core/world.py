@@ -138,6 +138,7 @@ class World:
         self._fitted_pct = self.values["soc_pct"] if "voltage_v" in battery else None
         self._fitted_v = self.values["voltage_v"]
         self.counted_min = 60.0  #: what a BMU counts goes on moving, whatever stands still
+        self.counts = True
         self.frozen: set[str] = set()  #: values that are not read any more
         self.pack_amps: float | None = None  #: what the BMU measures, if not what flows
         self.shunt = 1.0  #: what share of it the BMU measures
@@ -289,7 +290,7 @@ class World:
                 self.charger.obey(command)
         if self.values["current_a"] is not None:
             self.values["current_a"] = self._amps() * self.shunt if self.pack_amps is None else self.pack_amps
-        self.counted_min += self._amps() * dt_s / 60
+        self.counted_min += self._amps() * dt_s / 60 if self.counts else 0.0
 
     def _fit(self) -> None:
         """Where a test has set the SOC alone, the voltage follows it."""

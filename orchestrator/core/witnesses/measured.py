@@ -83,7 +83,7 @@ def charger_frozen_at_rest(f: Facts) -> str | None:
     if still is None or not f.standby or not f.connected or f.now_s - still.t_s < STILL_S or f.pack_v is None:
         return None
     moved_v = abs(f.pack_v - still.pack_v)
-    if moved_v <= MOVED_V:
+    if moved_v <= MOVED_V or abs(f.pack_v - still.volts) <= MOVED_V:  # it moved to where the charger had been all along
         return None
     return (
         f"the charger has said {still.volts:.2f} V for {f.now_s - still.t_s:.0f} s at rest, while the BMU's voltage "
