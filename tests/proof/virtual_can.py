@@ -13,7 +13,7 @@ from orchestrator.sim.can_noise import Bus, BusNoise
 from orchestrator.sim.can_wire import PERFECT, Handler
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
-from tests.proof.virtual_tty import Calls
+from tests.proof.virtual_kernel import Calls
 
 #: One frame of 8 bytes at 250 kbit/s, stuff bits and pause included.
 FRAME_S = 0.0005

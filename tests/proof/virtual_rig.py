@@ -46,7 +46,8 @@ class MemoryWire(ChargerWire):
         self.on_started: Callable[[float], None] = lambda _now_s: None  #: a frame has switched the output on
 
     def open(self) -> None:
-        self._plugged = self._tty.present = True
+        self._plugged = True
+        self._tty.plug()
 
     def close(self) -> None:
         self._plugged = False
