@@ -61,6 +61,7 @@ class BusWire:
         if not (self.down or self.lost):
             if self.drivers and not message.is_error_frame:
                 self.on_frame(message.arbitration_id, bytes(message.data))
+            self.drivers = [driver for driver in self.drivers if driver.process is None or driver.process.status is None]
             for driver in self.drivers:
                 driver.deliver(message)
 
@@ -86,6 +87,7 @@ class Driver(can.BusABC):
             raise OSError(100, "Network is down")
         self._wire, self._time, self._epoch = wire, time, wire.epoch
         self._heard: deque[can.Message] = deque()
+        self.process = time.me().process  #: whose driver it is; when that is dead, nobody hears
         self.news = Waiting(time)
         super().__init__(channel="virtual time")
         wire.drivers.append(self)

@@ -58,6 +58,21 @@ class MemoryWire(ChargerWire):
     def is_open(self) -> bool:
         return self._plugged
 
+    @property
+    def is_clear(self) -> bool:
+        return self._tty.clear
+
+    def set_speed(self, speed: int) -> None:
+        self._tty.taken_over(speed)
+
+    def lock(self) -> None:
+        if self._tty.lock is None:
+            self._tty.lock = self
+
+    def unlock(self) -> None:
+        if self._tty.lock is self:
+            self._tty.lock = None
+
     def _receive(self, chunk: bytes) -> None:
         now_s = self._time.now_s
         if self.counters.first_byte_s is None:
@@ -94,7 +109,7 @@ class VirtualRig(Rig):
         if nature.running:
             charger.run, charger.mode, charger.current_limit = True, ChargeMode.CHARGE, len(charger.steps_a) - 1
         self.bay = Bay(charger, nature.pack)
-        self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c)
+        self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c, nature.pack.cells)
         self.injected_s: float | None = None
         self.tty = tty
         self._loop = cast("Any", time)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from orchestrator.sim.line import garbled
+from orchestrator.sim.line import garbled, is_clear
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
 
@@ -29,18 +29,6 @@ def fresh_attributes() -> Attributes:
         termios.B9600,
         [b"\0"] * 32,
     ]
-
-
-def passes(attributes: Attributes, baud: int = termios.B19200) -> bool:
-    """Whether bytes come through as they are, both ways, to and from a device of 19200 8N1 without flow control."""
-    iflag, oflag, cflag, lflag, _, speed, _ = attributes
-    framed = cflag & (termios.CSIZE | termios.PARENB | termios.CSTOPB | termios.CRTSCTS | termios.CREAD)
-    changed = iflag & (termios.ISTRIP | termios.ICRNL | termios.IXON)
-    return (
-        speed == baud
-        and framed == termios.CS8 | termios.CREAD
-        and not (changed or oflag & termios.OPOST or lflag & termios.ICANON)
-    )
 
 
 @dataclass(slots=True)
@@ -67,7 +55,7 @@ class Tty:
     @property
     def clear(self) -> bool:
         """Whether what is said is what is heard."""
-        return passes(self.attributes)
+        return is_clear(self.attributes)
 
     def take(self, data: bytes) -> None:
         """Bytes go out."""
