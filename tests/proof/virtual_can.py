@@ -44,6 +44,10 @@ class BusWire:
         """A node says something."""
         self._put(self._to_drivers, cob_id, data)
 
+    def raw(self, message: can.Message) -> None:
+        """Somebody sends a frame of another kind."""
+        self._time.call_at(self._slot(), self._to_drivers, message)
+
     def from_driver(self, cob_id: int, data: bytes) -> None:
         self._put(self._to_nodes, cob_id, data)
 
