@@ -226,7 +226,7 @@ class Gateway:
         if process is not None:
             process.signal(number)
 
-    def cut_power(self) -> str:
+    def cut_power(self, how: str = "") -> str:
         """The gateway has no power any more; the chargers have. What the disk had written by then."""
         for process in list(self.processes.all.values()):
             if not process.dead:
@@ -241,7 +241,7 @@ class Gateway:
         for stream in self.kernel.output.values():
             stream.stopped = False
         self.bus.drivers.clear()
-        return self.disk.cut(self._dice)
+        return self.disk.cut(self._dice, how)
 
     # --- what is said and asked ---------------------------------------------------------------------------------------
 

@@ -36,6 +36,8 @@ OPEN_S = 2.0
 ASKED_S, KILLED_S, FROZEN_S, TERM_S, ESTOP_S = 0.6, 0.25, 1.2, 0.7, 0.5
 #: Over this the current is held against what was ordered.
 MEAN_S = 12.0
+#: Who runs again without an order this often within that time was not stopped, and is called so.
+RESTARTS, RESTARTS_S = 3, 25.0
 #: What latched this long ago is on the disk.
 KEPT_S = 2.6
 REST = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED", "QUALIFYING", "OFFLINE"})
@@ -59,11 +61,8 @@ class Charger:
     tripped_s: float | None = None  #: since when the status says TRIPPED
     asked_stop: bool = False  #: an operator's stop was accepted, and no start since
     flown: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=300))
-    stopped_s: float = 0.0  #: when it last understood a stop
-
-    @property
-    def model(self) -> Any:
-        return self.rig.wire.charger
+    stopped_s: float = 0.0  #: when a stop was last understood at its port
+    onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
 
     @property
     def flows(self) -> bool:
@@ -78,7 +77,6 @@ class Charger:
         charger = self.rig.bay.charger
         return not (
             charger.ignores_stop or charger.stops_left < 1 or charger.restless_s is not None or charger.rogue
-            or self.rig.wire.charger is not charger
         )  # fmt: skip
 
     def honest(self, kind: Kind, *fields: str) -> bool:
@@ -107,7 +105,8 @@ class Reason:
 
 
 def _temperature_honest(charger: Charger) -> bool:
-    return "temperature_c" not in charger.rig.bay.falsify and not charger.rig.forged
+    """What somebody else sends in the BMU's name is no excuse: the BMU answers as well, and differently."""
+    return "temperature_c" not in charger.rig.bay.falsify
 
 
 def _volts(charger: Charger) -> bool:
@@ -138,7 +137,7 @@ def _too_much(judge: "Judge", charger: Charger) -> bool:
 
 
 REASONS: tuple[Reason, ...] = (
-    Reason("no order", 1.0, lambda _, c: c.meant != "run"),
+    Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run"),
     Reason("operator's stop", ASKED_S, lambda _, c: c.asked_stop),
     Reason("hot", LINE_S, _hot),
     Reason("cold", LINE_S, _cold),
@@ -174,11 +173,18 @@ class Judge:
         self._read = 0  # lines that were said
         for charger in self.chargers:
             charger.rig.tty.on_written = lambda data, charger=charger: self._written(charger, data)
-            charger.rig.wire.on_started = lambda now_s, charger=charger: self._started(charger, now_s)
+            charger.rig.wire.on_started = lambda _, charger=charger: self._started(charger)
 
     def entry(self, charger: Charger) -> Any:
         """The bay of the present life that this charger's port belongs to."""
         return next((entry for entry in self.life if entry.port == charger.number), None)
+
+    def by(self, charger: Charger) -> Charger:
+        """At whose port this charger hangs: its own, unless cables are crossed."""
+        model = charger.rig.bay.charger
+        return charger if charger.rig.wire.charger is model else next(
+            one for one in self.chargers if one.rig.wire.charger is model
+        )  # fmt: skip
 
     def find(self, charger: int, name: str, text: str) -> None:
         if not any(f" {name}: " in line for line in self.wrong):
@@ -194,15 +200,12 @@ class Judge:
         if limit := LIMIT.search(data):
             charger.limit = limit[1][0]
 
-    def _started(self, charger: Charger, now_s: float) -> None:
+    def _started(self, charger: Charger) -> None:
         """A frame has switched an output on: of the charger behind this port."""
-        if charger.rig.wire.charger is not charger.rig.bay.charger:
-            return
         if charger.waits:
             self.find(charger.number, "by itself", f"it was started, and waits for a person: {charger.waits}")
         if self.booted_s is None or charger.meant_s < self.booted_s:
             self.find(charger.number, "by itself", "it was started by nobody")
-        del now_s
 
     # --- what people are told, and ask --------------------------------------------------------------------------------
 
@@ -263,6 +266,10 @@ class Judge:
         """No process of ours is left."""
         self.booted_s = None
 
+    def helped(self) -> None:
+        """Somebody stops the station without a service."""
+        self.booted_s = self.time.now_s if self.booted_s is None else self.booted_s
+
     def meant(self, within_s: float, why: str) -> None:
         """A stop of every charger of this life is meant, now."""
         for charger in self.chargers:
@@ -270,12 +277,14 @@ class Judge:
                 self._meant(charger, self.time.now_s, within_s, why)
 
     def _meant(self, charger: Charger, since_s: float, within_s: float, why: str) -> None:
-        if charger.flows and charger.meant == "run":
+        if charger.meant == "run" and charger.rig.wire.charger.running:
             self.time.call_at(max(since_s + within_s, self.time.now_s), self._understood, charger, since_s, why)
 
     def _understood(self, charger: Charger, since_s: float, why: str) -> None:
-        crossed = charger.rig.wire.charger is not charger.rig.bay.charger
-        if charger.stopped_s < since_s and charger.deaf_s < since_s and self.booted_s is not None and not crossed:
+        due_s = charger.rig.tty.changed_s + LINE_S
+        if due_s > self.time.now_s:  # the line was set up otherwise just then
+            self.time.call_at(due_s, self._understood, charger, since_s, why)
+        elif charger.stopped_s < since_s and charger.deaf_s < since_s and self.booted_s is not None:
             self.find(
                 charger.number, "not understood", f"{why}, and {self.time.now_s - since_s:.2f} s later it knows of none"
             )
@@ -301,8 +310,6 @@ class Judge:
         troubled = any(trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles)
         if not tty.present or tty.stalled or tty.stolen or wire.mute_rx or troubled:
             charger.deaf_s = now_s
-        elif now_s - tty.changed_s < LINE_S:
-            charger.deaf_s = now_s
 
     def _judge(self, charger: Charger, now_s: float) -> None:
         for reason in REASONS:
@@ -313,10 +320,23 @@ class Judge:
             if self.booted_s is None or self.entry(charger) is None:
                 charger.since_s[reason.name] = now_s
                 continue
-            reached_s = max(since_s, self.booted_s + OPEN_S, charger.deaf_s + OPEN_S if charger.deaf_s else 0.0)
+            port = self.by(charger)
+            deaf_s = port.deaf_s + OPEN_S if port.deaf_s else 0.0
+            reached_s = max(since_s, self.booted_s + OPEN_S, deaf_s, port.rig.tty.changed_s)
             if charger.obeys and now_s - reached_s > reason.within_s:
                 self.find(charger.number, reason.name, f"current flows for {now_s - since_s:.2f} s, {self._state(charger)}")
             self._judge_named(charger, reason, since_s, now_s)
+        self._judge_restless(charger, now_s)
+
+    def _judge_restless(self, charger: Charger, now_s: float) -> None:
+        """Who is stopped, and runs again and again, was never stopped."""
+        if charger.since_s.get("no order") == now_s and charger.seen:
+            charger.onsets.append(now_s)
+        onsets = charger.onsets
+        if self.booted_s is None or len(onsets) < RESTARTS or onsets[0] < self.booted_s:
+            return
+        if now_s - onsets[0] < RESTARTS_S and charger.named_s < onsets[0] and now_s - onsets[-1] > MARGIN_S:
+            self.find(charger.number, "nobody is told", f"it runs again and again by itself, {self._state(charger)}")
 
     def _judge_named(self, charger: Charger, reason: Reason, since_s: float, now_s: float) -> None:
         """Who cannot be stopped is called so."""
@@ -332,7 +352,8 @@ class Judge:
 
     def _judge_mean(self, charger: Charger, now_s: float) -> None:
         """On the average, no more flows than was ordered."""
-        ordered_a = STEPS_A[min(charger.limit, 4)] if charger.meant == "run" else 20.0
+        port = self.by(charger)
+        ordered_a = STEPS_A[min(port.limit, 4)] if port.meant == "run" else 20.0
         flown = charger.flown
         flown.append((now_s, charger.current_a, ordered_a))
         while flown and now_s - flown[0][0] > MEAN_S:

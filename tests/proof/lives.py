@@ -26,6 +26,10 @@ LOOK_S, STATUS_S = 0.05, 0.25
 RESTART_S = 2.0
 
 
+#: After these the service may end.
+EXCUSES = ("term", "kill", "kill guardian", "kill both", "freeze", "power")
+
+
 @dataclass(slots=True)
 class Lived:
     """What became of a script."""
@@ -58,6 +62,7 @@ class Player:
         self.began_s = self.time.now_s
         self.gateway.on_end = self._ended
         self._wanted = False  # somebody wants the service to run
+        self._excused = False  # something has happened for which it may end
         self._charged: set[int] = set()
 
     def _cross(self) -> None:
@@ -96,6 +101,9 @@ class Player:
     # --- what happens -------------------------------------------------------------------------------------------------
 
     def _happen(self, hazard: Hazard) -> None:
+        call, place = (*hazard.detail.split(":"), "")[:2]
+        hangs = hazard.what == "slow" and place == "port" and call not in ("open", "close")
+        self._excused = self._excused or hangs or hazard.what in EXCUSES
         getattr(self, f"_{hazard.what.replace(' ', '_')}")(hazard)
 
     def _rigs(self, hazard: Hazard) -> list[Any]:
@@ -110,6 +118,8 @@ class Player:
 
     def _ended(self, process: Process) -> None:
         """A process of ours has ended by itself."""
+        if process in (self.gateway.controller, self.gateway.service) and not self._excused:
+            self.judge.find(-1, "ended", f"{process.name}, though nobody wanted it to, and no thread of it could hang")
         self.judge.ended(process.name, process.status if process.status is not None else self.gateway.ended[-1].status)
         if process is self.gateway.controller:
             self.judge.dies("the controller has ended", orderly=self.gateway.ended[-1].status == 0)
@@ -172,15 +182,15 @@ class Player:
             self.judge.meant(FROZEN_S, "the controller hangs")
             self.gateway.signal(self.gateway.controller, signal.SIGSTOP)
 
-    def _power(self, _: Hazard) -> None:
+    def _power(self, hazard: Hazard) -> None:
         self._wanted = False
         self.judge.dies("the power was cut")
         self.judge.gone()
-        self.gateway.cut_power()
+        self.gateway.cut_power(hazard.detail)
 
     def _estop(self, _: Hazard) -> None:
-        if self.judge.booted_s is not None:
-            self.judge.meant(ESTOP_S, "estop")
+        self.judge.helped()
+        self.judge.meant(ESTOP_S, "estop")
         self.gateway.estop()
 
     def _edit(self, hazard: Hazard) -> None:
@@ -291,13 +301,17 @@ class Player:
         {
             "master": lambda: self._repeat(20, 0.1, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
             "abort": lambda: bus.from_driver(0x600 + node, b"\x80\x00\x60\x00\x00\x00\x04\x05"),
-            "forged": lambda: self._repeat(200, 0.05, lambda: bus.send(0x580 + node, b"\x43\x04\x60\x00\xc8\x00\x00\x00")),
+            "forged": lambda: bus.subscribe(0x600 + node, self, self._forge),
             "fd": lambda: self._repeat(50, 0.02, lambda: bus.raw(_fd(0x580 + node))),
             "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
             "heartbeat": lambda: bus.from_driver(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
             "flood": lambda: self._repeat(400, 0.002, lambda: bus.send(0x123, bytes(8))),
         }[hazard.detail]()
-        self.gateway.rigs[hazard.bay].forged = self.gateway.rigs[hazard.bay].forged or hazard.detail == "forged"
+
+    def _forge(self, cob_id: int, data: bytes) -> None:
+        """Somebody answers in the BMU's name, and is quicker: 20.0 °C."""
+        if data[:3] == b"\x40\x04\x60":
+            self.gateway.bus.send(cob_id - 0x80, b"\x43\x04\x60\x00\xc8\x00\x00\x00")
 
     def _repeat(self, times: int, every_s: float, act: Callable[[], object]) -> None:
         act()

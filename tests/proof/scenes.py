@@ -40,9 +40,11 @@ SCENES: dict[str, Script] = {
         Hazard(1.0, "stderr", value=1), h(4, "kill both"), h(8, "stderr", value=0), h(8, "boot"), systemd=False, end_s=50.0
     ),
     "disk full": _scene(
-        Hazard(1.0, "slow", -1, 0.0, "write:disk:60:ENOSPC"), h(4, "kill both"), h(8, "boot"), systemd=False, end_s=50.0
+        Hazard(1.0, "slow", -1, 0.0, "write:disk:22:ENOSPC"), h(4, "kill both"), h(8, "boot"), systemd=False, end_s=50.0
     ),
-    "stopped, then no power": _scene(h(0, "ask", 1, None, "stop"), h(3, "power"), h(5, "boot"), end_s=T + 20),
+    "stopped, then no power": _scene(h(0, "ask", 1, None, "stop"), h(3, "power", detail="nothing more"), h(5, "boot"), end_s=T + 20),
+    "charging, then no power": _scene(h(0, "power", detail="nothing more"), h(3, "boot"), end_s=T + 20),
+    "charging, then the disk is torn": _scene(h(0, "power", detail="some of it, torn"), h(3, "boot"), end_s=T + 20),
     "tripped, taken out, put back": _scene(
         h(0, "fault", 0, None, "status_bits"), h(5, "term"), h(7, "edit", 0, None, "remove"), h(7.2, "boot"),
         h(14, "term"), h(16, "edit", 0, None, "restore"), h(16.1, "heal", 0), h(16.2, "boot"), end_s=T + 34,
@@ -69,6 +71,11 @@ SCENES: dict[str, Script] = {
     ),
     "runs again": _scene(h(0, "fault", 2, None, "runs_again"), h(1, "ask", 2, None, "stop"), end_s=T + 24),
     "crossed cables": _scene(bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=40.0),
+    "crossed cables, hot": _scene(
+        h(0, "fault", 0, 60.0, "over_temperature"), bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=T + 14
+    ),
+    "obeys once": _scene(h(0, "fault", 0, None, "obeys_once"), h(1, "ask", 0, None, "stop"), h(4, "ask", 0, None, "start"),
+                         h(14, "ask", 0, None, "stop"), end_s=T + 26),
     # 5. One port delays another.
     "half dead adapter, killed": _scene(
         h(0, "slow", 0, 5.0, "open:port:60"), h(0.1, "fault", 0, None, "port_gone"), h(0.5, "heal", 0), h(1.5, "kill")
@@ -77,6 +84,9 @@ SCENES: dict[str, Script] = {
         h(0, "slow", 0, 5.0, "open:port:60"), h(1, "kill both"), h(1.3, "estop"), systemd=False
     ),
     "a port that closes never": _scene(h(0, "slow", 0, FOR_EVER, "close:port:60"), h(0.5, "kill")),
+    "a port that closes slowly": _scene(
+        h(0, "slow", 0, 5.0, "close:port:60"), h(0.5, "fault", 0, None, "port_gone"), h(1.5, "heal", 0), end_s=T + 16
+    ),
     "settings take for ever": _scene(h(0, "slow", 0, FOR_EVER, "tcsetattr:port:60"), h(0.5, "kill")),
     # 7. Conditions that come and go.
     "limit goes back": _scene(

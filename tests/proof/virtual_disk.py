@@ -143,9 +143,9 @@ class Disk:
 
     # --- what a power cut does ----------------------------------------------------------------------------------------
 
-    def cut(self, dice: Random) -> str:
-        """The power fails; in a word what the file system had written by then."""
-        how = dice.choice(("nothing more", "everything", "the first part", "some of it", "some of it, torn"))
+    def cut(self, dice: Random, how: str = "") -> str:
+        """The power fails; in a word what the file system had written by then (by chance, if not said)."""
+        how = how or dice.choice(("nothing more", "everything", "the first part", "some of it", "some of it, torn"))
         pending = self._pending
         chosen: Iterator[Change] = {
             "nothing more": lambda: iter(()),

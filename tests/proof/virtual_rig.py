@@ -104,7 +104,6 @@ class VirtualRig(Rig):
 
     wire: MemoryWire
     frozen = False  #: its BMU says what it once said, in all its words
-    forged = False  #: somebody else sends its BMU's temperature
     steady = False  #: its BMU tells the same lie in every answer
 
     def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:
