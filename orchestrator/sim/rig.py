@@ -34,6 +34,7 @@ class AsBuilt:
 
     control_mode: ControlMode
     ambient_c: float
+    cells: int = 13
 
 
 class Rig:
@@ -41,7 +42,7 @@ class Rig:
 
     def __init__(self, loop: asyncio.AbstractEventLoop, can_wire: CanWire, bay: Bay, setup: Setup) -> None:
         self.bay = bay
-        self.as_built = AsBuilt(bay.charger.control_mode, bay.pack.ambient_c)
+        self.as_built = AsBuilt(bay.charger.control_mode, bay.pack.ambient_c, bay.pack.cells)
         self.injected_s: float | None = None  #: when the newest fault was injected, `time.monotonic()`
         self._loop = loop
         self._speed = setup.speed
@@ -78,3 +79,8 @@ class Rig:
     def _readout(self) -> Readout:
         self.catch_up()
         return self.bay.readout()
+
+
+def cross_cables(one: Rig, other: Rig) -> None:
+    """Swap the serial cables of two bays: what is ordered for one is done by the charger of the other."""
+    one.wire.charger, other.wire.charger = other.wire.charger, one.wire.charger

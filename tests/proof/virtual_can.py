@@ -13,7 +13,7 @@ from orchestrator.sim.can_noise import Bus, BusNoise
 from orchestrator.sim.can_wire import PERFECT, Handler
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
-from tests.proof.virtual_tty import Calls
+from tests.proof.virtual_kernel import Calls
 
 #: One frame of 8 bytes at 250 kbit/s, stuff bits and pause included.
 FRAME_S = 0.0005
@@ -44,6 +44,10 @@ class BusWire:
         """A node says something."""
         self._put(self._to_drivers, cob_id, data)
 
+    def raw(self, message: can.Message) -> None:
+        """Somebody sends a frame of another kind."""
+        self._time.call_at(self._slot(), self._to_drivers, message)
+
     def from_driver(self, cob_id: int, data: bytes) -> None:
         self._put(self._to_nodes, cob_id, data)
 
@@ -61,6 +65,7 @@ class BusWire:
         if not (self.down or self.lost):
             if self.drivers and not message.is_error_frame:
                 self.on_frame(message.arbitration_id, bytes(message.data))
+            self.drivers = [driver for driver in self.drivers if driver.process is None or driver.process.status is None]
             for driver in self.drivers:
                 driver.deliver(message)
 
@@ -86,6 +91,7 @@ class Driver(can.BusABC):
             raise OSError(100, "Network is down")
         self._wire, self._time, self._epoch = wire, time, wire.epoch
         self._heard: deque[can.Message] = deque()
+        self.process = time.me().process  #: whose driver it is; when that is dead, nobody hears
         self.news = Waiting(time)
         super().__init__(channel="virtual time")
         wire.drivers.append(self)

@@ -46,7 +46,8 @@ class MemoryWire(ChargerWire):
         self.on_started: Callable[[float], None] = lambda _now_s: None  #: a frame has switched the output on
 
     def open(self) -> None:
-        self._plugged = self._tty.present = True
+        self._plugged = True
+        self._tty.plug()
 
     def close(self) -> None:
         self._plugged = False
@@ -56,6 +57,21 @@ class MemoryWire(ChargerWire):
     @property
     def is_open(self) -> bool:
         return self._plugged
+
+    @property
+    def is_clear(self) -> bool:
+        return self._tty.clear
+
+    def set_speed(self, speed: int) -> None:
+        self._tty.taken_over(speed)
+
+    def lock(self) -> None:
+        if self._tty.lock is None:
+            self._tty.lock = self
+
+    def unlock(self) -> None:
+        if self._tty.lock is self:
+            self._tty.lock = None
 
     def _receive(self, chunk: bytes) -> None:
         now_s = self._time.now_s
@@ -87,13 +103,15 @@ class VirtualRig(Rig):
     """What `sim.faults` acts upon."""
 
     wire: MemoryWire
+    frozen = False  #: its BMU says what it once said, in all its words
+    steady = False  #: its BMU tells the same lie in every answer
 
     def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:
         charger = Charger(nature.control)
         if nature.running:
             charger.run, charger.mode, charger.current_limit = True, ChargeMode.CHARGE, len(charger.steps_a) - 1
         self.bay = Bay(charger, nature.pack)
-        self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c)
+        self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c, nature.pack.cells)
         self.injected_s: float | None = None
         self.tty = tty
         self._loop = cast("Any", time)
