@@ -15,12 +15,13 @@ import pytest
 
 from orchestrator.errors import LinkError, RefusedError
 from orchestrator.link import can_text
-from orchestrator.link.can import DEFAULT_BITRATE, MAX_GARBAGE, CanBus
+from orchestrator.link.can import DEFAULT_BITRATE, MAX_FOREIGN, MAX_GARBAGE, CanBus
 from orchestrator.protocol.sdo import NmtCommand
 from tests.link.ptys import Pty
 from tests.waiting import wait_until
 
 READ = bytes.fromhex("40 00 60 00 00 00 00 00")
+OTHER_READ = bytes.fromhex("40 01 60 00 00 00 00 00")
 ANSWER = bytes.fromhex("43 00 60 00 F8 FF 40 09")
 Frames = list[tuple[int, bytes]]
 
@@ -85,15 +86,44 @@ def test_foreign_frames_do_not_disturb(pair: Pair) -> None:
     other.send(message(0x123, b"abc"))
     other.send(message(0x470, b"\x70"))  # the BMU's older protocol
     other.send(message(0x7E4, bytes(8)))  # LSS, which canopen would keep for ever
-    for _ in range(5):
-        bus.receive(1.0)
+    bus.receive(0.0)
     assert heard == []
-    assert bus.foreign == 3
+    assert bus.foreign == 5
     assert bus._network is not None
     assert bus._network.lss.responses.empty()
     other.send(message(0x590, ANSWER))
     bus.receive(1.0)
     assert heard == [(0x590, ANSWER)]
+
+
+@pytest.mark.parametrize("length", [0, 1, 8, 12, 64])
+def test_a_can_fd_frame_is_never_taken_for_canopen(channel: str, length: int) -> None:
+    settings: dict[str, object] = {"interface": "virtual", "channel": channel, "protocol": can.CanProtocol.CAN_FD}
+    bus, heard = opened(settings)
+    bus.subscribe(0x710, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.close()
+    bus.open()
+    with can.Bus(**settings) as other:  # type: ignore[arg-type]  # as in a station file
+        for cob_id in (0x590, 0x710):
+            other.send(message(cob_id, bytes(length), is_fd=True))
+        bus.receive(0.0)
+        assert (heard, bus.foreign) == ([], 2)
+        other.send(message(0x590, ANSWER))
+        bus.receive(1.0)
+        assert heard == [(0x590, ANSWER)]
+    bus.close()
+
+
+def test_a_flood_of_others_costs_few_calls_and_each_call_ends(pair: Pair) -> None:
+    bus, heard, other = pair
+    for _ in range(2 * MAX_FOREIGN):
+        other.send(message(0x123, b"abc"))
+    other.send(message(0x590, ANSWER))
+    bus.receive(1.0)
+    assert (bus.foreign, heard) == (MAX_FOREIGN, [])  # a turn of the loop comes between
+    bus.receive(1.0)
+    bus.receive(1.0)
+    assert (bus.foreign, heard) == (2 * MAX_FOREIGN, [(0x590, ANSWER)])
 
 
 def test_frames_of_any_length_are_handed_on_whole(pair: Pair) -> None:
@@ -324,6 +354,46 @@ def test_our_own_echo_is_tolerated_and_nothing_leaves_the_host(udp: dict[str, ob
         other.send(message(0x590, ANSWER))
         listen(bus, lambda: heard, "the answer")
     assert heard == [(0x590, ANSWER)]
+    bus.close()
+
+
+ECHOES = [{"interface": "udp_multicast"}, {"interface": "virtual", "receive_own_messages": True}]
+
+
+@pytest.mark.parametrize("kind", ECHOES, ids=["udp_multicast", "asked for"])
+def test_what_we_sent_is_not_heard_but_the_same_frame_of_somebody_else_is(
+    udp: dict[str, object], channel: str, kind: dict[str, object]
+) -> None:
+    settings = udp | kind if kind["interface"] == "udp_multicast" else {**kind, "channel": channel}
+    bus, heard = opened(settings)
+    bus.subscribe(0x610, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.close()
+    bus.open()
+    with can.Bus(**settings) as other:  # type: ignore[arg-type]  # as in a station file
+        bus.send(0x610, OTHER_READ)
+        bus.send(0x610, READ)
+        other.send(message(0x610, READ))
+        bus.send(0x610, READ)
+        other.send(message(0x610, OTHER_READ))
+        listen(bus, lambda: len(heard) >= 2, "the other's requests")
+        other.send(message(0x590, ANSWER))
+        listen(bus, lambda: len(heard) >= 3, "the answer behind them")
+    assert heard == [(0x610, READ), (0x610, OTHER_READ), (0x590, ANSWER)]
+    bus.close()
+
+
+def test_an_echo_that_was_lost_does_not_hide_another_masters_frame(udp: dict[str, object]) -> None:
+    bus, heard = opened(udp)
+    bus.subscribe(0x610, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.close()
+    bus.open()
+    bus._echo.append((0x610, OTHER_READ))  # the bus lost it
+    bus.send(0x610, READ)
+    listen(bus, lambda: not bus._echo, "our own echo")
+    with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
+        other.send(message(0x610, OTHER_READ))
+        listen(bus, lambda: heard, "the other's request")
+    assert heard == [(0x610, OTHER_READ)]
     bus.close()
 
 
