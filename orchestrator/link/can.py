@@ -31,8 +31,6 @@ DEFAULT_BITRATE = 1_000_000
 SEND_TIMEOUT_S = 0.02
 #: So many unreadable frames in a row are no noise any more: build the bus anew.
 MAX_GARBAGE = 16
-#: Frames of others that one call of `receive()` throws away, so that a flood of them costs no turn of the loop each.
-MAX_FOREIGN = 32
 #: Our own frames that an interface may still have to bring back.
 MAX_ECHO = 256
 #: Interfaces that always bring back what we send ourselves, and do not mark it; others do where they are told to.
@@ -52,7 +50,8 @@ class CanBus:
 
     `settings` go to python-can as they are, nothing is taken from the environment or from python-can's own
     configuration files. `nodes` are the node ids that may be written to at all (`link/can_gate.py`); `pages`: their
-    older protocol may be asked, too. `filtered`: the kernel keeps back what nobody subscribed to.
+    older protocol may be asked, too. `filtered`: nothing is wanted but what is subscribed to; without, `nodes_seen`
+    tells of all.
     """
 
     def __init__(
@@ -71,6 +70,7 @@ class CanBus:
         self._settings = {**PROTECTIVE.get(str(settings.get("interface")), {}), **settings}
         self._nodes = frozenset(nodes)
         self._pages = pages
+        self._scans = not filtered
         self._filtered = filtered and "can_filters" not in settings
         self._echoes = settings.get("interface") in ECHOING or bool(settings.get("receive_own_messages"))
         self._echo: deque[tuple[int, bytes]] = deque(maxlen=MAX_ECHO)  # what we sent and did not hear yet
@@ -88,7 +88,7 @@ class CanBus:
 
     @property
     def nodes_seen(self) -> tuple[int, ...]:
-        """The node ids of all that was heard since the bus was opened, ours or not."""
+        """The node ids of all that was heard since the bus was opened, ours or not; of a filtered bus only ours."""
         return () if self._network is None else tuple(self._network.scanner.nodes)
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
@@ -144,46 +144,37 @@ class CanBus:
             self.trouble = can_text.QUEUE_FULL
 
     def receive(self, timeout_s: float) -> None:
-        """Send what `nmt()` left, then wait for one frame and hand it on. What a callback raises comes out here.
-
-        Frames of others that are there already are thrown away meanwhile, MAX_FOREIGN at most.
-        """
+        """Send what `nmt()` left, then wait for one frame and hand it on. What a callback raises comes out here."""
         if self._bus is None or self._network is None:
             raise LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
         while self._orders:
             _send_nmt(self._network, *self._orders.popleft())
-        bus, network, wait_s = self._bus, self._network, max(timeout_s, 0.0)
-        for _ in range(MAX_FOREIGN):
-            try:
-                message = bus.recv(wait_s)
-            except Exception as error:  # noqa: BLE001 - drivers raise anything; it ends here
-                self._unreadable(error)
-                return
-            self._garbage_run = 0
-            if message is None or self._dispatch(message, network):
-                return
-            wait_s = 0.0
+        try:
+            message = self._bus.recv(max(timeout_s, 0.0))
+        except Exception as error:  # noqa: BLE001 - drivers raise anything; it ends here
+            self._unreadable(error)
+            return
+        self._garbage_run = 0
+        if message is not None:
+            self._dispatch(message, self._network)
 
     def _check(self, cob_id: int, data: bytes) -> None:
         if reason := refusal(cob_id, data, self._nodes, pages=self._pages):
             raise RefusedError(f"{can_text.place(self.name, self._settings)}: not sent: {reason}")
 
-    def _dispatch(self, message: "can.Message", network: "canopen.Network") -> bool:
-        """Hand a frame on; False if it is none that anybody here waits for."""
+    def _dispatch(self, message: "can.Message", network: "canopen.Network") -> None:
         if message.is_error_frame:
             self._error_frame(message)
-            return True
+            return
         self.trouble = ""
         wanted = message.arbitration_id in self._callbacks
-        if message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES:
+        odd = message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES
+        if odd or not wanted:
             self.foreign += 1
-            return False
-        if self._is_own(message):
-            return False
-        if not wanted:
-            self.foreign += 1
-        network.notify(message.arbitration_id, message.data, message.timestamp)
-        return wanted
+            if odd or not self._scans:
+                return
+        if not self._is_own(message):
+            network.notify(message.arbitration_id, message.data, message.timestamp)
 
     def _is_own(self, message: "can.Message") -> bool:
         """Our own frame has come back. Echoes come in the order of sending: those before it are lost.
