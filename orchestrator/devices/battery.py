@@ -13,7 +13,7 @@ from orchestrator.devices.battery_view import BatteryView
 from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup, TimerWrite
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.emergency import emergency_cob_id, emergency_text
-from orchestrator.devices.node_health import NodeHealth
+from orchestrator.devices.node_health import NOT_OURS, NodeHealth
 from orchestrator.devices.other_masters import OtherMasters
 from orchestrator.devices.polled import Polled
 from orchestrator.devices.read_plan import ReadPlan
@@ -212,7 +212,7 @@ class BatteryNode:
         if verdict is Verdict.ACCEPTED and not isinstance(reply, SdoMalformed):
             self._accept(reply, now_s)
             return
-        if verdict not in (Verdict.THEIRS, Verdict.UNCLEAR):
+        if verdict not in NOT_OURS:
             self._view.dropped()
         if verdict is Verdict.UNCLEAR and asked is not None:
             self._plan.unanswered(asked, now_s)
@@ -228,7 +228,7 @@ class BatteryNode:
             self._configured(now_s, written=isinstance(reply, SdoWritten))
             return
         if (reply.index, reply.sub) == HEARTBEAT:  # its period was read back
-            if isinstance(reply, SdoValue) and (found := self._setup.checked(reply.value, now_s)):
+            if isinstance(reply, SdoValue) and (found := self._setup.checked(reply.value)):
                 self._view.set(heartbeat_set=found, heartbeat_set_t_s=now_s)
             return
         polled = self._plan[reply.index, reply.sub]

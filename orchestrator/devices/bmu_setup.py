@@ -17,9 +17,8 @@ _TPDO_TIMER_SUB = 5
 CHECK_PERIODS = 3  #: so many missed: read back which period it has now, well before it counts as lost (core: 4.5)
 ODD = (0.6, 1.5)  #: times its period, an interval between two heartbeats is as it should be …
 MOST_ODD = 3  #: … and after so many in a row that are not, the period is read back, too
-CHECK_AGAIN_S = 5.0  #: a period that was found right is not read back again before this
 
-RETRY_S = 1.0  #: a write that was not answered is tried again after this
+RETRY_S = 1.0  #: a write that was not answered is tried again after this, and a period read back again
 LOST_PERIODS = 5  #: so many heartbeats missed by a node that still answers: it booted and we did not hear it
 
 
@@ -126,13 +125,12 @@ class BmuSetup:
         """The heartbeat's period is asked for."""
         self.check_due, self._check_s = False, now_s + RETRY_S
 
-    def checked(self, period_ms: int, now_s: float) -> str:
+    def checked(self, period_ms: int) -> str:
         """What it is. "" if it is ours; else in words what was found, and ours will be written again.
 
         None at all may also come from a restart that nobody heard: then everything is written again.
         """
         if period_ms == round(self._heartbeat_s * 1000):
-            self._check_s = now_s + CHECK_AGAIN_S
             return ""
         heard = self._heard
         if period_ms == 0:

@@ -8,6 +8,10 @@ BABBLE_HZ = 500  #: frames a second; a node that is read as fast as allowed send
 _STRAY, _CLEAN, _DOUBLED, _MOST = 2, 1, 6, 8
 
 
+#: Answers that another master explains.
+NOT_OURS = (Verdict.THEIRS, Verdict.FRAGMENT, Verdict.UNCLEAR)
+
+
 class NodeHealth:
     """Counts what is odd about a node."""
 
@@ -36,7 +40,7 @@ class NodeHealth:
 
     def answer(self, verdict: Verdict, reason: str = "") -> None:
         """An SDO answer came; `reason` says what is wrong with a malformed one."""
-        if verdict in (Verdict.THEIRS, Verdict.UNCLEAR):
+        if verdict in NOT_OURS:
             self.excuse()
             return
         self._last, self._reason = verdict, reason

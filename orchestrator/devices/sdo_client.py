@@ -27,6 +27,7 @@ class Verdict(Enum):
     SECOND = auto()  #: one more answer to a request that has one (`first`): a second node with this id, or a forger
     STRAY = auto()  #: to no request of ours, or not of its kind: as above
     THEIRS = auto()  #: to another master
+    FRAGMENT = auto()  #: a frame of a longer transfer of another master, whatever it looks like
     UNCLEAR = auto()  #: to us or to another master: nobody can tell, and ours is given up
     MALFORMED = auto()  #: not an answer that we understand
 

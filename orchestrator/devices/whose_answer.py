@@ -15,7 +15,7 @@ def whose_answer(reply: SdoReply, data: bytes, client: SdoClient, others: OtherM
     if not others.active:
         return client.take(reply, now_s)
     if others.in_transfer(data, now_s):
-        return Verdict.THEIRS
+        return Verdict.FRAGMENT
     if others.breaks_off(reply):
         client.drop()
         return Verdict.UNCLEAR

@@ -10,10 +10,12 @@ from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, NODE_ID, REPLY, REQUES
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
 from tests.protocol.vectors import BMU
 
-#: What an event is: a frame on one of four ids, an answer to the newest request, time, trouble with the bus, bytes for
-#: the parsers that are not the node's, a request or an NMT command of another master.
-SDO, HEART, EMCY, TPDO, ANSWER, PAUSE, TROUBLE, PARSE, OTHERS, NMT = range(10)
-TPDO_COB_IDS = (0x190, 0x290, 0x390)
+#: What an event is: a frame on one of some ids, an answer to the newest request, time, trouble with the bus, and bytes
+#: for the parsers that are not the node's.
+SDO, HEART, EMCY, ELSE, ANSWER, PAUSE, TROUBLE, PARSE = range(8)
+#: By the first byte of ELSE: a TPDO, a request or an NMT command of another master.
+ELSE_COB_IDS = (0x190, 0x290, 0x390, REQUEST, NMT_COB_ID)
+OTHERS, NMT = b"\3", b"\4"
 COMMANDS = (0x43, 0x43, 0x4B, 0x4F, 0x60, 0x80, 0x41, 0xFF)
 #: Of another master: reads, writes, aborts, segments and blocks.
 REQUESTS = (
@@ -53,13 +55,11 @@ class Session:
             bench.node.fail("the bus failed", bench.now_s)
         elif kind == PARSE:
             self._parse(content)
-        elif kind == NMT:
-            bench.node.on_nmt(content, bench.now_s)
         elif kind == ANSWER:
             self._answer(content)
         else:
-            ids = {SDO: REPLY, OTHERS: REQUEST, HEART: HEARTBEAT, EMCY: EMERGENCY}
-            self._frame(ids.get(kind) or TPDO_COB_IDS[content[0] % 3 if content else 0], content[kind == TPDO :])
+            ids = {SDO: REPLY, HEART: HEARTBEAT, EMCY: EMERGENCY}
+            self._frame(ids.get(kind, ELSE_COB_IDS[content[0] % 5 if content else 0]), content[kind == ELSE :])
         self._is_honest()
 
     def _answer(self, content: bytes) -> None:
@@ -75,6 +75,8 @@ class Session:
     def _frame(self, cob_id: int, data: bytes) -> None:
         if cob_id in self.bench.node.cob_ids:  # the bus hands on no other
             self.bench.node.on_frame(cob_id, data, self.bench.now_s)
+        elif cob_id == NMT_COB_ID:
+            self.bench.node.on_nmt(data, self.bench.now_s)
 
     def _parse(self, content: bytes) -> None:
         reply = parse_reply(content)
@@ -142,15 +144,15 @@ TARGET = Target(
         record(SDO, bytes.fromhex("6017100000000000")), record(HEART, b"\0"), record(HEART, b"\5"),
         record(HEART, b"\4"), record(HEART, b"\x7f"), record(HEART), record(EMCY, bytes(8)),
         record(EMCY, b"\x10\x42\0\0\0\0\0\0"), record(EMCY, b"\1"),
-        *(record(TPDO, bytes((number,)) + content) for number in range(3) for content in (bytes(8), b"\xff" * 8)),
-        record(TPDO, b"\1\1"),
+        *(record(ELSE, bytes((number,)) + content) for number in range(3) for content in (bytes(8), b"\xff" * 8)),
+        record(ELSE, b"\1\1"),
         record(PAUSE, b"\x02"), record(PAUSE, b"\x32"), record(PAUSE, b"\xc8"), record(TROUBLE), record(TROUBLE, b"\1"),
         record(PARSE, b"\x70\1" + bytes(6)), record(PARSE, b"\x70\2" + b"\xff" * 6),
         record(PARSE, b"\x70\3" + bytes(6)),
-        *(record(OTHERS, bytes.fromhex(request)) for request in REQUESTS),
+        *(record(ELSE, OTHERS + bytes.fromhex(request)) for request in REQUESTS),
         record(SDO, bytes.fromhex("410810000a000000")), record(SDO, bytes.fromhex("0043006000000000")),
         record(SDO, bytes.fromhex("c60060000a000000")), record(SDO, bytes.fromhex("0143006000000000")),
-        record(NMT, b"\2\x10"), record(NMT, b"\x81\0"), record(NMT, b"\1"), record(NMT, b"\xff\xff"),
+        *(record(ELSE, NMT + command) for command in (b"\2\x10", b"\x81\0", b"\1", b"\xff\xff")),
     ],
     ["orchestrator/protocol/sdo.py", "orchestrator/protocol/words.py", "orchestrator/protocol/pages.py",
      "orchestrator/devices/battery.py", "orchestrator/devices/battery_view.py", "orchestrator/devices/bmu_setup.py",
