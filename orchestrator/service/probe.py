@@ -126,7 +126,7 @@ def _contactor(config: ContactorConfig, show: Show) -> bool:
 
 def _bmu(station: Station, bay: Bay, nmt: NmtCommand | None, *, old_protocol: bool, show: Show) -> bool:
     name = bay.battery.can
-    bus = CanBus(name, station.can[name], [bay.battery.node_id], pages=old_protocol)
+    bus = CanBus(name, station.can[name], [bay.battery.node_id], pages=old_protocol, filtered=False)
     bmu = BmuProbe(bus, bay.battery, show)
     try:
         bus.open()

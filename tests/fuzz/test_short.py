@@ -119,7 +119,7 @@ def remembers_all(patch: Patch) -> None:
     ask, number = SdoClient.ask, count(1)
 
     def hoards(self: SdoClient, key: tuple[int, int], now_s: float, *, write: bool = False) -> None:
-        self._answered[next(number), -1] = False
+        self._answers[next(number), -1] = None
         ask(self, key, now_s, write=write)
 
     patch.setattr(SdoClient, "ask", hoards)
