@@ -187,7 +187,7 @@ def keeps_old_ports(patch: Patch) -> None:
 
 
 def any_name(patch: Patch) -> None:
-    patch.setattr(laststop, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
+    patch.setattr(lastline, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
 
 
 #: Target → what somebody might get wrong there.
