@@ -161,7 +161,7 @@ def _rest(f: Facts, faults: Faults) -> Course:
     if state is State.QUALIFYING and trigger is Trigger.QUALIFY:
         return _qualifying(f)
     if trigger is Trigger.QUALIFY and state not in (State.IDLE, State.FULL, State.SUSPENDED):
-        return Trigger.REST, reason
+        return (Trigger.REST if f.memory.session is None else Trigger.SUSPEND), reason
     return (None if LEADS.get(trigger) is state else trigger), reason
 
 
@@ -176,8 +176,10 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
     if waits is not None:
         return Trigger.REST, waits.text
-    if memory.hold or f.snapshot.ending:
-        return Trigger.REST, memory.hold or f.snapshot.ending
+    if memory.hold:
+        return Trigger.REST, memory.hold
+    if f.snapshot.ending:  # the charge goes on after it
+        return (Trigger.REST if memory.session is None else Trigger.SUSPEND), f.snapshot.ending
     if memory.paused:
         return Trigger.SUSPEND, "paused by the operator; start to go on"
     absent = _absent(f)

@@ -6,6 +6,7 @@ that the next step, if it does not raise, goes on from there.
 
 from dataclasses import replace
 
+from orchestrator.core.contactor import closes
 from orchestrator.core.latches import shown
 from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory, Memory
@@ -35,6 +36,7 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     if tried_s >= OBEY_STOP_S:
         memory.state = State.UNCONTROLLABLE
     out = memory.state is State.UNCONTROLLABLE
+    memory.closed = closes(memory.state, closed=memory.closed, standby=False)
     memory.reason = (
         f"CUT THE MAINS of this charger: this software has failed to judge the bay for {tried_s:.0f} s, and cannot "
         f"verify the stop that it repeats ({error})"
@@ -43,5 +45,5 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     )
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
     decision = Decision(memory.state, memory.reason, STOP, faults=shown(memory.faults), alarm=out,
-                        answer=f"this bay {ANSWERS}" if refused else "")  # fmt: skip
+                        closed=memory.closed, answer=f"this bay {ANSWERS}" if refused else "")  # fmt: skip
     return replace(decision, session=memory.session), memory

@@ -39,9 +39,9 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
     State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
     State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
 }
-#: After these a charge is over. A pause, a stop that is still being verified and a device that does not answer do not
-#: end it: its limits would begin anew with each of them.
-SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.TRIPPED, State.UNCONTROLLABLE})
+#: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
+#: not end it: its limits would begin anew with each of them.
+SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.TRIPPED})
 
 
 def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
@@ -92,17 +92,24 @@ def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
     trigger, reason = course(f, faults)
     memory.reason = reason
     memory.state = fire(before, trigger) if trigger is not None else before
-    if memory.state is before:
-        return None
-    follow_stop(f, before)
-    follow_state(f, before)
-    if memory.state is State.STOPPING:
-        memory.stop_reason = reason
-    if memory.session is None or memory.state not in SESSION_ENDS:
+    if memory.state is not before:
+        follow_stop(f, before)
+        follow_state(f, before)
+        if memory.state is State.STOPPING:
+            memory.stop_reason = reason
+    if memory.session is None or not _is_over(f, before):
         return None
     ended = replace(memory.session, result=memory.stop_reason if before is State.STOPPING else reason)
     memory.session = None
     return ended
+
+
+def _is_over(f: Facts, before: State) -> bool:
+    """Whether the open charge has ended. One that the last run of the service left open ends with its battery."""
+    exchanged = f.memory.faults.get("battery_exchanged")
+    another = f.departed or (exchanged is not None and exchanged.raised_s is not None)
+    goes_on = f.memory.state is before or before is State.STARTING
+    return f.memory.state in SESSION_ENDS and (another or not goes_on)
 
 
 def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step | None]:
