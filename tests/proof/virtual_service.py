@@ -38,8 +38,8 @@ from orchestrator.link import can as can_module
 from orchestrator.link import serial as serial_module
 from orchestrator.model import ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
-from orchestrator.service import supervisor as supervisor_module
 from orchestrator.service import reload as reload_module
+from orchestrator.service import supervisor as supervisor_module
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.past import Place

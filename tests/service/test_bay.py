@@ -196,7 +196,7 @@ def test_what_was_not_charging_when_the_guardian_died_waits_for_nobody(bench: Be
 
 @pytest.mark.parametrize("before", [True, False])
 def test_the_end_of_the_service_and_an_operators_stop_are_two_things(bench: Bench, *, before: bool) -> None:
-    """The stop may come before the end or, in the same second, after it: the next run keeps to it, and to nothing else."""
+    """The stop may come before the end or, in the same second, after it: the next run keeps to it and nothing else."""
     bench.charging()
     if before:
         bench.ask(Request.STOP)
