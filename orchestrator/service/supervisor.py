@@ -115,6 +115,17 @@ class Supervisor:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGHUP, self._on_hangup)
+        try:
+            self._begin()
+            while not self._ending:
+                self._turn()
+            self._say(f"{self._ending}: stopping every bay")
+            return self._end()
+        finally:
+            self._console.close()
+
+    def _begin(self) -> None:
+        """Stop every charger, find out what the last run has left, and take every bay's first step."""
         self._store.start()
         if known := self._store.wait(LOCK_S):
             self._strays.begin()
@@ -131,10 +142,6 @@ class Supervisor:
             bus.start()
         self._say(f"{self._station.station}: {len(self._bays)} bays, control socket {self._station.control.socket}")
         self._run_all()
-        while not self._ending:
-            self._turn()
-        self._say(f"{self._ending}: stopping every bay")
-        return self._end()
 
     def _run_all(self) -> None:
         for bay in self._bays:
@@ -212,7 +219,6 @@ class Supervisor:
         verdicts += [f"NOT kept: {unkept}"] if unkept else []
         self._say(f"ended: {'; '.join(verdicts) or 'every charger stands by, verified'}")
         self._journal.close()
-        self._console.close()
         return 1 if verdicts or self._lost else 0
 
     def _unverified(self) -> list[str]:

@@ -12,7 +12,6 @@ import zlib
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -207,7 +206,8 @@ def _spread(events: Iterable[Fields], bays: Mapping[str, list[Recorded]]) -> Non
     for line in events:
         near = list(_near(line["t"], by_time.get(line["bay"], []), times.get(line["bay"], [])))
         if near:
-            step = min(near, key=lambda step: _apart_s(step.wall, line["wall"]))
+            later = [step for step in near if step.wall >= line["wall"]]  # a step is written down after its events
+            step = min(later or near, key=lambda step: step.wall)
             fields = {name: value for name, value in line.items() if name not in ("t", "wall", "bay", "kind")}
             step.events.append((line["kind"], fields))
 
@@ -219,13 +219,6 @@ def _near(t_s: float, steps: Sequence[Recorded], times: Sequence[float]) -> Iter
             return
         if t_s <= steps[at].written_s:
             yield steps[at]
-
-
-def _apart_s(one: str, other: str) -> float:
-    try:
-        return abs((datetime.fromisoformat(one) - datetime.fromisoformat(other)).total_seconds())
-    except (TypeError, ValueError):
-        return 0.0  # no clock of ours writes such times
 
 
 def _wrong(path: Path, number: int, text: str) -> ConfigError:

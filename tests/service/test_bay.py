@@ -10,6 +10,7 @@ import pytest
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
+from orchestrator.core.step import step
 from orchestrator.model import STOP, Decision, Request, Snapshot, State
 from orchestrator.service import bay as bay_module
 from orchestrator.service.asked import Asked
@@ -149,7 +150,6 @@ def test_a_refusal_waits_for_no_disk(bench: Bench) -> None:
 def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """A charge that the core intends begins only once that is kept; a write under way counts for nothing."""
     told: list[bool] = []
-    step = bay_module.step
 
     def intending(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
         told.append(snapshot.running_kept)

@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.service import journal as journal_module
-from orchestrator.service import rotating
 from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal, rfc3339
 from orchestrator.service.rotating import FILES, RotatingFile
 from tests.waiting import wait_until
@@ -245,7 +244,9 @@ def test_whatever_a_power_cut_leaves_swallows_no_line_of_the_next_run(tmp_path: 
 def test_events_are_on_the_disk_when_they_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The record of the accident outlives a power cut right after it; of the snapshots there are too many for that."""
     synchronised: list[Path] = []
-    monkeypatch.setattr(rotating.os, "fsync", lambda fd: synchronised.append(Path(f"/proc/self/fd/{fd}").readlink()))
+    monkeypatch.setattr(
+        "orchestrator.service.rotating.os.fsync", lambda fd: synchronised.append(Path(f"/proc/self/fd/{fd}").readlink())
+    )
     with writing(tmp_path) as journal:
         journal.put("bay-1", ("fault", {"id": "hot"}))
         journal.put("bay-1", ("snapshot", {}))
