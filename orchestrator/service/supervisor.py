@@ -12,31 +12,28 @@ from queue import Empty, SimpleQueue
 from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
 from types import FrameType
 
-from orchestrator.config.station import Bay, ChargerConfig, Limits, Rs485, Station
+from orchestrator.config.station import Station
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
-from orchestrator.keys import Range
 from orchestrator.link.can import CanBus, load
-from orchestrator.link.gpio import OutputLine, need_gpiod
-from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
 from orchestrator.service.closing import close_all
 from orchestrator.service.console import Console
-from orchestrator.service.contactor import Contactor
 from orchestrator.service.control import ControlSocket
-from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLink
+from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.reload import Reload
 from orchestrator.service.status import station_status
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
+from orchestrator.service.wiring import charger_port, open_contactor, stray_port
 
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
@@ -76,7 +73,7 @@ class Supervisor:
         self._bays: list[BayRunner] = []
         self._build()
         self._strays = Strays(
-            self._store, partial(_stray_port, self._guardian, partial(self._wake.put, None)), self._say
+            self._store, partial(stray_port, self._guardian, partial(self._wake.put, None)), self._say
         )
         self._reload = Reload(station, self._bays, self._say)
         self._reload_asked = False
@@ -92,11 +89,11 @@ class Supervisor:
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
         for number, bay in enumerate(self._station.bays):
             poke: Callable[[], None] = partial(self._wake.put, number)
-            port = _port(bay.charger, bay.limits, poke, self._guardian)
+            port = charger_port(bay.charger, bay.limits, poke, self._guardian)
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             self._ports.append(port)
-            contactor, snapshots = _contactor(bay, self._guardian), self._station.journal.snapshots
+            contactor, snapshots = open_contactor(bay, self._guardian), self._station.journal.snapshots
             runner = BayRunner(
                 bay, port, node, self._journal, self._store, self._say, contactor=contactor, snapshots=snapshots
             )
@@ -268,30 +265,3 @@ def _names(value: object) -> list[object]:
     if not isinstance(value, list):
         raise ServiceError("'bays' is a list of names, or null for all")
     return value
-
-
-def _port(charger: ChargerConfig, limits: Limits, poke: Callable[[], None], guardian: GuardianLink) -> ChargerPort:
-    port, kernel = charger.port, charger.rs485 is Rs485.KERNEL
-    return ChargerPort(
-        charger,
-        limits,
-        open_line=partial(GuardedLine, port, partial(SerialLine.open, port, kernel_rs485=kernel), guardian),
-        clock=monotonic,
-        on_change=poke,
-    )
-
-
-def _stray_port(guardian: GuardianLink, poke: Callable[[], None], place: Place) -> ChargerPort:
-    """A port that is only ever stopped: no current is within its limits."""
-    charger = ChargerConfig(port=place.port, control=place.control, steps_a=(0.0,) * 5, rs485=place.rs485)
-    return _port(charger, Limits(voltage_v=0.0, current_a=0.0, temperature_c=Range(0, 0)), poke, guardian)
-
-
-def _contactor(bay: Bay, guardian: GuardianLink) -> Contactor | None:
-    """The bay's contactor, if it has one. LinkError where the library for it is not installed."""
-    config = bay.contactor
-    if config is None:
-        return None
-    need_gpiod()
-    open_output = partial(OutputLine.open, config.chip, config.line, active_low=config.active_low)
-    return Contactor(partial(GuardedOutput, bay.name, open_output, guardian))
