@@ -40,6 +40,7 @@ class Stream:
     def __init__(self, file: RotatingFile, begin: Callable[[], bytes]) -> None:
         self._file, self._begin = file, begin
         self._lines: deque[bytes] = deque()
+        self._ahead: deque[bytes] = deque()  # our own lines, which come before them
         self._begun = False
         self.gap = False  #: lines are missing before the first one that waits
 
@@ -47,7 +48,7 @@ class Stream:
         """One line more; how many are lost by it."""
         if not self._begun:
             self._begun = True
-            self._lines.append(self._begin())
+            self._ahead.append(self._begin())
         self._lines.append(line)
         if len(self._lines) <= BACKLOG:
             return 0
@@ -58,8 +59,9 @@ class Stream:
     def write(self, lost: bytes) -> None:
         """Bring them to the disk, or raise OSError; `lost` is the line that stands for a gap."""
         if self.gap and self._lines:
-            self._lines.appendleft(lost)
+            self._ahead.append(lost)
             self.gap = False
+        self._file.take(self._ahead)
         self._file.take(self._lines)
 
 

@@ -1,4 +1,4 @@
-"""Chargers in hand that no bay has any more: an earlier run told them to run, on a port that the station file lacks now.
+"""Chargers in hand that no bay has any more: an earlier run had them run, on a port that the station file lacks now.
 
 Whoever stops, stops those too. Each is stopped on the port that was written down, until two status replies in a row
 show that it stands by, and is watched for a little longer; then its port is given back. What was known of its bay stays

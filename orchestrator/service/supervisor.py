@@ -12,16 +12,13 @@ from queue import Empty, SimpleQueue
 from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
 from types import FrameType
 
-from orchestrator.config.station import Bay, ChargerConfig, Limits, Rs485, Station
+from orchestrator.config.station import Station
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
-from orchestrator.keys import Range
 from orchestrator.link.can import CanBus, load
-from orchestrator.link.gpio import OutputLine, need_gpiod
-from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
 from orchestrator.service.answers import Answer, Later
 from orchestrator.service.asked import Asked
@@ -29,9 +26,8 @@ from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
 from orchestrator.service.closing import close_all
 from orchestrator.service.console import Console
-from orchestrator.service.contactor import Contactor
 from orchestrator.service.control import ControlSocket
-from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLink
+from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.reload import Reload
@@ -39,6 +35,7 @@ from orchestrator.service.starts import Starts
 from orchestrator.service.status import station_status
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
+from orchestrator.service.wiring import charger_port, open_contactor, stray_port
 
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
@@ -78,7 +75,7 @@ class Supervisor:
         self._bays: list[BayRunner] = []
         self._build()
         self._strays = Strays(
-            self._store, partial(_stray_port, self._guardian, partial(self._wake.put, None)), self._say
+            self._store, partial(stray_port, self._guardian, partial(self._wake.put, None)), self._say
         )
         self._reload = Reload(station, self._bays, self._say)
         self._reload_asked = False
@@ -96,11 +93,11 @@ class Supervisor:
         starts = Starts(0.0 if alone else self._station.stagger_s, self._station.source.at("stagger_s"))
         for number, bay in enumerate(self._station.bays):
             poke: Callable[[], None] = partial(self._wake.put, number)
-            port = _port(bay.charger, bay.limits, poke, self._guardian)
+            port = charger_port(bay.charger, bay.limits, poke, self._guardian)
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             self._ports.append(port)
-            contactor, snapshots = _contactor(bay, self._guardian), self._station.journal.snapshots
+            contactor, snapshots = open_contactor(bay, self._guardian), self._station.journal.snapshots
             runner = BayRunner(
                 bay, port, node, self._journal, self._store, self._say,
                 contactor=contactor, starts=starts, snapshots=snapshots,
@@ -120,6 +117,17 @@ class Supervisor:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGHUP, self._on_hangup)
+        try:
+            self._begin()
+            while not self._ending:
+                self._turn()
+            self._say(f"{self._ending}: stopping every bay")
+            return self._end()
+        finally:
+            self._console.close()
+
+    def _begin(self) -> None:
+        """Stop every charger, find out what the last run has left, and take every bay's first step."""
         self._store.start()
         if known := self._store.wait(LOCK_S):
             self._strays.begin()
@@ -136,10 +144,6 @@ class Supervisor:
             bus.start()
         self._say(f"{self._station.station}: {len(self._bays)} bays, control socket {self._station.control.socket}")
         self._run_all()
-        while not self._ending:
-            self._turn()
-        self._say(f"{self._ending}: stopping every bay")
-        return self._end()
 
     def _run_all(self) -> None:
         for bay in self._bays:
@@ -217,7 +221,6 @@ class Supervisor:
         verdicts += [f"NOT kept: {unkept}"] if unkept else []
         self._say(f"ended: {'; '.join(verdicts) or 'every charger stands by, verified'}")
         self._journal.close()
-        self._console.close()
         return 1 if verdicts or self._lost else 0
 
     def _unverified(self) -> list[str]:
@@ -272,30 +275,3 @@ def _names(value: object) -> list[object]:
     if not isinstance(value, list):
         raise ServiceError("'bays' is a list of names, or null for all")
     return value
-
-
-def _port(charger: ChargerConfig, limits: Limits, poke: Callable[[], None], guardian: GuardianLink) -> ChargerPort:
-    port, kernel = charger.port, charger.rs485 is Rs485.KERNEL
-    return ChargerPort(
-        charger,
-        limits,
-        open_line=partial(GuardedLine, port, partial(SerialLine.open, port, kernel_rs485=kernel), guardian),
-        clock=monotonic,
-        on_change=poke,
-    )
-
-
-def _stray_port(guardian: GuardianLink, poke: Callable[[], None], place: Place) -> ChargerPort:
-    """A port that is only ever stopped: no current is within its limits."""
-    charger = ChargerConfig(port=place.port, control=place.control, steps_a=(0.0,) * 5, rs485=place.rs485)
-    return _port(charger, Limits(voltage_v=0.0, current_a=0.0, temperature_c=Range(0, 0)), poke, guardian)
-
-
-def _contactor(bay: Bay, guardian: GuardianLink) -> Contactor | None:
-    """The bay's contactor, if it has one. LinkError where the library for it is not installed."""
-    config = bay.contactor
-    if config is None:
-        return None
-    need_gpiod()
-    open_output = partial(OutputLine.open, config.chip, config.line, active_low=config.active_low)
-    return Contactor(partial(GuardedOutput, bay.name, open_output, guardian))

@@ -203,6 +203,7 @@ class Player:
         bay, watch = self.world.bays[number], self.watches[number]
         decision, after, snapshot = bay.decision, bay._memory, bay._snapshot
         assert decision is not None
+        assert after is not None
         before = watch.before or Memory()
         if after.state is not before.state:
             self._changed(number, before.state, after.state)

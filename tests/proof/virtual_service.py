@@ -41,6 +41,7 @@ from orchestrator.model import ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
 from orchestrator.service import reload as reload_module
 from orchestrator.service import supervisor as supervisor_module
+from orchestrator.service import wiring as wiring_module
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.past import Place
@@ -291,8 +292,11 @@ class World:
         fake = self.kernel.modules()
         change = self._patches.enter_context
         replaced: dict[Any, dict[str, Any]] = {
-            supervisor_module: {
+            wiring_module: {
                 "OutputLine": SimpleNamespace(open=lambda _chip, line, **_: Contactor(self.rigs[line])),
+                "monotonic": time.clock,
+            },
+            supervisor_module: {
                 "monotonic": time.clock, "boottime": time.clock, "SimpleQueue": _Queues(time),
                 "Journal": Notebook, "Console": Notebook, "ControlSocket": Silence,
                 "Store": partial(Shelf, self._kept), "boot_id": lambda: "virtual", "close_all": _close_all,

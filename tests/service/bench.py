@@ -1,6 +1,7 @@
 """A bay of the service without threads: the test is its control loop, its devices obey at once and time jumps."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -130,12 +131,14 @@ class Bench:
         bay: Bay | None = None,
         *,
         max_mb: float = 1.0,
+        now_s: float = 1000.0,
+        wall: Callable[[], float] = time.time,
         contactor: Contactor | None = None,
     ) -> None:
         self.charger, self.battery = Charger(), Battery()
-        self.now_s = 1000.0
+        self.now_s = now_s
         self.asleep_s = 0.0
-        self.journal = Journal(directory, max_mb, lambda: self.now_s, time.time)
+        self.journal = Journal(directory, max_mb, lambda: self.now_s, wall)
         self.said: list[str] = []
         chosen = bay or the_bay()
         place = Place.of(chosen)

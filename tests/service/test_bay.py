@@ -10,6 +10,7 @@ import pytest
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
+from orchestrator.core.step import step
 from orchestrator.model import STOP, Decision, Request, Snapshot, State
 from orchestrator.service import bay as bay_module
 from orchestrator.service.asked import Asked
@@ -164,7 +165,6 @@ def test_a_refusal_waits_for_no_disk(bench: Bench) -> None:
 def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """A charge that the core intends begins only once that is kept; a write under way counts for nothing."""
     told: list[bool] = []
-    step = bay_module.step
 
     def intending(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
         told.append(snapshot.running_kept)
@@ -211,7 +211,7 @@ def test_what_was_not_charging_when_the_guardian_died_waits_for_nobody(bench: Be
 
 @pytest.mark.parametrize("before", [True, False])
 def test_the_end_of_the_service_and_an_operators_stop_are_two_things(bench: Bench, *, before: bool) -> None:
-    """The stop may come before the end or, in the same second, after it: the next run keeps to it, and to nothing else."""
+    """The stop may come before the end or, in the same second, after it: the next run keeps to it and nothing else."""
     bench.charging()
     if before:
         bench.ask(Request.STOP)

@@ -41,13 +41,23 @@ def test_a_bay_that_nobody_knows_is_held() -> None:
     assert past == Persisted(hold=f"bay-3 on /dev/c is not in {FILE}: nobody knows its past; start to go on")
 
 
+LAST = "when this service last ran, and"
 MOVED = {
-    "another port": (Place("bay-1", "/dev/c", "can0", 16), "bay-1 was on /dev/a when this service last ran, and is on /dev/c now"),
-    "another name": (Place("bay-9", "/dev/a", "can0", 16), "/dev/a was bay-1's when this service last ran, and is bay-9's now"),
-    "another bus": (Place("bay-1", "/dev/a", "can1", 16), "bay-1 had the BMU on can0, node 16, when this service last ran, and has can1, node 16, now"),
-    "another BMU": (Place("bay-1", "/dev/a", "can0", 20), "bay-1 had the BMU on can0, node 16, when this service last ran, and has can0, node 20, now"),
-    "only its BMU": (Place("bay-9", "/dev/c", "can0", 16), "the BMU on can0, node 16, was bay-1's when this service last ran, and is bay-9's now"),
-}  # fmt: skip
+    "another port": (replace(A, port="/dev/c"), f"bay-1 was on /dev/a {LAST} is on /dev/c now"),
+    "another name": (replace(A, bay="bay-9"), f"/dev/a was bay-1's {LAST} is bay-9's now"),
+    "another bus": (
+        replace(A, can="can1"),
+        "bay-1 had the BMU on can0, node 16, when this service last ran, and has can1, node 16, now",
+    ),
+    "another BMU": (
+        replace(A, node_id=20),
+        "bay-1 had the BMU on can0, node 16, when this service last ran, and has can0, node 20, now",
+    ),
+    "only its BMU": (
+        Place("bay-9", "/dev/c", "can0", 16),
+        f"the BMU on can0, node 16, was bay-1's {LAST} is bay-9's now",
+    ),
+}
 
 
 @pytest.mark.parametrize("name", MOVED)

@@ -425,8 +425,8 @@ def test_a_second_service_on_the_same_directory_ends_with_a_sentence(tmp_path: P
             command, capture_output=True, text=True, timeout=30, check=False, stdin=subprocess.DEVNULL
         )
         assert done.stdout == (
-            f"another service keeps its state in {tmp_path}: stop it first, or give this station a journal.directory of "
-            "its own\n"
+            f"another service keeps its state in {tmp_path}: stop it first, or give this station a journal.directory "
+            "of its own\n"
         )
         assert (tmp_path / FILE).read_bytes() == before
 

@@ -73,13 +73,14 @@ class Service:
 
     # --- the process ---
 
-    def start(self) -> Self:
+    def start(self, stderr: int | None = None) -> Self:
+        """Until it answers; what it says goes into its log, or to `stderr`."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
                 [sys.executable, *self._run, str(self.file)],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
-                stderr=log,
+                stderr=log if stderr is None else stderr,
                 start_new_session=True,
                 preexec_fn=die_with_parent,
             )
@@ -93,6 +94,12 @@ class Service:
             return bool(self.status())
         except Exception:  # noqa: BLE001 - not yet
             return False
+
+    def edit(self, change: Callable[[Document], None]) -> None:
+        """Change the station file, as a person with an editor does."""
+        document: Document = json.loads(self.file.read_text(encoding="utf-8"))
+        change(document)
+        self.file.write_text(json.dumps(document, indent=1), encoding="utf-8")
 
     def signal(self, number: signal.Signals) -> None:
         """To the process that was started: the guardian."""
@@ -139,6 +146,10 @@ class Service:
         """The status of every bay, or of one, by its name."""
         bays = cast("list[Document]", ask(self.socket, {"verb": "status", "bay": only})["bays"])
         return {bay["name"]: bay for bay in bays}
+
+    def strays(self) -> list[Document]:
+        """The chargers in hand that the station file has not any more."""
+        return cast("list[Document]", ask(self.socket, {"verb": "status", "bay": None})["strays"])
 
     def bay(self, name: str = "bay-1") -> Document:
         return self.status(name)[name]
