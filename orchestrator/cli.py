@@ -188,7 +188,9 @@ def _request(arguments: argparse.Namespace) -> int:
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified, then = {}, ""
     if arguments.verb in STOPS:
-        unverified, then = _wait_for_standby(path, accepted), "; stands by, verified"
+        # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
+        looked_at = list(results) if arguments.verb == "stop" else accepted
+        unverified, then = _wait_for_standby(path, looked_at), "; stands by, verified"
     for line in (*unverified.values(), *(f"{bay}: {refusal}" for bay, refusal in results.items() if refusal)):
         print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
     for bay in accepted:

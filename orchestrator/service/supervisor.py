@@ -23,7 +23,6 @@ from orchestrator.link.can import CanBus, load
 from orchestrator.link.gpio import OutputLine, need_gpiod
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
-from orchestrator.service.answers import Answer, Later
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
@@ -34,6 +33,7 @@ from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
+from orchestrator.service.reception import Answer, Later
 from orchestrator.service.reload import Reload
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import station_status
@@ -44,8 +44,7 @@ from orchestrator.service.strays import Strays
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
 STOP_S = 3.0
-#: A request is decided by the next step and answered when its effect is on the disk, after 2 s without it; longer than
-#: this means that the loop hangs.
+#: A request is decided by the next step, and answered when it is on disk or after 2 s; longer is a loop that hangs.
 ANSWER_S = 3.0
 #: A disk that answers has told what the last run has left within this; else the chargers are stopped meanwhile …
 LOCK_S = 0.3

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from orchestrator.service.kept import Kept
 
 from orchestrator.service import journal as journal_module
 from orchestrator.service.journal import BACKLOG, STALL_S, Journal, rfc3339
-from orchestrator.service.kept import Kept
 from orchestrator.service.rotating import FILES, RotatingFile
 from tests.waiting import wait_until
 
