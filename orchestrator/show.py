@@ -18,18 +18,18 @@ def page(document: Mapping[str, object]) -> str:
     """The whole status: what to do, the bays, and what is wrong with the station itself."""
     lines = [f"ALARM: {text}" for text in strays(document)]
     lines.append(table(cast("Sequence[Bay]", document["bays"])))
-    for part in ("journal", "persisted"):
-        if problem := cast("Mapping[str, object]", document.get(part, {})).get("problem"):
-            lines.append(f"WARNING: {problem}")
-    return "\n".join(lines)
+    problems = (
+        cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
+    )
+    return "\n".join([*lines, *(f"WARNING: {problem}" for problem in problems if problem)])
 
 
 def strays(document: Mapping[str, object]) -> list[str]:
     """What to do about chargers that no bay has any more, and that nobody has seen to stand by."""
     found = cast("Sequence[Mapping[str, object]]", document.get("strays", ()))
     return [
-        f"CUT THE MAINS of the charger on {one['port']}, which was {one['bay']}'s: it may be running, and is not seen to "
-        f"stand by: {one['problem'] or one['state']}"
+        f"CUT THE MAINS of the charger on {one['port']}, which was {one['bay']}'s: it may be running, nobody has "
+        f"seen that it stands by: {one['problem'] or one['state']}"
         for one in found
         if not one["verified"]
     ]
