@@ -161,15 +161,12 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
-    from orchestrator.show import table
+    from orchestrator.show import page
 
     if as_json:
         print(json.dumps(document, ensure_ascii=False), flush=True)
         return
-    journal = cast("dict[str, str]", document["journal"])
-    text = table(cast("list[dict[str, object]]", document["bays"]))
-    if journal["problem"]:
-        text += f"\nWARNING: {journal['problem']}"
+    text = page(document)
     print(f"\x1b[H\x1b[2J{document['station']}\n{text}" if clear else text, flush=True)
 
 
@@ -188,7 +185,9 @@ def _request(arguments: argparse.Namespace) -> int:
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified, then = {}, ""
     if arguments.verb in STOPS:
-        unverified, then = _wait_for_standby(path, accepted), "; stands by, verified"
+        # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
+        looked_at = list(results) if arguments.verb == "stop" else accepted
+        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), "; stands by, verified"
     for line in (*unverified.values(), *(f"{bay}: {refusal}" for bay, refusal in results.items() if refusal)):
         print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
     for bay in accepted:
@@ -196,22 +195,25 @@ def _request(arguments: argparse.Namespace) -> int:
     return 1 if unverified or any(results.values()) else 0
 
 
-def _wait_for_standby(path: Path, names: Sequence[str]) -> dict[str, str]:
-    """Look at these bays until their chargers stand by; what to do about each that was not seen to in time."""
+def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[str, str]:
+    """Look at these bays until their chargers stand by; what to do about each that was not seen to in time.
+
+    `every`: and at chargers that are no bay's any more.
+    """
     from orchestrator.service.control import ask
-    from orchestrator.show import is_alarming, stands_by, what_to_do
+    from orchestrator.show import is_alarming, stands_by, strays, what_to_do
 
     end_s = time.monotonic() + STANDBY_S
     while True:
         try:
-            found = cast(
-                "list[dict[str, object]]", ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S))["bays"]
-            )
+            document = ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S))
         except ServiceError as error:
             return {name: f"{name}: NOT verified, run `orchestrator estop`: {error}" for name in names}
+        found = cast("list[dict[str, object]]", document["bays"])
         bays = [bay for bay in found if bay["name"] in names and not stands_by(bay)]
-        if time.monotonic() >= end_s or all(map(is_alarming, bays)):
-            return {str(bay["name"]): what_to_do(bay) for bay in bays}
+        others = strays(document) if every else []
+        if time.monotonic() >= end_s or (all(map(is_alarming, bays)) and not others):
+            return {str(bay["name"]): what_to_do(bay) for bay in bays} | {text: text for text in others}
         time.sleep(LOOK_S)
 
 

@@ -14,6 +14,27 @@ STANDBY_A, BMU_A = 0.5, 1.0
 Bay = Mapping[str, object]
 
 
+def page(document: Mapping[str, object]) -> str:
+    """The whole status: what to do, the bays, and what is wrong with the station itself."""
+    lines = [f"ALARM: {text}" for text in strays(document)]
+    lines.append(table(cast("Sequence[Bay]", document["bays"])))
+    problems = (
+        cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
+    )
+    return "\n".join([*lines, *(f"WARNING: {problem}" for problem in problems if problem)])
+
+
+def strays(document: Mapping[str, object]) -> list[str]:
+    """What to do about chargers that no bay has any more, and that nobody has seen to stand by."""
+    found = cast("Sequence[Mapping[str, object]]", document.get("strays", ()))
+    return [
+        f"CUT THE MAINS of the charger on {one['port']}, which was {one['bay']}'s: it may be running, nobody has "
+        f"seen that it stands by: {one['problem'] or one['state']}"
+        for one in found
+        if not one["verified"]
+    ]
+
+
 def table(bays: Sequence[Bay]) -> str:
     """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
     bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", not bay.get("alarm")))
@@ -61,6 +82,8 @@ def stands_by(bay: Bay) -> bool:
 def what_to_do(bay: Bay) -> str:
     """About a charger that was not verified to stand by: first what to do, then why."""
     why = f"{bay['state']}: {bay['reason']}"
+    if str(bay["reason"]).startswith("CUT THE MAINS"):
+        return f"{bay['name']}: {bay['reason']}"
     whose = f"{bay['name']}'s charger ({bay.get('port', 'its port is not known')})"
     if is_alarming(bay) or bay["state"] not in RESTING | {"OFFLINE"}:
         return f"CUT THE MAINS of {whose}: {why}"

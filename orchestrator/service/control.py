@@ -1,9 +1,9 @@
 """The control socket: who may ask, and how. One JSON object a line, in and out.
 
 Only the owner of the service (and root) can open the socket. One thread serves all clients at once and waits for none:
-each has its time, its bytes and its place, and whoever is slow is slow alone. Stops go first (`answers.py`). After each
-turn the thread rests, so that no number of clients takes more of the processor than its share; the control loop never
-waits for a client.
+each has its time, its bytes and its place, and whoever is slow is slow alone. Stops go first (`reception.py`). After
+each turn the thread rests, so that no number of clients takes more of the processor than its share; the control loop
+never waits for a client.
 """
 
 import errno
@@ -20,8 +20,8 @@ from pathlib import Path
 from time import monotonic, sleep, thread_time
 
 from orchestrator.errors import NoServiceError, OrchestratorError, ServiceError
-from orchestrator.service.answers import Answers, Handler, encode, refusal
 from orchestrator.service.client import Client, parse_request
+from orchestrator.service.reception import Handler, Reception, encode, refusal
 from orchestrator.service.socketfile import identity, listen, owner, remove
 
 #: So many clients are served at once; for one more the longest idle one goes.
@@ -44,7 +44,7 @@ MAX_ANSWER = 32 * 1024 * 1024
 
 
 class ControlSocket:
-    """Listens on a Unix socket and answers each request by `handler` (`Answers`)."""
+    """Listens on a Unix socket and answers each request by `handler` (`Reception`)."""
 
     def __init__(
         self, path: Path, handler: Handler, clock: Callable[[], float], say: Callable[[str], None] = lambda _: None
@@ -55,7 +55,7 @@ class ControlSocket:
         self._closing = False
         self._clients: set[Client] = set()
         self._handler = handler
-        self._answers = Answers(handler, self._reply)
+        self._reception = Reception(handler, self._reply)
         self._accept_s = -inf  # nobody is taken in before
         self._selector = selectors.DefaultSelector()
         self._listener = listen(path)
@@ -103,12 +103,12 @@ class ControlSocket:
         self._complain(f"internal error, its clients are sent away: {error!r}")
         for client in tuple(self._clients):
             self._drop(client)
-        self._answers = Answers(self._handler, self._reply)
+        self._reception = Reception(self._handler, self._reply)
 
     @property
     def _patience_s(self) -> float:
         """How long nothing may happen until the next turn."""
-        if self._answers.busy:
+        if self._reception.busy:
             return POLL_S
         return TICK_S if self._clients or self._accept_s > -inf else NAME_S
 
@@ -119,7 +119,7 @@ class ControlSocket:
         for client in ready:
             if isinstance(client, Client) and client in self._clients:
                 self._serve(client, now_s)
-        self._answers.work(now_s)
+        self._reception.work(now_s)
         for client in [client for client in self._clients if now_s > client.end_s]:
             self._drop(client)
         if now_s - self._name_s >= NAME_S:
@@ -171,14 +171,14 @@ class ControlSocket:
 
     def _make_room(self) -> bool:
         """Let the longest idle client go; where all have asked something, one whose request is not being done."""
-        others = self._clients - self._answers.stopping
+        others = self._clients - self._reception.stopping
         if others:
             self._drop(min(others, key=lambda client: (bool(client.line), client.heard_s)))
         return bool(others)
 
     def _drop(self, client: Client) -> None:
         self._clients.discard(client)
-        self._answers.forget(client)
+        self._reception.forget(client)
         with suppress(KeyError, ValueError):
             self._selector.unregister(client)
         client.close()
@@ -193,7 +193,7 @@ class ControlSocket:
             elif client.hear(now_s):
                 self._selector.unregister(client)
                 client.request = parse_request(client.line)
-                self._answers.take(client, now_s)
+                self._reception.take(client, now_s)
         except OrchestratorError as error:
             self._reply(client, refusal(str(error)), now_s)
         except OSError:

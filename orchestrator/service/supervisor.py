@@ -20,7 +20,6 @@ from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
 from orchestrator.link.can import CanBus, load
 from orchestrator.model import Request
-from orchestrator.service.answers import Answer, Later
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
@@ -30,6 +29,7 @@ from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
+from orchestrator.service.reception import Answer, Later
 from orchestrator.service.reload import Reload
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import station_status
@@ -41,8 +41,7 @@ from orchestrator.service.wiring import charger_port, open_contactor, stray_port
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
 STOP_S = 3.0
-#: A request is decided by the next step and answered when its effect is on the disk, after 2 s without it; longer than
-#: this means that the loop hangs.
+#: A request is decided by the next step, and answered when it is on disk or after 2 s; longer is a loop that hangs.
 ANSWER_S = 3.0
 #: A disk that answers has told what the last run has left within this; else the chargers are stopped meanwhile …
 LOCK_S = 0.3

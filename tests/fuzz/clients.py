@@ -14,7 +14,7 @@ from unittest.mock import patch
 
 from orchestrator.errors import ServiceError
 from orchestrator.model import Request
-from orchestrator.service import answers, client, control
+from orchestrator.service import client, control, reception
 from tests.fuzz.control import BAYS, LOOP, SUPERVISOR
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records, scratch
 from tests.waiting import wait_until
@@ -30,7 +30,7 @@ CLIENT_S = 0.005  #: instead of 1 s: how long each of these can hold the others 
 ANSWER_S = 60.0  #: for an honest client, on a machine that may stand still
 
 
-def _handle(request: dict[str, object]) -> answers.Answer | answers.Later:
+def _handle(request: dict[str, object]) -> reception.Answer | reception.Later:
     LOOP.stepped.clear()
     return SUPERVISOR._answer(request)
 
@@ -126,7 +126,7 @@ TARGET = Target(
         record(END_WORDS), record(END_WORDS, b"r"), record(LEAVE), record(HEAR), record(HEAR, b"1"), record(TURN),
         record(HONEST), _GOOD, record(COME) * 8,
     ],
-    [f"orchestrator/service/{name}.py" for name in ("answers", "client", "control")],
+    [f"orchestrator/service/{name}.py" for name in ("reception", "client", "control")],
     max_bytes=120,
     limit_s=2.0,
 )  # fmt: skip

@@ -44,6 +44,7 @@ class Loop:
         if number not in self.stepped:
             self.stepped.add(number)
             self._supervisor._bays[number].run(monotonic())
+            self._supervisor._bays[number].answer()  # there is no disk behind it to wait for
 
 
 def _service() -> tuple[Supervisor, Loop]:
@@ -91,10 +92,10 @@ def _answered(ours: socket.socket, theirs: socket.socket) -> bytes:
     server._selector.register(one, EVENT_READ)
     server._serve(one, monotonic())
     while one in server._clients:
-        if one.answering or not server._answers.busy:
+        if one.answering or not server._reception.busy:
             server._serve(one, monotonic())
-        server._answers._request_s = 0.0  # without the pause between two requests
-        server._answers.work(monotonic())
+        server._reception._request_s = 0.0  # without the pause between two requests
+        server._reception.work(monotonic())
     with theirs.makefile("rb") as stream:
         return stream.readline()
 
@@ -130,7 +131,7 @@ TARGET = Target(
         b"\n", b", ", b": ", b"{", b"}", b"[", b"]", b"[" * 1200, b"]" * 1200, b'{"a":' * 300, b"\xff", b"\xef\xbb\xbf",
         b"\0", b" " * 4096, b'"bay-1", ', b'"' + b"\\u0001" * 600 + b'"', b"\\", b'"',
     ],
-    [f"orchestrator/service/{name}.py" for name in ("answers", "client", "control", "supervisor", "status")],
+    [f"orchestrator/service/{name}.py" for name in ("reception", "client", "control", "supervisor", "status")],
     max_bytes=client.MAX_REQUEST + 64,
     limit_s=1.0,
 )  # fmt: skip

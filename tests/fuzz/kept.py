@@ -5,7 +5,7 @@ import json
 from orchestrator.core.faults import ROW
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted, PersistedFault
-from orchestrator.service import answers
+from orchestrator.service import reception
 from orchestrator.service.loading import FILE, FIRST_FILE, load
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.stateformat import Stamp, decode, encode
@@ -30,7 +30,7 @@ def one(data: bytes) -> None:
             memory = found[place].memory(NOW_S)
             _is_no_free_start(found[place], memory)
             shown = {"reason": memory.hold, "faults": [fault.text for fault in memory.faults.values()]}
-            assert json.loads(answers.encode(shown)) == shown
+            assert json.loads(reception.encode(shown)) == shown
         assert decode(encode(NOW, loaded.run, loaded.entries), NOW) == (loaded.run, list(loaded.entries))
 
 

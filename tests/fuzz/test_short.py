@@ -21,10 +21,10 @@ from orchestrator.devices import battery, dialogue
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.model import Measurement
 from orchestrator.protocol import frame, standby, words
-from orchestrator.service import answers, control, lastline, typed
-from orchestrator.service.answers import Later
+from orchestrator.service import control, lastline, reception, typed
 from orchestrator.service.client import Client
 from orchestrator.service.guardian import Guardian
+from orchestrator.service.reception import Later
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz import __main__ as runner
 from tests.fuzz.__main__ import NAMES, main, the_target, unguided
@@ -160,7 +160,7 @@ def asks_one_only(patch: Patch) -> None:
 
 
 def raw_answers(patch: Patch) -> None:
-    patch.setattr(answers, "encode", lambda answer: str(answer).encode() + b"\n")
+    patch.setattr(reception, "encode", lambda answer: str(answer).encode() + b"\n")
 
 
 def waits_for_the_line(patch: Patch) -> None:

@@ -18,9 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.errors import ServiceError
-from orchestrator.service import answers as answers_module
 from orchestrator.service import control as control_module
-from orchestrator.service.answers import PAUSE_S, SHARED_S, Answer, Handler, Later
+from orchestrator.service import reception as reception_module
 from orchestrator.service.client import CLIENT_S, MAX_REQUEST, Client, parse_request
 from orchestrator.service.control import (
     MAX_CLIENTS,
@@ -31,6 +30,7 @@ from orchestrator.service.control import (
     ControlSocket,
     ask,
 )
+from orchestrator.service.reception import PAUSE_S, SHARED_S, Answer, Handler, Later
 from orchestrator.service.socketfile import is_alive
 from tests.waiting import wait_until
 
@@ -301,7 +301,7 @@ def test_an_answer_that_comes_later_keeps_nobody_waiting(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("broken", [lambda: None, lambda: json.loads("lost")], ids=["never", "fails"])
 def test_an_answer_that_never_comes_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, broken: Later) -> None:
-    monkeypatch.setattr(answers_module, "ANSWER_S", 0.1)
+    monkeypatch.setattr(reception_module, "ANSWER_S", 0.1)
     with listening(tmp_path / "control.sock", lambda _: broken), pytest.raises(ServiceError, match="internal: "):
         ask(tmp_path / "control.sock", {"verb": "start"})
 
@@ -333,7 +333,7 @@ def test_a_stop_goes_first_and_what_it_overtook_is_not_done_after_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whoever asked for a start before the stop must ask again; what is for other bays stays."""
-    monkeypatch.setattr(answers_module, "PAUSE_S", 0.5)
+    monkeypatch.setattr(reception_module, "PAUSE_S", 0.5)
     bays, path = Bays(), tmp_path / "control.sock"
     bays.ready.set()
     with listening(path, bays), closing_all() as clients:
@@ -377,8 +377,8 @@ def test_those_who_ask_for_the_status_at_once_get_the_same_one(tmp_path: Path) -
 
 
 def test_requests_that_are_too_many_are_refused_in_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(answers_module, "QUEUE_S", 0.2)
-    monkeypatch.setattr(answers_module, "PAUSE_S", 60.0)
+    monkeypatch.setattr(reception_module, "QUEUE_S", 0.2)
+    monkeypatch.setattr(reception_module, "PAUSE_S", 60.0)
     bays, path = Bays(), tmp_path / "control.sock"
     bays.ready.set()
     with listening(path, bays), closing_all() as clients:

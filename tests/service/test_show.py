@@ -5,7 +5,7 @@ from typing import cast
 
 import pytest
 
-from orchestrator.show import figure, stands_by, table, what_to_do
+from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
 
 
 def bay(**changes: object) -> dict[str, object]:
@@ -170,3 +170,27 @@ def test_whatever_speaks_against_it_is_no_standby(change: dict[str, object]) -> 
 )
 def test_what_to_do_is_said_before_why(change: dict[str, object], first: str) -> None:
     assert what_to_do({**STOPPED, **change}) == f"{first}stopped by the operator"
+
+
+def test_advice_that_the_reason_begins_with_is_not_said_twice() -> None:
+    told = bay(state="UNCONTROLLABLE", reason="CUT THE MAINS of this charger (/dev/x): it runs on")
+    assert what_to_do(told) == "bay-1: CUT THE MAINS of this charger (/dev/x): it runs on"
+
+
+def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_what_is_wrong_with_the_station() -> None:
+    stray = {"bay": "bay-7", "port": "/dev/old", "state": "STOPPING", "verified": False, "problem": "no such port"}
+    document = {
+        "bays": [],
+        "journal": {"problem": "disk full"},
+        "persisted": {"problem": "its disk hangs"},
+        "strays": [stray, {**stray, "port": "/dev/other", "verified": True}],
+    }
+    assert page(document).splitlines() == [
+        "ALARM: CUT THE MAINS of the charger on /dev/old, which was bay-7's: it may be running, nobody has seen that "
+        "it stands by: no such port",
+        "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY",
+        "WARNING: disk full",
+        "WARNING: its disk hangs",
+    ]
+    assert strays({}) == []
+    assert page({"bays": [], "journal": {"problem": ""}}) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"

@@ -141,5 +141,7 @@ def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
     assert station_status(station, [], "disk full") == {
         "station": "depot-1",
         "bays": [],
+        "strays": [],
         "journal": {"problem": "disk full"},
+        "persisted": {"problem": ""},
     }

@@ -43,7 +43,7 @@ class Pending:
     end_s: float
 
 
-class Answers:
+class Reception:
     """Takes complete requests, and calls `reply` once for each. Belongs to the control thread; nothing here waits.
 
     `handler` must not wait either: what takes time it answers with a function that is asked until it has the answer.
