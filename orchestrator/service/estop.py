@@ -39,6 +39,8 @@ FROZEN = "watchdog"
 VERIFY_S = 3.0
 #: A charger that stands by is watched for this long: one that runs again was not stopped.
 WATCH_S = 1.0
+#: Who reads what is told may keep it waiting for this long.
+READER_S = 2.0
 #: What the service has written down is waited for no longer than this: its disk may hang.
 READ_S = 1.0
 
@@ -158,6 +160,9 @@ class EmergencyStop:
 
     def finish(self) -> int:
         """Verify all of them, with whatever help there is, and tell what became of each; the exit status."""
+        import signal  # noqa: PLC0415 - the first stops are out now
+
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
         if not self._bays:
             for note in self._notes:
                 _say(2, note)
@@ -209,12 +214,9 @@ class EmergencyStop:
 
 
 def _say(fd: int, text: str) -> None:
-    """A terminal that cannot show a character, or is gone, is no reason to end otherwise than as it is."""
+    """A terminal that cannot show a character, stands still or is gone must not change how this ends."""
+    from orchestrator.service.say import put  # noqa: PLC0415 - the first stops are out now
+
     stream = sys.stdout if fd == 1 else sys.stderr
     encoding = getattr(stream, "encoding", None) or "ascii"
-    data = f"{text}\n".encode(encoding, errors="backslashreplace")
-    try:
-        while data:
-            data = data[os.write(fd, data) :]
-    except OSError:
-        return
+    put(fd, f"{text}\n".encode(encoding, errors="backslashreplace"), READER_S)

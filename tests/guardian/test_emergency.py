@@ -2,13 +2,14 @@
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -179,9 +180,10 @@ def test_whoever_does_not_listen_changes_nothing(tmp_path: Path, arguments: list
         words = [bench.name if word == "PORT" else word for word in arguments]
         heard = estop(*words, cwd=tmp_path)
         for gone in (1, 2):
+            argv = [sys.executable, "-m", "orchestrator", "estop", *words]
             closed = subprocess.run(
-                ["sh", "-c", f'exec {gone}>&-; exec "$@"', "sh", sys.executable, "-m", "orchestrator", "estop", *words],
-                cwd=tmp_path, capture_output=True, text=True, check=False, env={**os.environ, "ORCHESTRATOR_SOCKET": ""},
+                ["sh", "-c", f'exec {gone}>&-; exec "$@"', "sh", *argv], cwd=tmp_path, capture_output=True, text=True,
+                check=False, env={**os.environ, "ORCHESTRATOR_SOCKET": ""},
             )  # fmt: skip
             assert closed.returncode == heard.returncode
             assert "Traceback" not in closed.stderr
@@ -192,12 +194,38 @@ def test_whoever_does_not_listen_changes_nothing(tmp_path: Path, arguments: list
         assert (piped.returncode, "Traceback" in piped.stderr) == (heard.returncode, False)
 
 
+def test_a_terminal_that_stands_still_keeps_nobody_from_the_exit_status(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    with running_chargers(tmp_path) as (bench,):
+        began_s = time.monotonic()
+        assert estop("--port", bench.name, cwd=tmp_path, stdout=writer).returncode == 0
+        assert time.monotonic() - began_s < 8.0
+    os.close(reader)
+    os.close(writer)
+
+
+def test_ctrl_c_leaves_no_traceback(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        argv = [sys.executable, "-m", "orchestrator", "estop", "--port", bench.name]
+        with subprocess.Popen(argv, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+            wait_until(lambda: bench.wire.counters.polls, what="the first question")
+            running.send_signal(signal.SIGINT)
+            assert running.communicate() == (b"", b"")
+            assert running.returncode == -signal.SIGINT
+        assert not bench.runs
+
+
 # --- beside what calls itself a service ------------------------------------------------------------------------------
 
 
 @contextmanager
 def answering(path: Path, status: Mapping[str, Any] | None) -> Iterator[list[Mapping[str, Any]]]:
-    """What listens on a Unix socket, and all that it is asked: answers like a service, or drips for ever (None)."""
+    """What listens on a Unix socket, and all that it is asked: it answers like a service, or drips for ever."""
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     listener.bind(str(path))
     listener.listen()
