@@ -120,23 +120,28 @@ class EmergencyStop:
 
     def by_station(self) -> None:
         """Stop what a station file names, and what is in hand besides."""
-        journal = ""
-        if self._options.stations:
-            journal = self._take(self._options.stations[0])
-        else:
-            from orchestrator.service.inhand import stations  # noqa: PLC0415 - only where it is needed
-
-            for station in stations():
-                journal = self._take(station)
-                if self._bays or journal:
-                    self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has no such
-                    break
-        if journal:
-            reading = threading.Thread(target=self._take_in_hand, args=(journal,), daemon=True)
+        journals = self._take_any() if not self._options.stations else [self._take(self._options.stations[0])]
+        readings = [threading.Thread(target=self._take_in_hand, args=(name,), daemon=True) for name in journals if name]
+        end_s = time.monotonic() + READ_S
+        for reading in readings:
             reading.start()
-            reading.join(READ_S)
-            if reading.is_alive():
-                self._notes.append(f"{journal} cannot be read in time: ports that it may name besides were not stopped")
+        for reading in readings:
+            reading.join(max(0.0, end_s - time.monotonic()))
+        if any(reading.is_alive() for reading in readings):
+            self._notes.append("the journal cannot be read in time: ports that it may name besides were not stopped")
+
+    def _take_any(self) -> list[str]:
+        """The station file that is meant where none is named; of several that run, all of them."""
+        from orchestrator.service.inhand import stations  # noqa: PLC0415 - only where it is needed
+
+        for together in stations():
+            journals = []
+            for station in together:
+                journals.append(self._take(station))
+                self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has no such
+            if self._bays or any(journals):
+                return journals
+        return []
 
     def _take(self, station: str) -> str:
         """Stop what this file names; the journal's directory. A file with mistakes gives what it can."""

@@ -441,6 +441,14 @@ def test_a_port_that_was_set_to_another_speed_is_stopped(tmp_path: Path, *, open
         assert not charger.running
 
 
+@pytest.mark.parametrize("opened", [True, False])
+def test_output_that_was_suspended_goes_on(tmp_path: Path, *, opened: bool) -> None:
+    """As by Ctrl-S, or an XOFF that came in while somebody had flow control on."""
+    with running_chargers(tmp_path) as (bench,):
+        termios.tcflow(bench.fd, termios.TCOOFF)
+        assert stop_all({bench.name: bench.duplicate() if opened else None}, 3.0) == {bench.name: ""}
+
+
 def test_settings_that_hang_do_not_keep_the_first_stop_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with plugged(tmp_path / "port") as pty, hanging(monkeypatch, termios, "tcsetattr", pty.path):
         fd = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
