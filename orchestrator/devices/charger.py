@@ -182,24 +182,28 @@ class ChargerPort:
 
     def _write(self, line: Line, frame: bytes, order: Command, turn: Turn, *, whole_stop: bool = False) -> None:
         start_s = self._clock()
-        if order == STOP:
-            self._restore(line)
+        found = self._restored(line) if order == STOP else ""
         line.write(frame)
         end_s = self._clock()
         self._took(turn, start_s, end_s)
+        self._found(found)
         stop_sent_s = end_s if whole_stop else self._view[1].stop_sent_s
         self._publish(sent=Sent(order, end_s), stop_sent_s=stop_sent_s, refused="")
 
-    def _restore(self, line: Line) -> None:
-        """Whose settings the port has: ours, when this is over. What fails here must not keep a stop from the line."""
+    def _restored(self, line: Line) -> str:
+        """What had to be set right. That this fails must not keep a stop from the line."""
         with suppress(LinkError):
-            if found := line.restore():
-                self._publish(taken_over=found, taken_over_t_s=self._clock())
+            return line.restore()
+        return ""
+
+    def _found(self, taken_over: str) -> None:
+        if taken_over:
+            self._publish(taken_over=taken_over, taken_over_t_s=self._clock())
 
     def _look(self, line: Line) -> None:
         """What others do to the port shows here, once a second."""
         self._look_s = self._clock() + LOOK_S
-        self._restore(line)
+        self._found(self._restored(line))
         self._publish(locked_by=line.locked_by())
 
     def _poll(self, line: Line, refused: str = "") -> None:
@@ -222,7 +226,7 @@ class ChargerPort:
         if reading is None:
             reading = dialogue.give_up(now_s)
         if reading is None:
-            self._restore(line)
+            self._found(self._restored(line))
         self._took(Turn.POLL, asked_s, now_s)
         self._polled(reading, refused)
 

@@ -36,12 +36,12 @@ def holder(port: str, but: Iterable[int] = ()) -> Holder:
     return _best([found for pid in _openers(port) if pid not in besides and (found := _process(pid))])
 
 
-def control_socket(port: str) -> str:
-    """The control socket of the orchestrator that holds this port; "" where none does, or where that cannot be told."""
-    for pids in (_lockers, _openers):
-        for pid in pids(port):
-            if is_orchestrator(_words(pid)) and (path := _listens_on(pid)):
-                return path
+def control_socket(ports: Iterable[str]) -> str:
+    """The control socket of an orchestrator that has one of these ports open; "" where none can be found."""
+    devices = {os.path.realpath(port) for port in ports}
+    for pid, _ in orchestrators():
+        if not devices.isdisjoint(_files(pid)) and (path := _listens_on(pid)):
+            return path
     return ""
 
 

@@ -35,6 +35,8 @@ _GONE = "the adapter was unplugged or lost its power, or another program reads t
 _BUSY = "in use: another program holds it, or two bays name the same port; close the other one (lsof shows it)"
 _FORBIDDEN = "permission denied: add the user that runs this to the group dialout, then log in again"
 _NO_PORT = "it is no serial port: check the name in the station file (ls -l /dev/serial/by-path)"
+_STUBBORN = f"its driver does not take the charger's settings, {BAUD} baud 8N1; use another adapter"
+_ESSENTIAL = ("baud", "data bits", "parity")  #: else no charger understands a word
 _STALLED = f"stalled, it took nothing for {WRITE_TIMEOUT_S:g} s; unplug the adapter and plug it in again"
 _TAKEN = (
     "another program has opened it for itself alone (TIOCEXCL), so that nobody else can stop this charger: end that "
@@ -74,6 +76,8 @@ class SerialLine:
         self._tolerated = ""
         self.restore()  # pyserial does not set all of it; output may be suspended, say
         self._tolerated = self.restore()  # what the driver does not take is nobody else's doing
+        if any(word in self._tolerated for word in _ESSENTIAL):
+            raise LinkError(f"{self._path}: {_STUBBORN} ({self._tolerated})")
 
     @classmethod
     def open(cls, path: str, *, kernel_rs485: bool = False) -> Self:
@@ -101,7 +105,7 @@ class SerialLine:
                 ) from error
         try:
             return cls(port, locked=locked)
-        except LinkError:  # it has gone in this moment
+        except LinkError:
             port.close()
             raise
 

@@ -39,6 +39,8 @@ FROZEN = "watchdog"
 VERIFY_S = 3.0
 #: A charger that stands by is watched for this long: one that runs again was not stopped.
 WATCH_S = 1.0
+#: Who reads what is told may keep it waiting for this long.
+READER_S = 2.0
 #: What the service has written down is waited for no longer than this: its disk may hang.
 READ_S = 1.0
 
@@ -118,23 +120,28 @@ class EmergencyStop:
 
     def by_station(self) -> None:
         """Stop what a station file names, and what is in hand besides."""
-        journal = ""
-        if self._options.stations:
-            journal = self._take(self._options.stations[0])
-        else:
-            from orchestrator.service.inhand import stations  # noqa: PLC0415 - only where it is needed
-
-            for station in stations():
-                journal = self._take(station)
-                if self._bays or journal:
-                    self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has no such
-                    break
-        if journal:
-            reading = threading.Thread(target=self._take_in_hand, args=(journal,), daemon=True)
+        journals = self._take_any() if not self._options.stations else [self._take(self._options.stations[0])]
+        readings = [threading.Thread(target=self._take_in_hand, args=(name,), daemon=True) for name in journals if name]
+        end_s = time.monotonic() + READ_S
+        for reading in readings:
             reading.start()
-            reading.join(READ_S)
-            if reading.is_alive():
-                self._notes.append(f"{journal} cannot be read in time: ports that it may name besides were not stopped")
+        for reading in readings:
+            reading.join(max(0.0, end_s - time.monotonic()))
+        if any(reading.is_alive() for reading in readings):
+            self._notes.append("the journal cannot be read in time: ports that it may name besides were not stopped")
+
+    def _take_any(self) -> list[str]:
+        """The station file that is meant where none is named; of several that run, all of them."""
+        from orchestrator.service.inhand import stations  # noqa: PLC0415 - only where it is needed
+
+        for together in stations():
+            journals = []
+            for station in together:
+                journals.append(self._take(station))
+                self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has no such
+            if self._bays or any(journals):
+                return journals
+        return []
 
     def _take(self, station: str) -> str:
         """Stop what this file names; the journal's directory. A file with mistakes gives what it can."""
@@ -158,6 +165,9 @@ class EmergencyStop:
 
     def finish(self) -> int:
         """Verify all of them, with whatever help there is, and tell what became of each; the exit status."""
+        import signal  # noqa: PLC0415 - the first stops are out now
+
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
         if not self._bays:
             for note in self._notes:
                 _say(2, note)
@@ -209,12 +219,9 @@ class EmergencyStop:
 
 
 def _say(fd: int, text: str) -> None:
-    """A terminal that cannot show a character, or is gone, is no reason to end otherwise than as it is."""
+    """A terminal that cannot show a character, stands still or is gone must not change how this ends."""
+    from orchestrator.service.say import put  # noqa: PLC0415 - the first stops are out now
+
     stream = sys.stdout if fd == 1 else sys.stderr
     encoding = getattr(stream, "encoding", None) or "ascii"
-    data = f"{text}\n".encode(encoding, errors="backslashreplace")
-    try:
-        while data:
-            data = data[os.write(fd, data) :]
-    except OSError:
-        return
+    put(fd, f"{text}\n".encode(encoding, errors="backslashreplace"), READER_S)

@@ -20,14 +20,16 @@ FILES = ("persisted.json", "kept.json")
 MAX_BYTES = 16 * 1024 * 1024
 
 
-def stations() -> Iterator[str]:
-    """Station files that may be meant, the likeliest first; only such as are there."""
-    yield from filter(os.path.isfile, PLACES)
-    for pid, words in orchestrators():
-        name = _station(words)
-        path = os.path.join(directory(pid), name)  # noqa: PTH118
-        if name and os.path.isfile(path):  # noqa: PTH113
-            yield path
+def stations() -> Iterator[list[str]]:
+    """Station files that may be meant, the likeliest first, together where several are; only such as are there."""
+    for place in PLACES:
+        yield _existing([place])
+    yield _existing([os.path.join(directory(pid), name) for pid, words in orchestrators() if (name := _station(words))])  # noqa: PTH118
+
+
+def _existing(paths: list[str]) -> list[str]:
+    """Each once. Of what we may not look at, pathlib would make an error."""
+    return [path for path in dict.fromkeys(paths) if os.path.isfile(path)]  # noqa: PTH113
 
 
 def ports_in_hand(journal: str) -> dict[str, str]:

@@ -62,6 +62,7 @@ class LastLine:
         self.shown_s: float | None = None  #: since when every answer has shown standby
         self._fd, self._witness, self._leave_held = fd, witness, leave_held
         self._stopped_s = 0.0  # when the first stop had been written
+        self._begun = False  # the thread has had its first round
         self._proofs, self._sample = 0, 0.0
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
@@ -76,15 +77,13 @@ class LastLine:
         self._thread = thread
         return True
 
-    def stop(self) -> None:
-        """Write a stop, without a thread if need be."""
+    def first(self) -> None:
+        """Write the first stop, before anything else is asked of the port."""
         if self._fd is not None:
             os.set_blocking(self._fd, False)
         self.write(STOP_FRAME)
-        self._stopped_s = self._stopped_s or time.monotonic()
+        self._stopped_s = time.monotonic()
         self.tried.set()
-        if self._restored():
-            self.write(STOP_FRAME)
 
     def end(self) -> None:
         """Let the thread close the port and end."""
@@ -110,12 +109,21 @@ class LastLine:
 
     def _round(self, began_s: float) -> None:
         if not self._proofs:
-            self.stop()
+            self._stop()
             for at_s, frame in STOPS[1:]:
                 self._pause_until(began_s + at_s)
                 self.write(frame)
             self._pause_until(began_s + ASK_S)
         self._look()
+
+    def _stop(self) -> None:
+        if not self.tried.is_set():
+            self.first()
+        elif self._begun:
+            self.write(STOP_FRAME)
+        self._begun = True
+        if self._restored():
+            self.write(STOP_FRAME)
 
     def _pause_until(self, at_s: float) -> None:
         left_s = at_s - time.monotonic()

@@ -68,7 +68,7 @@ class Service:
 
     def _hold(self) -> bool:
         """Tell it to hold its bays until an operator starts them. False where there is no service."""
-        found = next(filter(None, map(control_socket, self._ports)), "")
+        found = control_socket(self._ports)
         if not found and not _listens(self._named):
             self.said = NOBODY
             self.told.set()  # one that starts now stops its chargers first, and asks nobody

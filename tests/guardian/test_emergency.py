@@ -2,13 +2,14 @@
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -49,32 +50,55 @@ def test_without_arguments_the_file_in_this_folder_counts(tmp_path: Path) -> Non
         assert done.stderr == f"station file: {file}\n{NOBODY}\n"
 
 
-def test_else_that_of_a_service_that_runs(tmp_path: Path) -> None:
-    """Found by its command line, and relative to its own folder."""
-    (tmp_path / "its").mkdir()
-    (tmp_path / "here").mkdir()
-    with running_chargers(tmp_path) as (bench,):
-        file = station_file(tmp_path / "its" / "depot.yaml", bench)
-        service = subprocess.Popen(
-            ["orchestrator", "-c", "input()", "run", "depot.yaml"], executable=sys.executable, cwd=file.parent,
-            stdin=subprocess.PIPE,
-        )  # fmt: skip
-        try:
-            if Path(inhand.PLACES[1]).exists():
-                pytest.skip("there is an installed one on this machine")
-            wait_until(lambda: str(file) in stations())
-            done = estop(cwd=tmp_path / "here")
-        finally:
-            service.communicate(b"\n")
-        assert (done.returncode, done.stdout) == (0, f"bay-1 ({bench.name}): standby verified\n{DONE}")
-        assert f"station file: {file}\n" in done.stderr
+#: An emergency stop that sees only these processes: others on this machine may be somebody else's tests.
+AMONG = """
+import sys
+from orchestrator.service import estop, inhand
+every, ours = inhand.orchestrators, {int(word) for word in sys.argv[1:]}
+inhand.orchestrators = lambda: (one for one in every() if one[0] in ours)
+sys.exit(estop.main([]))
+"""
+
+
+def test_else_those_of_the_services_that_run(tmp_path: Path) -> None:
+    """Found by their command lines, relative to their own folders."""
+    if Path(inhand.PLACES[1]).exists():
+        pytest.skip("there is an installed one on this machine")
+    with running_chargers(tmp_path, 2) as benches, ExitStack() as stack:
+        files, services = [], []
+        for number, bench in enumerate(benches):
+            (tmp_path / str(number)).mkdir()
+            files.append(station_file(tmp_path / str(number) / "depot.yaml", bench))
+            services.append(stack.enter_context(running(files[-1])))
+        argv = [sys.executable, "-c", AMONG, *(str(service.pid) for service in services)]
+        (tmp_path / "here").mkdir()
+        done = subprocess.run(argv, cwd=tmp_path / "here", capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout.count("standby verified")) == (0, 2)
+        assert [f"station file: {file}" in done.stderr for file in files] == [True, True]
+        assert not any(bench.runs for bench in benches)
+
+
+@contextmanager
+def running(file: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """What looks like a service, with this station file in its own folder."""
+    service = subprocess.Popen(
+        ["orchestrator", "-c", "print(flush=True); input()", "run", file.name], executable=sys.executable,
+        cwd=file.parent, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    assert service.stdout is not None
+    service.stdout.readline()
+    try:
+        yield service
+    finally:
+        service.communicate(b"\n")
 
 
 def test_the_installed_one_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed = tmp_path / "installed.yaml"
     installed.touch()
     monkeypatch.setattr(inhand, "PLACES", (str(tmp_path / "none"), str(installed)))
-    assert next(stations()) == str(installed)
+    none, first, *_ = stations()
+    assert (none, first) == ([], [str(installed)])
 
 
 @pytest.mark.parametrize(
@@ -179,9 +203,10 @@ def test_whoever_does_not_listen_changes_nothing(tmp_path: Path, arguments: list
         words = [bench.name if word == "PORT" else word for word in arguments]
         heard = estop(*words, cwd=tmp_path)
         for gone in (1, 2):
+            argv = [sys.executable, "-m", "orchestrator", "estop", *words]
             closed = subprocess.run(
-                ["sh", "-c", f'exec {gone}>&-; exec "$@"', "sh", sys.executable, "-m", "orchestrator", "estop", *words],
-                cwd=tmp_path, capture_output=True, text=True, check=False, env={**os.environ, "ORCHESTRATOR_SOCKET": ""},
+                ["sh", "-c", f'exec {gone}>&-; exec "$@"', "sh", *argv], cwd=tmp_path, capture_output=True, text=True,
+                check=False, env={**os.environ, "ORCHESTRATOR_SOCKET": ""},
             )  # fmt: skip
             assert closed.returncode == heard.returncode
             assert "Traceback" not in closed.stderr
@@ -192,12 +217,38 @@ def test_whoever_does_not_listen_changes_nothing(tmp_path: Path, arguments: list
         assert (piped.returncode, "Traceback" in piped.stderr) == (heard.returncode, False)
 
 
+def test_a_terminal_that_stands_still_keeps_nobody_from_the_exit_status(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    with running_chargers(tmp_path) as (bench,):
+        began_s = time.monotonic()
+        assert estop("--port", bench.name, cwd=tmp_path, stdout=writer).returncode == 0
+        assert time.monotonic() - began_s < 8.0
+    os.close(reader)
+    os.close(writer)
+
+
+def test_ctrl_c_leaves_no_traceback(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        argv = [sys.executable, "-m", "orchestrator", "estop", "--port", bench.name]
+        with subprocess.Popen(argv, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+            wait_until(lambda: bench.wire.counters.polls, what="the first question")
+            running.send_signal(signal.SIGINT)
+            assert running.communicate() == (b"", b"")
+            assert running.returncode == -signal.SIGINT
+        assert not bench.runs
+
+
 # --- beside what calls itself a service ------------------------------------------------------------------------------
 
 
 @contextmanager
 def answering(path: Path, status: Mapping[str, Any] | None) -> Iterator[list[Mapping[str, Any]]]:
-    """What listens on a Unix socket, and all that it is asked: answers like a service, or drips for ever (None)."""
+    """What listens on a Unix socket, and all that it is asked: it answers like a service, or drips for ever."""
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     listener.bind(str(path))
     listener.listen()

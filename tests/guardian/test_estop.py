@@ -157,7 +157,7 @@ def test_with_a_port_only_that_bay_is_held(station: Station) -> None:
     """Nobody named the socket: it is found by the lock on the port."""
     plant, service = station
     port = port_of(station, 1)
-    assert control_socket(port) == str(service.socket)
+    assert control_socket([port]) == str(service.socket)
     done = estop("--port", port)
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{port}: standby verified\n{DONE}", held("bay-1"))
     assert [plant.state(bay)["operation"] for bay in (1, 2, 3, 4)] == [0, 1, 1, 1]

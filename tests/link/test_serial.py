@@ -215,6 +215,20 @@ def test_settings_that_a_driver_does_not_take_are_nobodys_doing(pty: Pty, monkey
     line.close()
 
 
+def test_a_driver_that_does_not_take_the_speed_is_told(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    takes = termios.tcsetattr
+
+    def always_fast(fd: int, when: int, attributes: list[Any]) -> None:
+        attributes[4] = attributes[5] = termios.B115200
+        takes(fd, when, attributes)
+
+    monkeypatch.setattr(termios, "tcsetattr", always_fast)
+    text = failure(pty.path)
+    assert "its driver does not take the charger's settings, 19200 baud 8N1; use another adapter (115200 baud)" in text
+    monkeypatch.undo()
+    SerialLine.open(pty.path).close()  # it was given back
+
+
 def test_output_that_was_suspended_goes_on(pty: Pty, line: SerialLine) -> None:
     termios.tcflow(line.fileno(), termios.TCOOFF)
     line.restore()
