@@ -194,15 +194,15 @@ class BatteryNode:
         """Somebody else asks the node."""
         self._health.excuse()
         request = self._others.asked(data, now_s)
-        if request is not None and request.ask is Ask.WRITE:
+        if request is not None and request.ask in (Ask.WRITE, Ask.BLOCK_WRITE):
             self._setup.touched((request.index, request.sub), request.timer_ms, now_s)
         self._say_others()
 
     def _say_others(self) -> None:
-        others = self._others
-        if others.said_s != self._view.link.other_master_t_s and others.said:
-            self._view.set(other_master=others.said, news=others.said != self._view.link.other_master)
-            self._view.set(other_master_t_s=others.said_s, news=False)
+        said, said_s = self._others.said, self._others.said_s
+        if said and said_s != self._view.link.other_master_t_s:
+            self._view.set(other_master=said)
+            self._view.set(other_master_t_s=said_s, news=False)
 
     def _on_sdo(self, data: bytes, now_s: float) -> None:
         self.next_due_s = now_s
@@ -223,7 +223,8 @@ class BatteryNode:
         self._answer_s = now_s
         self._not_before_s = -inf
         self._view.set(online=True, problem="")
-        self._others.ours_answered(self._client.asked_s)
+        if self._others.active:
+            self._others.ours_answered(self._client.asked_s)
         if self._client.writing:
             self._configured(now_s, written=isinstance(reply, SdoWritten))
             return
@@ -270,7 +271,7 @@ class BatteryNode:
         self._view.booted(now_s)
         self._client.clear()
         self._others.clear()
-        self._setup.restart()
+        self._setup.booted()
         self._plan.restart(now_s)
         self._not_before_s = -inf
         self.next_due_s = now_s
@@ -284,7 +285,7 @@ class BatteryNode:
 
     def _on_tpdo(self, tpdo: TpdoEntry, data: bytes, now_s: float) -> None:
         objects = [self._plan[index, 0] for index in tpdo.objects]
-        if len(data) != sum(polled.entry.size for polled in objects):
+        if self._setup.tpdos_changed or len(data) != sum(polled.entry.size for polled in objects):
             self._view.dropped()
             return
         begin = 0

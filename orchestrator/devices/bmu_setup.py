@@ -18,6 +18,9 @@ CHECK_PERIODS = 3  #: so many missed: read back which period it has now, well be
 ODD = (0.6, 1.5)  #: times its period, an interval between two heartbeats is as it should be …
 MOST_ODD = 3  #: … and after so many in a row that are not, the period is read back, too
 
+#: What TPDO 1 … 4 carry, when and as which frame; only the timer's value does not change what a frame means.
+TPDO_SETTINGS = (*range(0x1800, 0x1804), *range(0x1A00, 0x1A04))
+
 RETRY_S = 1.0  #: a write that was not answered is tried again after this, and a period read back again
 LOST_PERIODS = 5  #: so many heartbeats missed by a node that still answers: it booted and we did not hear it
 
@@ -50,17 +53,23 @@ class BmuSetup:
 
     __slots__ = (
         "_all", "_any_tpdo", "_check_s", "_heard", "_heartbeat_s", "_left", "_lost_s", "_odd", "_rearm", "_retry_s",
-        "check_due", "start_due",
+        "check_due", "start_due", "tpdos_changed",
     )  # fmt: skip
 
     def __init__(self, config: BatteryConfig) -> None:
         self._all = timer_writes(config)
         self._heartbeat_s = inf if config.heartbeat_s is None else config.heartbeat_s
         self._lost_s = LOST_PERIODS * self._heartbeat_s
+        self.booted()
+
+    def booted(self) -> None:
+        """The node booted, and has forgotten what others had set."""
+        #: Another master changed what the TPDOs carry, or where: they are not to be used until the node boots.
+        self.tpdos_changed = False
         self.restart()
 
     def restart(self) -> None:
-        """The node booted: everything again."""
+        """Write everything again."""
         self._left = list(self._all)
         self._retry_s = -inf
         self._any_tpdo = False
@@ -110,7 +119,10 @@ class BmuSetup:
             self._retry_s = now_s + RETRY_S
 
     def touched(self, key: Key, period_ms: int | None, now_s: float) -> None:
-        """Somebody else writes a timer, which may be one of ours."""
+        """Somebody else writes an object, which may be a timer of ours or change what the TPDOs carry."""
+        index, sub = key
+        if index in TPDO_SETTINGS and sub != _TPDO_TIMER_SUB:
+            self.tpdos_changed = True
         mine = next((write for write in self._all if write.key == key), None)
         if mine is None or period_ms == round(mine.period_s * 1000) or mine in self._left:
             return

@@ -19,9 +19,10 @@ FORGET_S = 2.0  #: what was not answered for so long is not answered any more
 ORDER_S = 0.05
 TRANSFER_S = 0.2  #: a longer transfer that stood still for so long has ended
 #: How long a request of ours lets a request, or a longer transfer, of others go first. Many nodes have room for one.
-POLITE_S, POLITE_TRANSFER_S = 0.05, 0.15
+POLITE_S, POLITE_TRANSFER_S = 0.05, 0.2
 SAY_S = 1.0  #: what they do is said once a second at most; more than reading at once
 MOST_OPEN = 256  #: requests that are remembered
+_OUT_OF_STEP = (0x0503, 0x0504)  #: upper half of an abort code: the protocol was not kept, whatever the object is
 _AHEAD = 4  #: segments of a block that may be lost to us alone
 
 _VERBS = {Ask.READ: "reads", Ask.BLOCK_READ: "reads", Ask.WRITE: "writes", Ask.BLOCK_WRITE: "writes"}
@@ -52,7 +53,19 @@ class Open:
 class OtherMasters:
     """What they asked one node, and what they were last seen to do."""
 
-    __slots__ = ("_grave_s", "_open", "_polite_s", "_segment", "_transfer", "_transfer_s", "_writing", "said", "said_s")
+    __slots__ = (
+        "_going",
+        "_going_s",
+        "_grave_s",
+        "_open",
+        "_polite_s",
+        "_segment",
+        "_transfer",
+        "_transfer_s",
+        "_writing",
+        "said",
+        "said_s",
+    )
 
     def __init__(self) -> None:
         self.said = ""  #: what another master was last seen to do, for a person
@@ -61,18 +74,31 @@ class OtherMasters:
         self._open: deque[Open] = deque(maxlen=MOST_OPEN)
         self._transfer: Key | None = None  # of their longer transfer
         self._transfer_s = -inf  # when its newest frame came
+        self._going = False  # they asked for the next frame of a transfer; a node that knows of none aborts, each time
+        self._going_s = -inf
         self._segment = 0  # the number of the next segment of a block that streams; 0: none does
         self._writing = False  # a block is being written: their frames are data
         self._polite_s: float | None = None  # since when a request of ours waits for theirs
 
     @property
+    def going(self) -> bool:
+        """Whether they have asked for a frame of a longer transfer lately."""
+        return self._going
+
+    @property
+    def transferring(self) -> bool:
+        """Whether a longer transfer of theirs goes on."""
+        return self._transfer is not None
+
+    @property
     def active(self) -> bool:
         """Whether an answer may be theirs."""
-        return bool(self._open) or self._transfer is not None
+        return bool(self._open) or self._going or self._transfer is not None
 
     def clear(self) -> None:
         """The node booted: nothing is answered any more."""
         self._open.clear()
+        self._going = False
         self._end()
 
     # --- what they ask --------------------------------------------------------------------------------------------
@@ -87,8 +113,10 @@ class OtherMasters:
         if request is None:
             return None
         if request.ask in (Ask.STREAM, Ask.ON):
-            self._transfer_s = now_s
-            self._segment = 1 if request.ask is Ask.STREAM else 0
+            self._transfer_s = self._going_s = now_s
+            self._going = True
+            if request.ask is Ask.STREAM:
+                self._segment = 1
             return request
         key = request.index, request.sub
         if request.ask is Ask.ABORT:
@@ -124,11 +152,11 @@ class OtherMasters:
         """That one is answered, and what was asked before it is not answered any more."""
         while self._open and self._open.popleft() is not one:
             pass
-        if one.key == self._transfer:
-            self._end()
+        self._end()  # a node has one transfer at a time
 
     def ours_answered(self, asked_s: float) -> None:
-        """An answer to a request of ours came: what they asked well before it is over."""
+        """An answer to a request of ours came: what they asked well before it is over, and so is their transfer."""
+        self._end()
         while self._open and self._open[0].t_s < asked_s - ORDER_S:
             self._open.popleft()
 
@@ -143,7 +171,7 @@ class OtherMasters:
         if part.part is Part.BEGIN:
             return self._begins((part.index, part.sub), data, now_s)
         if self._transfer is None:
-            return False
+            return self._going
         self._transfer_s = now_s
         if part.part is Part.LAST:
             self._end()
@@ -155,6 +183,10 @@ class OtherMasters:
             return False
         self._end()
         return True
+
+    def out_of_step(self, reply: SdoReply) -> bool:
+        """Whether this abort is for a frame that should have continued a longer transfer; any object may be named."""
+        return self._going and isinstance(reply, SdoAbort) and reply.code >> 16 in _OUT_OF_STEP
 
     def _streams(self, data: bytes, now_s: float) -> bool:
         if not self._segment or self._segment > segment_number(data) or segment_number(data) >= self._segment + _AHEAD:
@@ -195,6 +227,8 @@ class OtherMasters:
     def _age(self, now_s: float) -> None:
         while self._open and now_s - self._open[0].t_s > FORGET_S:
             self._open.popleft()
+        if self._going and now_s - self._going_s > FORGET_S:
+            self._going = False
         if self._transfer is not None and now_s - self._transfer_s > TRANSFER_S:
             self._end()
 

@@ -44,7 +44,7 @@ class Polled:
         """The fields, from the object's word in a TPDO that came at `now_s`."""
         fields = decode_word(self.entry, word, self.entry.size, now_s)
         self.tpdo_t_s, self._tpdo_fields = now_s, fields
-        return fields | self.conflict | self.answers.doubts(now_s)
+        return self._doubted(fields, now_s)
 
     def from_sdo(self, reply: SdoValue, asked_s: float) -> Fields:
         """The fields, from an SDO answer to the request of `asked_s`. Where TPDOs bring them, too, both must agree."""
@@ -56,7 +56,12 @@ class Polled:
             self._differed = min(CONFLICTS, self._differed + 1) if different else max(0.0, self._differed - AGREED)
             self.conflict = different if self._differed >= CONFLICTS else {}
             self._tpdo_fields = {}
-        return fields | self.conflict | self.answers.doubts(asked_s)
+        return self._doubted(fields, asked_s)
+
+    def _doubted(self, fields: Fields, now_s: float) -> Fields:
+        """The fields, with the reasons not to believe some of them."""
+        doubts = self.answers.doubts(now_s)
+        return {**fields, **self.conflict, **doubts} if self.conflict or doubts else fields
 
     def _different(self, fields: Fields) -> dict[str, Decoded]:
         different: dict[str, Decoded] = {}

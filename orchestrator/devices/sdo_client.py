@@ -16,6 +16,7 @@ Key = tuple[int, int]  #: index and sub-index
 #: Reasons to refuse that only a write can have (CiA 301, table 22).
 WRITE_ABORTS = frozenset({0x06010002, 0x06070010, 0x06070012, 0x06070013, 0x06090030, 0x06090031, 0x06090032})
 
+HURRY_S = 0.05  #: what a node needs for an answer once nothing else is to be answered
 QUIET_S = 1.0  #: far longer than a node that means to answer at all takes
 
 
@@ -66,6 +67,10 @@ class SdoClient:
             return False
         self.pending = None
         return True
+
+    def hurry(self, now_s: float) -> None:
+        """Give the request in flight up soon: the node was busy with another master's transfer and may have lost it."""
+        self.deadline_s = min(self.deadline_s, now_s + HURRY_S)
 
     def drop(self) -> None:
         """Give the request in flight up: the bus broke. Its answer may still come."""

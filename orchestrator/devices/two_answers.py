@@ -20,6 +20,8 @@ ONE_REQUEST = 0.002
 UNASKED, UNASKED_S = 0.02, 2.0
 #: The same for one that another master asked for.
 OTHERS, OTHERS_S = 0.05, 0.3
+#: These do not change by so much within that time. Amperes, status bits and minutes may.
+STEADY = frozenset({"voltage_v", "temperature_c", "soc_pct", "soh_pct", "remaining_ah", "available_wh"})
 #: Nothing that is read is believed for this long after two answers that differ.
 DOUBT_S = 10.0
 
@@ -50,7 +52,8 @@ class TwoAnswers:
         """Two answers to one request came; the doubts of which they are the reason."""
         texts = _readable(self._entry, first), _readable(self._entry, second)
         words = _fields(self._entry, first), _fields(self._entry, second)
-        apart = [field.name for field in self._entry.fields if _apart(field, *words, share)]
+        fields = [field for field in self._entry.fields if share == ONE_REQUEST or field.name in STEADY]
+        apart = [field.name for field in fields if _apart(field, *words, share)]
         if not apart:
             return {}
         self._doubts_s = now_s

@@ -2,7 +2,7 @@
 
 from orchestrator.devices.other_masters import OtherMasters
 from orchestrator.devices.sdo_client import SdoClient, Verdict
-from orchestrator.protocol.sdo import SdoReply, SdoValue
+from orchestrator.protocol.sdo import SdoMalformed, SdoReply, SdoValue
 
 
 def whose_answer(reply: SdoReply, data: bytes, client: SdoClient, others: OtherMasters, now_s: float) -> Verdict:
@@ -15,13 +15,23 @@ def whose_answer(reply: SdoReply, data: bytes, client: SdoClient, others: OtherM
     if not others.active:
         return client.take(reply, now_s)
     if others.in_transfer(data, now_s):
+        if not others.transferring:
+            client.hurry(now_s)
+        return Verdict.FRAGMENT
+    if isinstance(reply, SdoMalformed) and others.going:
         return Verdict.FRAGMENT
     if others.breaks_off(reply):
         client.drop()
         return Verdict.UNCLEAR
     theirs = others.owner(reply)
     if theirs is None:
-        return client.take(reply, now_s)
+        if not others.out_of_step(reply):
+            return client.take(reply, now_s)
+        if not client.claims(reply):
+            client.hurry(now_s)
+            return Verdict.FRAGMENT
+        client.drop()
+        return Verdict.UNCLEAR
     if not client.claims(reply):
         others.close(theirs)
         return Verdict.THEIRS

@@ -185,8 +185,7 @@ class CanBus:
             self._echoes = False
             self._echo.clear()
             return True
-        frame = message.arbitration_id, bytes(message.data)
-        if frame not in self._echo:
+        if not self._echo or (frame := (message.arbitration_id, bytes(message.data))) not in self._echo:
             return False
         while self._echo.popleft() != frame:
             pass

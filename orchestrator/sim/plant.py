@@ -69,6 +69,7 @@ class Plant:
             link=args.dir / f"bay-{number + 1}",
             line=LINES[args.line],
             layout=LAYOUTS[args.layout],
+            main_loop=args.bmu == "mainloop",
             speed=args.speed,
         )
         return Rig(self._loop, self._wires[number // self._per_bus], Bay(charger, pack), setup)
@@ -212,6 +213,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--line", choices=LINES, default="real", help="what the serial lines do to bytes")
     parser.add_argument("--bus", choices=BUSES, default="perfect", help="what the CAN buses do to frames")
     parser.add_argument("--layout", choices=LAYOUTS, default="first-high", help="of the BMUs' words")
+    parser.add_argument("--bmu", choices=("immediate", "mainloop"), default="immediate", help="when the BMUs answer")
     parser.add_argument("--automatic", action="store_true", help="the chargers' rotary switches are on 5, not on 1")
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real time the batteries live")
     args = parser.parse_args(argv)

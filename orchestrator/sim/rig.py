@@ -25,6 +25,7 @@ class Setup:
     link: Path | None = None  #: a name for the charger's port
     line: Line = field(default_factory=Line)
     layout: Layout = Layout.FIRST_HIGH
+    main_loop: bool = False  #: the BMU answers when its main loop comes round to it
     speed: float = 1.0  #: model seconds in one real second
 
 
@@ -48,7 +49,7 @@ class Rig:
         self._speed = setup.speed
         self._advanced_s = loop.time()
         self.wire = ChargerWire(loop, bay.charger, line=setup.line, link=setup.link, now=self.catch_up)
-        self.bmu = Bmu(loop, can_wire, setup.node_id, self._readout, layout=setup.layout)
+        self.bmu = Bmu(loop, can_wire, setup.node_id, self._readout, layout=setup.layout, main_loop=setup.main_loop)
         self.wire.open()
 
     def catch_up(self) -> None:

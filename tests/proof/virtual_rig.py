@@ -32,6 +32,7 @@ class Nature:
     line: str = "real"
     seed: int = 1
     speed: float = 1.0  #: model seconds in one second
+    main_loop: bool = False  #: the BMU answers when its main loop comes round to it
     running: bool = False  #: as the last service left it
 
 
@@ -121,7 +122,7 @@ class VirtualRig(Rig):
         line = type(line)(**{name: getattr(line, name) for name in line.__slots__} | {"seed": nature.seed})
         self.wire = MemoryWire(time, charger, tty, line, self.catch_up)
         set_scheduler(AsyncScheduler(time))
-        self.bmu = Bmu(cast("Any", time), cast("Any", bus), node_id, self._readout)
+        self.bmu = Bmu(cast("Any", time), cast("Any", bus), node_id, self._readout, main_loop=nature.main_loop)
         self.bmu.port.faults.delay_s = ANSWER_S
         self.wire.open()
         self.catch_up(force=True)
