@@ -1,4 +1,4 @@
-"""The environment's campaign: whatever else is on the machine, the line, the bus and the disk, over lives of the gateway.
+"""The environment's campaign: whatever else is on machine, line, bus and disk, over lives of the gateway.
 
 python -m tests.proof.environment                    every scene, then 1,000 random scripts, on all processors
 python -m tests.proof.environment --seed 104 -v      one of them again, with what the service said
@@ -38,7 +38,9 @@ def quiet() -> None:
 def play(name: str | int) -> tuple[str, Lived]:
     """A scene by its name, a random script by its seed."""
     quiet()
-    return (f"seed {name}", live(Script.of_seed(name))) if isinstance(name, int) else (f"scene {name}", live(SCENES[name]))
+    return (
+        (f"seed {name}", live(Script.of_seed(name))) if isinstance(name, int) else (f"scene {name}", live(SCENES[name]))
+    )
 
 
 def campaign(names: Iterable[str | int], workers: int, until_s: float) -> Iterator[tuple[str, Lived]]:
@@ -136,7 +138,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--runs", type=int, default=RUNS, help="random scripts (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first seed (default: %(default)s)")
-    parser.add_argument("--minutes", type=float, default=60.0, help="no script begins after this (default: %(default)s)")
+    parser.add_argument(
+        "--minutes", type=float, default=60.0, help="no script begins after this (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=int, help="only this one")
     parser.add_argument("--scene", choices=SCENES, help="only this one", metavar="NAME")
     parser.add_argument("--script", type=Path, help="only the script in this file")

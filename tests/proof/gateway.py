@@ -9,7 +9,7 @@ import json
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf
 from pathlib import Path
@@ -67,7 +67,9 @@ def document(entries: Sequence[Entry], battery: dict[str, Any]) -> str:
     ]
     can = {"can0": {"interface": "virtual", "bitrate": 250_000}}
     journal = {"directory": JOURNAL, "snapshots": False}
-    return json.dumps({"station": "virtual", "can": can, "bays": bays, "control": {"socket": SOCKET}, "journal": journal})
+    return json.dumps(
+        {"station": "virtual", "can": can, "bays": bays, "control": {"socket": SOCKET}, "journal": journal}
+    )
 
 
 @cache
@@ -132,7 +134,7 @@ class Ended:
 
 
 class Gateway:
-    """The station and its gateway. `boot`, `signal`, `cut_power` and the like are for callbacks, not for its threads."""
+    """The station and its gateway. What changes it is for callbacks and for the main runner, not for its threads."""
 
     def __init__(
         self, natures: Sequence[Nature], entries: Sequence[Entry], *, seed: int, end_s: float, **battery: Any

@@ -186,11 +186,14 @@ def _random(seed: int) -> Script:
             break
         hazards.append(Hazard(round(t_s, 3), dice.choice(ENDS)))
         t_s += BETWEEN_S * dice.uniform(0.3, 2.0)
-        hazards += [Hazard(round(t_s, 3), "edit", dice.randrange(3), None, edit)] if (edit := dice.choice(EDITS)) else []
+        hazards += (
+            [Hazard(round(t_s, 3), "edit", dice.randrange(3), None, edit)] if (edit := dice.choice(EDITS)) else []
+        )
         hazards.append(Hazard(round(t_s + 0.2, 3), "boot"))
         t_s += dice.choice((2.0, 6.0, BEGIN_S)) * dice.uniform(0.7, 1.0)
     hazards.sort(key=lambda one: one.t_s)
-    return Script(seed, bays, tuple(hazards), round(t_s + 14.0, 3), dice.random() < 0.7, dice.random() < 0.2)
+    end_s = max(t_s, hazards[-1].t_s) + 14.0
+    return Script(seed, bays, tuple(hazards), round(end_s, 3), dice.random() < 0.7, dice.random() < 0.2)
 
 
 # --- made smaller -----------------------------------------------------------------------------------------------------

@@ -13,6 +13,7 @@ import re
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from orchestrator.model import ChargeMode
@@ -51,7 +52,9 @@ class Charger:
 
     number: int
     rig: VirtualRig
-    meant: str = ""  #: the newest that a process of ours has written to its port: "run", "stop"; "" nothing in this life
+    meant: str = (
+        ""  #: the newest that a process of ours has written to its port: "run", "stop"; "" nothing in this life
+    )
     meant_s: float = 0.0
     limit: int = 4  #: the newest current limit that was written
     deaf_s: float = 0.0  #: when it could last not hear, or not be reached
@@ -172,8 +175,8 @@ class Judge:
         self.frozen = False
         self._read = 0  # lines that were said
         for charger in self.chargers:
-            charger.rig.tty.on_written = lambda data, charger=charger: self._written(charger, data)
-            charger.rig.wire.on_started = lambda _, charger=charger: self._started(charger)
+            charger.rig.tty.on_written = partial(self._written, charger)
+            charger.rig.wire.on_started = partial(self._started, charger)
 
     def entry(self, charger: Charger) -> Any:
         """The bay of the present life that this charger's port belongs to."""
@@ -200,7 +203,7 @@ class Judge:
         if limit := LIMIT.search(data):
             charger.limit = limit[1][0]
 
-    def _started(self, charger: Charger) -> None:
+    def _started(self, charger: Charger, _now_s: float) -> None:
         """A frame has switched an output on: of the charger behind this port."""
         if charger.waits:
             self.find(charger.number, "by itself", f"it was started, and waits for a person: {charger.waits}")
@@ -307,7 +310,9 @@ class Judge:
     def _reach(self, charger: Charger, now_s: float) -> None:
         tty, wire = charger.rig.tty, charger.rig.wire
         name = port_name(charger.number)
-        troubled = any(trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles)
+        troubled = any(
+            trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles
+        )
         if not tty.present or tty.stalled or tty.stolen or wire.mute_rx or troubled:
             charger.deaf_s = now_s
 
@@ -324,7 +329,9 @@ class Judge:
             deaf_s = port.deaf_s + OPEN_S if port.deaf_s else 0.0
             reached_s = max(since_s, self.booted_s + OPEN_S, deaf_s, port.rig.tty.changed_s)
             if charger.obeys and now_s - reached_s > reason.within_s:
-                self.find(charger.number, reason.name, f"current flows for {now_s - since_s:.2f} s, {self._state(charger)}")
+                self.find(
+                    charger.number, reason.name, f"current flows for {now_s - since_s:.2f} s, {self._state(charger)}"
+                )
             self._judge_named(charger, reason, since_s, now_s)
         self._judge_restless(charger, now_s)
 
@@ -347,7 +354,9 @@ class Judge:
         unnamed_s = now_s - max(since_s, self.booted_s + OPEN_S, charger.named_s)
         if unnamed_s > reason.within_s + VERIFY_S + MARGIN_S:
             self.find(
-                charger.number, "nobody is told", f"{reason.name}: it runs for {unnamed_s:.2f} s, {self._state(charger)}"
+                charger.number,
+                "nobody is told",
+                f"{reason.name}: it runs for {unnamed_s:.2f} s, {self._state(charger)}",
             )
 
     def _judge_mean(self, charger: Charger, now_s: float) -> None:
@@ -363,7 +372,9 @@ class Judge:
         mean_a, most_a = sum(one[1] for one in flown) / len(flown), max(one[2] for one in flown)
         if mean_a > most_a * 1.1 + 1.5 and charger.seen and charger.obeys and now_s - charger.deaf_s > MEAN_S:
             self.find(
-                charger.number, "more than ordered", f"{mean_a:.1f} A in the mean of {MEAN_S:g} s, {most_a:g} A were ordered"
+                charger.number,
+                "more than ordered",
+                f"{mean_a:.1f} A in the mean of {MEAN_S:g} s, {most_a:g} A were ordered",
             )
 
     def _state(self, charger: Charger) -> str:
@@ -404,4 +415,6 @@ class Judge:
                     continue
                 lies = {*charger.rig.wire.lies, *charger.rig.wire.liars} & {Kind.OPERATION, Kind.CURRENT}
                 if charger.seen if name == "controller" else not lies:
-                    self.find(charger.number, "verified", f"{name} has ended with 0, and {charger.current_a:.1f} A flow")
+                    self.find(
+                        charger.number, "verified", f"{name} has ended with 0, and {charger.current_a:.1f} A flow"
+                    )

@@ -234,28 +234,20 @@ class Player:
             rig.wire.liars[Kind[name]] = lie
 
     def _bmu(self, hazard: Hazard) -> None:
-        field_, how, every = hazard.detail.split(":")
+        """detail: FIELD:is|frozen|more:EVERY (0: once)."""
+        name, how, every = hazard.detail.split(":")
         for rig in self._rigs(hazard):
             rig.catch_up()
-            frozen = getattr(rig.bay.readout(), field_)
-            value = hazard.value or 0.0
-            told: Callable[[Any], Any] = {
-                "is": lambda _: value,
-                "frozen": lambda _: frozen,
-                "more": lambda true: value if true is None else true + value,
-            }[how]
-            every_n = Lie(0, max(1, int(every)), inf if int(every) else 1)
-            rig.bay.falsify[field_] = lambda true, told=told, lie=every_n: told(true) if lie.is_told() else true
+            lie = Lie(0, max(1, int(every)), inf if int(every) else 1)
+            rig.bay.falsify[name] = _liar(lie, how, getattr(rig.bay.readout(), name), hazard.value or 0.0)
             rig.steady = int(every) == 1
 
     def _slow(self, hazard: Hazard) -> None:
         """detail: CALL:port|diskNAME:LASTS[:ERRNO]; value: seconds, FOR_EVER."""
         call, place, lasts, *error = hazard.detail.split(":")
         delay_s = inf if hazard.value == FOR_EVER else hazard.value or 0.0
-        if place == "port":
-            where = port_name(hazard.bay)
-        else:
-            where = f"{JOURNAL}/{place[4:]}" if place[4:] else JOURNAL
+        on_disk = f"{JOURNAL}/{place[4:]}" if place[4:] else JOURNAL
+        where = port_name(hazard.bay) if place == "port" else on_disk
         until_s = self.time.now_s + float(lasts)
         number = getattr(errno, error[0]) if error else 0
         self.gateway.kernel.calls.troubles.append(Trouble(call, where, until_s, delay_s, number))
@@ -317,6 +309,19 @@ class Player:
         act()
         if times > 1:
             self.time.call_later(every_s, self._repeat, times - 1, every_s, act)
+
+
+def _liar(lie: Lie, how: str, frozen: Any, value: float) -> Callable[[Any], Any]:
+    """What the BMU says of a value: another one, the one of now, or so much more; None is said as it is."""
+
+    def told(true: Any) -> Any:
+        if not lie.is_told():
+            return true
+        if how == "more":
+            return true if true is None else true + value
+        return frozen if how == "frozen" else value
+
+    return told
 
 
 def _read(index: int) -> bytes:

@@ -132,10 +132,10 @@ def search(seed: Seed, skip: Mapping[str, str]) -> Result:
 
 
 def _gist(said: str) -> str:
-    lines = [line for line in said.splitlines() if line.strip()]
-    return next((line for line in lines if line.startswith(("scene", "seed", "E  ", "FAILED"))), lines[-1] if lines else "")[
-        :200
-    ]
+    """The line that says it."""
+    lines = [line for line in said.splitlines() if line.strip()] or [""]
+    telling = [line for line in lines if line.startswith(("scene", "seed", "E  ", "FAILED"))]
+    return (telling or lines[-1:])[0][:200]
 
 
 def page(results: Sequence[Result]) -> Iterator[str]:
@@ -145,7 +145,7 @@ def page(results: Sequence[Result]) -> Iterator[str]:
     yield "# Which proof finds which bug"
     yield ""
     yield "Each hole that was once open is a seeded bug: a small change that opens it again. This page is made by"
-    yield "`make campaign ARGS=seeds`, which applies each to a copy of the package and runs the proofs until one finds it."
+    yield "`make campaign ARGS=seeds`: each is applied to a copy of the package, and the proofs run until one finds it."
     yield ""
     yield f"{len(found)} of {len(results)} are found, in {mean_s:.0f} s each in the mean."
     yield ""

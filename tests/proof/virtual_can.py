@@ -11,9 +11,9 @@ import can
 
 from orchestrator.sim.can_noise import Bus, BusNoise
 from orchestrator.sim.can_wire import PERFECT, Handler
+from tests.proof.virtual_kernel import Calls
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
-from tests.proof.virtual_kernel import Calls
 
 #: One frame of 8 bytes at 250 kbit/s, stuff bits and pause included.
 FRAME_S = 0.0005
@@ -65,7 +65,9 @@ class BusWire:
         if not (self.down or self.lost):
             if self.drivers and not message.is_error_frame:
                 self.on_frame(message.arbitration_id, bytes(message.data))
-            self.drivers = [driver for driver in self.drivers if driver.process is None or driver.process.status is None]
+            self.drivers = [
+                driver for driver in self.drivers if driver.process is None or driver.process.status is None
+            ]
             for driver in self.drivers:
                 driver.deliver(message)
 
