@@ -54,11 +54,7 @@ def stopped_elsewhere(rig: Rig, _: float | None) -> None:
 def bmu_frozen(rig: Rig, _: float | None) -> None:
     """The BMU goes on saying all values of now."""
     frozen = rig.bay.readout()
-    rig.bay.falsify |= {name: partial(always, getattr(frozen, name)) for name in frozen.__slots__}
-
-
-def always(value: float, _true: float) -> float:
-    return value
+    rig.bay.falsify |= {name: partial(_always, getattr(frozen, name)) for name in frozen.__slots__}
 
 
 def pack_collapsed(rig: Rig, value: float | None) -> None:
@@ -70,3 +66,7 @@ def pack_collapsed(rig: Rig, value: float | None) -> None:
 def another_pack(rig: Rig, value: float | None) -> None:
     """The pack has `value` cells in series, 10, and a BMU like the other's."""
     rig.bay.pack.cells = 10 if value is None else int(value)
+
+
+def _always(value: float, _true: float) -> float:
+    return value

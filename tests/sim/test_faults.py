@@ -1,6 +1,7 @@
 """Every fault does what its sentence says, seen from the lines or in the model, and healing takes it away."""
 
 import asyncio
+import termios
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fcntl import LOCK_EX, LOCK_NB, flock
@@ -125,6 +126,11 @@ def all_frozen(rig: Rig) -> bool:
     return rig.bay.readout() == before and rig.bay.charger.voltage_v > volts
 
 
+def at_115200(rig: Rig) -> bool:
+    with Path(rig.wire.path).open("rb", buffering=0) as port:
+        return bool(termios.tcgetattr(port.fileno())[5] == termios.B115200)
+
+
 def locked(rig: Rig) -> bool:
     with Path(rig.wire.path).open("rb", buffering=0) as port:
         try:
@@ -180,7 +186,7 @@ SEEN: dict[str, Callable[[Rig], object]] = {
     "ignore_stop": ignores_a_stop,
     "bmu_reboot": lambda _: True,
     "port_gone": lambda rig: not rig.wire.is_open,
-    "line_taken_over": lambda rig: not rig.wire.is_clear,
+    "line_taken_over": at_115200,
     "port_locked": locked,
     "says_standby": lambda rig: (
         rig.wire.lies == {Kind.OPERATION: 0, Kind.CURRENT: 0} and rig.bay.charger.current_a == 8.0
