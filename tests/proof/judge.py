@@ -9,6 +9,7 @@ A lie that both witnesses tell alike cannot be seen by anybody: nothing is deman
 only, the BMU.
 """
 
+import json
 import re
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -18,8 +19,8 @@ from typing import Any
 
 from orchestrator.model import ChargeMode
 from orchestrator.sim.charger_frames import Kind
-from tests.proof.gateway import STEPS_A, Asked, Gateway, port_name
-from tests.proof.hazards import Script
+from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name
+from tests.proof.hazards import Bay, Script
 from tests.proof.virtual_rig import VirtualRig
 
 STOP, OPERATION_0 = bytes.fromhex("AFFA900410900034AFA0"), bytes.fromhex("AFFA90050290010028AFA0")
@@ -35,6 +36,8 @@ LINE_S, VERIFY_S, MARGIN_S = 2.0, 3.0, 1.4
 OPEN_S = 2.0
 #: Within this after an operator's answer, or the end of a process, its stop is understood.
 ASKED_S, KILLED_S, FROZEN_S, TERM_S, ESTOP_S = 0.6, 0.25, 1.2, 0.7, 0.5
+#: The control socket is there this long after the start, and answers within that.
+START_S, ANSWER_S = 1.5, 6.0
 #: Over this the current is held against what was ordered.
 MEAN_S = 12.0
 #: Who runs again without an order this often within that time was not stopped, and is called so.
@@ -65,6 +68,9 @@ class Charger:
     asked_stop: bool = False  #: an operator's stop was accepted, and no start since
     flown: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=300))
     stopped_s: float = 0.0  #: when a stop was last understood at its port
+    looked_s: float = 1000.0
+    charged_ah: float = 0.0
+    precharged_s: float = 0.0
     onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
 
     @property
@@ -151,8 +157,21 @@ REASONS: tuple[Reason, ...] = (
     Reason("collapsed", LINE_S, lambda _, c: c.rig.bay.pack.bias_v < -8.0 and c.honest(Kind.VOLTAGE, "voltage_v")),
     Reason("crossed", 9.0, _crossed),
     Reason("BMU frozen", 65.0, _frozen),
+    Reason("apart, most of the time", 20.0, lambda _, c: c.rig.apart_v > 1.2),
     Reason("status word", LINE_S, lambda _, c: "status" in c.rig.bay.falsify and _trips(c)),
 )
+
+
+#: Somebody reads or writes on bus and line as everybody may: no reason to stop.
+HARMLESS = ("boot", "tool")
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
 
 
 def _trips(charger: Charger) -> bool:
@@ -232,6 +251,19 @@ class Judge:
     def _of(self, name: str) -> Charger | None:
         return next((self.chargers[entry.port] for entry in self.life if entry.name == name), None)
 
+    def asked(self, asked: Asked, names: list[str]) -> None:
+        """A person asks: a stop is one whatever is answered, and something is answered."""
+        if self.booted_s is None or self.frozen or self.time.now_s < self.booted_s + START_S:
+            return
+        if asked.request["verb"] == "stop":
+            for charger in filter(None, map(self._of, names)):
+                self._meant(charger, asked.asked_s, ASKED_S, "an operator asked for a stop")
+        self.time.call_later(ANSWER_S, self._unanswered, asked, self.gateway.controller)
+
+    def _unanswered(self, asked: Asked, controller: Any) -> None:
+        if asked.answer is None and not asked.error and self.gateway.alive(controller) and not self.frozen:
+            self.find(-1, "unanswered", f"nobody answers {asked.request}")
+
     def answered(self, asked: Asked) -> None:
         """A person's request was answered: "" is yes."""
         verb, results = asked.request["verb"], (asked.answer or {}).get("results", {})
@@ -242,7 +274,6 @@ class Judge:
             if verb == "stop":
                 charger.asked_stop = True
                 charger.waits["operator"] = "stopped by the operator"
-                self._meant(charger, asked.asked_s, ASKED_S, "an operator's stop was accepted")
             elif verb == "start":
                 charger.asked_stop = False
                 charger.waits.clear()
@@ -306,6 +337,38 @@ class Judge:
             self._judge(charger, now_s)
             self._judge_mean(charger, now_s)
         self._judge_words()
+        self._judge_small(now_s)
+
+    def _judge_small(self, now_s: float) -> None:
+        """Limits of a charge hold over restarts."""
+        for charger, bay in zip(self.chargers, self.script.bays, strict=True):
+            dt_s, charger.looked_s = now_s - charger.looked_s, now_s
+            if not bay.small:
+                continue
+            charger.charged_ah += charger.current_a * dt_s / 3600
+            charger.precharged_s += dt_s * (charger.flows and charger.rig.bay.pack.leaky)
+            if charger.charged_ah > SMALL_AH * 1.2:
+                self.find(charger.number, "limits", f"{charger.charged_ah:.3f} Ah went in, {SMALL_AH:g} are allowed")
+            if charger.precharged_s > SMALL_RISE_S * 1.4:
+                self.find(charger.number, "limits", f"{charger.precharged_s:.0f} s of precharge without a rise")
+
+    def ends(self) -> None:
+        """The script is over: what was harmless has stopped nobody, and the record can be read."""
+        if all(one.what in HARMLESS for one in self.script.hazards) and self.script.bays == (Bay(),) * 3:
+            for charger in self.chargers:
+                if not charger.rig.bay.charger.running:
+                    self.find(
+                        charger.number, "goes on", f"it was stopped by something harmless, {self._state(charger)}"
+                    )
+        if not any(one.what == "power" for one in self.script.hazards):
+            for path, inode in self.gateway.disk.names.items():
+                broken = [
+                    line
+                    for line in bytes(inode.data).split(b"\n")[:-1]
+                    if path.endswith(".jsonl") and not _is_json(line)
+                ]
+                if broken:
+                    self.find(-1, "record", f"{path} has a line that cannot be read: {broken[0]!r}")
 
     def _reach(self, charger: Charger, now_s: float) -> None:
         tty, wire = charger.rig.tty, charger.rig.wire

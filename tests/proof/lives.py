@@ -53,7 +53,7 @@ class Player:
         battery: dict[str, Any] = {"tpdo_s": 0.1} if script.tpdo else {}
         self.gateway = Gateway(
             [_nature(bay, number) for number, bay in enumerate(script.bays)],
-            [Entry(f"bay-{number + 1}", number, number) for number in range(len(script.bays))],
+            entries(script),
             seed=script.seed, end_s=script.end_s + 30.0, **battery,
         )  # fmt: skip
         self.time = self.gateway.time
@@ -84,6 +84,7 @@ class Player:
             self.judge.find(-1, "exception", f"{error!r} in {where and where.name}, {where and where.filename}")
         finally:
             self.gateway.close()
+        self.judge.ends()
         lived.wrong, lived.charged = self.judge.wrong, len(self._charged)
         lived.said = [f"{one.t_s - self.began_s:8.3f} {one.process}: {one.text}" for one in self.gateway.said]
         return lived
@@ -194,25 +195,25 @@ class Player:
         self.gateway.estop()
 
     def _edit(self, hazard: Hazard) -> None:
-        entries, at = self.gateway.entries, hazard.bay
-        usual = {number: Entry(f"bay-{number + 1}", number, number) for number in range(len(self.script.bays))}
+        now, at, usual = self.gateway.entries, hazard.bay, entries(self.script)
         if hazard.detail == "remove":
-            entries = [entry for entry in entries if entry.port != at]
+            now = [entry for entry in now if entry.port != at]
         elif hazard.detail == "restore":
-            entries = list(usual.values())
+            now = usual
         elif hazard.detail == "rename":
-            entries = [replace(one, name=f"{one.name}b") if one.port == at else one for one in entries]
-        elif hazard.detail == "rewire":  # the port is another one, and that bay's is this one's
-            entries = [replace(one, name=f"bay-{(one.port + 1) % 3 + 1}") for one in entries]
+            now = [replace(one, name=f"{one.name}b") if one.port == at else one for one in now]
+        elif hazard.detail == "rewire":  # every bay has another's name
+            now = [replace(one, name=f"bay-{(one.port + 1) % 3 + 1}") for one in now]
         elif hazard.detail == "swap":
             other = {at: (at + 1) % 3, (at + 1) % 3: at}
-            entries = [replace(one, port=other.get(one.port, one.port)) for one in entries]
-        self.gateway.entries = entries or list(usual.values())
+            now = [replace(one, port=other.get(one.port, one.port)) for one in now]
+        self.gateway.entries = now or usual
         self.gateway.write_station()
 
     def _ask(self, hazard: Hazard) -> None:
         names = [entry.name for entry in self.judge.life if hazard.bay in (-1, entry.port)]
-        self.gateway.ask({"verb": hazard.detail, "bays": names}, self.judge.answered)
+        asked = self.gateway.ask({"verb": hazard.detail, "bays": names}, self.judge.answered)
+        self.judge.asked(asked, names)
 
     # --- lines, devices -----------------------------------------------------------------------------------------------
 
@@ -220,6 +221,19 @@ class Player:
         for rig in self._rigs(hazard):
             rig.inject(lambda rig: FAULTS[hazard.detail].happen(rig, hazard.value))
             rig.frozen = rig.frozen or hazard.detail == "bmu_frozen"
+
+    def _comes(self, hazard: Hazard) -> None:
+        """detail: FIELD; for 2.75 s of every 3 s the BMU says so much more."""
+        for rig in self._rigs(hazard):
+            more, time = hazard.value or 0.0, self.time
+            rig.bay.falsify[hazard.detail] = lambda true: true + (more if time.now_s % 3.0 < 2.75 else 0.0)
+            rig.apart_v = more if hazard.detail == "voltage_v" else 0.0
+
+    def _loose(self, hazard: Hazard) -> None:
+        """A plug that has contact for `value` s, and then none for as long."""
+        for rig in self._rigs(hazard):
+            rig.bay.connected = not rig.bay.connected
+        self.time.call_later(hazard.value or 1.0, self._loose, hazard)
 
     def _heal(self, hazard: Hazard) -> None:
         for rig in self._rigs(hazard):
@@ -288,16 +302,24 @@ class Player:
 
     # --- the bus ------------------------------------------------------------------------------------------------------
 
-    def _bus(self, hazard: Hazard) -> None:
+    def _tool(self, hazard: Hazard) -> None:
+        """What a CANopen tool or another device does on the bus, as everybody may."""
         node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
         {
-            "master": lambda: self._repeat(20, 0.1, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
-            "abort": lambda: bus.from_driver(0x600 + node, b"\x80\x00\x60\x00\x00\x00\x04\x05"),
-            "forged": lambda: bus.subscribe(0x600 + node, self, self._forge),
+            "master": lambda: self._repeat(40, 0.1, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
+            "reads all": lambda: self._repeat(40, 0.03, lambda: bus.from_driver(0x600 + node, _read(0x1018))),
+            "abort": lambda: self._repeat(3, 1.0, lambda: bus.send(0x580 + node, b"\x80\x17\x10\x00\x10\x00\x01\x06")),
             "fd": lambda: self._repeat(50, 0.02, lambda: bus.raw(_fd(0x580 + node))),
-            "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
             "heartbeat": lambda: bus.from_driver(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
             "flood": lambda: self._repeat(400, 0.002, lambda: bus.send(0x123, bytes(8))),
+        }[hazard.detail]()
+
+    def _bus(self, hazard: Hazard) -> None:
+        """What nobody may."""
+        node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
+        {
+            "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
+            "forged": lambda: bus.subscribe(0x600 + node, self, self._forge),
         }[hazard.detail]()
 
     def _forge(self, cob_id: int, data: bytes) -> None:
@@ -331,6 +353,12 @@ def _read(index: int) -> bytes:
 def _fd(cob_id: int) -> can.Message:
     data = b"\x43\x04\x60\x00\xc8\x00\x00\x00" + bytes(56)
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_fd=True)
+
+
+def entries(script: Script) -> list[Entry]:
+    """The station file as it is meant."""
+    policies = ["small.yaml" if bay.small else "li-ion-48v" for bay in script.bays]
+    return [Entry(f"bay-{number + 1}", number, number, policy=policy) for number, policy in enumerate(policies)]
 
 
 def _nature(bay: Any, number: int) -> Nature:

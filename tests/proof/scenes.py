@@ -6,7 +6,7 @@ long enough to see what comes of it, over further lives where the past matters.
 
 import termios
 
-from tests.proof.hazards import BEGIN_S, FOR_EVER, Bay, Hazard, Script
+from tests.proof.hazards import BEGIN_S, FOR_EVER, TOOLS, Bay, Hazard, Script
 
 THREE = (Bay(), Bay(), Bay())
 #: In mid-charge.
@@ -104,10 +104,23 @@ SCENES: dict[str, Script] = {
         h(0, "slow", 0, 5.0, "close:port:60"), h(0.5, "fault", 0, None, "port_gone"), h(1.5, "heal", 0), end_s=T + 16
     ),
     "settings take for ever": _scene(h(0, "slow", 0, FOR_EVER, "tcsetattr:port:60"), h(0.5, "kill")),
+    # 6. Limits that a restart forgets.
+    "ampere-hours over restarts": _scene(
+        *(one for t_s in (17.0, 37.0, 57.0, 77.0) for one in (Hazard(t_s, "term"), Hazard(t_s + 5, "boot"))),
+        bays=(Bay(small=True), Bay(), Bay()),
+        end_s=100.0,
+    ),
+    "precharge over restarts": _scene(
+        Hazard(1.0, "fault", 0, None, "precharge_no_rise"),
+        *(one for t_s in (17.0, 37.0, 57.0, 77.0) for one in (Hazard(t_s, "term"), Hazard(t_s + 5, "boot"))),
+        bays=(Bay(small=True, soc_pct=-100.0), Bay(), Bay()),
+        end_s=100.0,
+    ),
     # 7. Conditions that come and go.
     "limit goes back": _scene(
         h(0, "fault", 0, None, "limit_reverts"), bays=(Bay(temperature_c=8.0), Bay(), Bay()), end_s=T + 26
     ),
+    "apart for most of the time": _scene(h(0, "comes", 0, 2.0, "voltage_v"), end_s=T + 30),
     # 8. Not the battery that is meant.
     "a pack of 36 V": _scene(bays=(Bay(cells=10, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
     "a pack that collapses": _scene(h(0, "fault", 1, None, "pack_collapsed")),
@@ -117,7 +130,12 @@ SCENES: dict[str, Script] = {
     "a BMU that reads 0.00 V": _scene(
         h(0, "bmu", 0, 0.0, "voltage_v:is:1"), h(0, "fault", 0, None, "ignore_stop"), end_s=T + 16
     ),
+    # 11. The last words.
+    "cut off, then killed": _scene(
+        h(0, "fault", 0, None, "charger_cut_off"), h(8, "kill both"), h(9, "boot"), end_s=T + 24
+    ),
     # 12. Others on the bus.
+    **{f"on the bus: {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
     "a temperature that is forged": _scene(
         h(0, "bus", 1, None, "forged"), h(1, "fault", 1, 60.0, "over_temperature"), end_s=T + 16
     ),
