@@ -357,27 +357,12 @@ class Judge:
         if all(one.what in HARMLESS for one in self.script.hazards) and self.script.bays == (Bay(),) * 3:
             for charger in self.chargers:
                 if not charger.rig.bay.charger.running:
-                    self.find(
-                        charger.number, "goes on", f"it was stopped by something harmless, {self._state(charger)}"
-                    )
+                    self.find(charger.number, "goes on", f"something harmless has stopped it, {self._state(charger)}")
         if not any(one.what == "power" for one in self.script.hazards):
             for path, inode in self.gateway.disk.names.items():
-                broken = [
-                    line
-                    for line in bytes(inode.data).split(b"\n")[:-1]
-                    if path.endswith(".jsonl") and not _is_json(line)
-                ]
-                if broken:
+                lines = bytes(inode.data).split(b"\n")[:-1] if path.endswith(".jsonl") else []
+                if broken := [line for line in lines if not _is_json(line)]:
                     self.find(-1, "record", f"{path} has a line that cannot be read: {broken[0]!r}")
-
-    def _reach(self, charger: Charger, now_s: float) -> None:
-        tty, wire = charger.rig.tty, charger.rig.wire
-        name = port_name(charger.number)
-        troubled = any(
-            trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles
-        )
-        if not tty.present or tty.stalled or tty.stolen or wire.mute_rx or troubled:
-            charger.deaf_s = now_s
 
     def _judge(self, charger: Charger, now_s: float) -> None:
         for reason in REASONS:

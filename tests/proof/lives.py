@@ -5,6 +5,7 @@ import signal
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -225,9 +226,11 @@ class Player:
     def _comes(self, hazard: Hazard) -> None:
         """detail: FIELD; for 2.75 s of every 3 s the BMU says so much more."""
         for rig in self._rigs(hazard):
-            more, time = hazard.value or 0.0, self.time
-            rig.bay.falsify[hazard.detail] = lambda true: true + (more if time.now_s % 3.0 < 2.75 else 0.0)
-            rig.apart_v = more if hazard.detail == "voltage_v" else 0.0
+            rig.bay.falsify[hazard.detail] = partial(self._more, hazard.value or 0.0)
+            rig.apart_v = (hazard.value or 0.0) if hazard.detail == "voltage_v" else 0.0
+
+    def _more(self, more: float, true: float) -> float:
+        return true + (more if self.time.now_s % 3.0 < 2.75 else 0.0)
 
     def _loose(self, hazard: Hazard) -> None:
         """A plug that has contact for `value` s, and then none for as long."""
@@ -308,7 +311,7 @@ class Player:
         {
             "master": lambda: self._repeat(40, 0.1, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
             "reads all": lambda: self._repeat(40, 0.03, lambda: bus.from_driver(0x600 + node, _read(0x1018))),
-            "abort": lambda: self._repeat(3, 1.0, lambda: bus.send(0x580 + node, b"\x80\x17\x10\x00\x10\x00\x01\x06")),
+            "abort": lambda: self._repeat(99, 0.03, lambda: bus.send(0x580 + node, ABORT)),
             "fd": lambda: self._repeat(50, 0.02, lambda: bus.raw(_fd(0x580 + node))),
             "heartbeat": lambda: bus.from_driver(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
             "flood": lambda: self._repeat(400, 0.002, lambda: bus.send(0x123, bytes(8))),
@@ -351,8 +354,12 @@ def _read(index: int) -> bytes:
 
 
 def _fd(cob_id: int) -> can.Message:
-    data = b"\x43\x04\x60\x00\xc8\x00\x00\x00" + bytes(56)
+    data = b"\x43\x04\x60\x00\x58\x02\x00\x00" + bytes(56)  # looks like 60.0 °C
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_fd=True)
+
+
+#: Somebody has tried to write the heartbeat's time as it may not be written.
+ABORT = b"\x80\x17\x10\x00\x02\x00\x01\x06"
 
 
 def entries(script: Script) -> list[Entry]:
