@@ -364,6 +364,15 @@ class Judge:
                 if broken := [line for line in lines if not _is_json(line)]:
                     self.find(-1, "record", f"{path} has a line that cannot be read: {broken[0]!r}")
 
+    def _reach(self, charger: Charger, now_s: float) -> None:
+        tty, wire = charger.rig.tty, charger.rig.wire
+        name = port_name(charger.number)
+        troubled = any(
+            trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles
+        )
+        if not tty.present or tty.stalled or tty.stolen or wire.mute_rx or troubled:
+            charger.deaf_s = now_s
+
     def _judge(self, charger: Charger, now_s: float) -> None:
         for reason in REASONS:
             if not (charger.flows and reason.holds(self, charger)):
