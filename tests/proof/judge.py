@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from orchestrator.model import ChargeMode
+from orchestrator.model import ENERGISED, ChargeMode
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name
 from tests.proof.hazards import Bay, Script
@@ -44,7 +44,6 @@ MEAN_S = 12.0
 RESTARTS, RESTARTS_S = 3, 25.0
 #: What latched this long ago is on the disk.
 KEPT_S = 2.6
-REST = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED", "QUALIFYING", "OFFLINE"})
 VERIFIED = re.compile(r"standby verified|stands? by, verified|verified (?:standby|to stand by)", re.IGNORECASE)
 DENIED = re.compile(r"NOT|not verified|no proof")
 
@@ -146,7 +145,7 @@ def _too_much(judge: "Judge", charger: Charger) -> bool:
 
 
 REASONS: tuple[Reason, ...] = (
-    Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run"),
+    Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run" and not judge.wants(c)),
     Reason("operator's stop", ASKED_S, lambda _, c: c.asked_stop),
     Reason("hot", LINE_S, _hot),
     Reason("cold", LINE_S, _cold),
@@ -207,6 +206,10 @@ class Judge:
         return charger if charger.rig.wire.charger is model else next(
             one for one in self.chargers if one.rig.wire.charger is model
         )  # fmt: skip
+
+    def wants(self, charger: Charger) -> bool:
+        """The service says that it charges here: where the charger runs already, it need not be told to."""
+        return self._shown(charger).get("state") in ENERGISED and self.time.now_s - self.status_s < 1.0
 
     def find(self, charger: int, name: str, text: str) -> None:
         if not any(f" {name}: " in line for line in self.wrong):
@@ -435,10 +438,14 @@ class Judge:
             )
 
     def _state(self, charger: Charger) -> str:
+        shown = self._shown(charger)
+        return f"{shown['state']}: {shown['reason']}" if shown else "and no status tells of it"
+
+    def _shown(self, charger: Charger) -> Mapping[str, Any]:
+        """The bay in the newest status."""
         entry = self.entry(charger)
         bays = self.status["bays"] if self.status is not None else []
-        shown = next((bay for bay in bays if entry is not None and bay["name"] == entry.name), None)
-        return f"{shown['state']}: {shown['reason']}" if shown else "and no status tells of it"
+        return next((bay for bay in bays if entry is not None and bay["name"] == entry.name), {})
 
     # --- words --------------------------------------------------------------------------------------------------------
 
