@@ -285,6 +285,7 @@ class Judge:
 
     def boots(self) -> None:
         self.life, self.booted_s, self.frozen = list(self.gateway.entries), self.time.now_s, False
+        self.status = None
         for charger in self.chargers:
             charger.meant, charger.limit = "", 4
             charger.since_s.clear()

@@ -309,10 +309,10 @@ class Player:
         """What a CANopen tool or another device does on the bus, as everybody may."""
         node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
         {
-            "master": lambda: self._repeat(40, 0.1, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
+            "master": lambda: self._repeat(400, 0.013, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
             "reads all": lambda: self._repeat(40, 0.03, lambda: bus.from_driver(0x600 + node, _read(0x1018))),
             "abort": lambda: self._repeat(99, 0.03, lambda: bus.send(0x580 + node, ABORT)),
-            "fd": lambda: self._repeat(50, 0.02, lambda: bus.raw(_fd(0x580 + node))),
+            "fd": lambda: bus.subscribe(0x600 + node, self, self._answer_fd),
             "heartbeat": lambda: bus.from_driver(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
             "flood": lambda: self._repeat(400, 0.002, lambda: bus.send(0x123, bytes(8))),
         }[hazard.detail]()
@@ -324,6 +324,11 @@ class Player:
             "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
             "forged": lambda: bus.subscribe(0x600 + node, self, self._forge),
         }[hazard.detail]()
+
+    def _answer_fd(self, cob_id: int, data: bytes) -> None:
+        """A frame of another kind of bus, which looks like an answer: 60.0 °C."""
+        if data[:3] == b"\x40\x04\x60":
+            self.gateway.bus.raw(_fd(cob_id - 0x80))
 
     def _forge(self, cob_id: int, data: bytes) -> None:
         """Somebody answers in the BMU's name, and is quicker: 20.0 °C."""
