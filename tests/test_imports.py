@@ -241,7 +241,7 @@ BROKEN: tuple[tuple[Rule, str, str], ...] = (
     (purity, "core.step", "import time"),
     (purity, "core.step", "from logging import getLogger"),
     (purity, "core.step", "def f():\n    import os"),
-    (purity, "core.checks.pair", "import threading"),
+    (purity, "core.witnesses.measured", "import threading"),
     (purity, "protocol.frame", "import socket"),
     (purity, "interlock", "import random"),
     (purity, "interlock", "open('x')"),

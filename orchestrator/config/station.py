@@ -103,6 +103,14 @@ class Station:
     station: str = key("the station's name")
     can: Mapping[str, Mapping[str, object]] = key("CAN buses by name; the keys of each are python-can's own")
     bays: tuple[Bay, ...] = key("one for each charger")
+    stagger_s: float = key(
+        "charges of this station begin at least this far apart, each once the one before was seen on its own BMU; with "
+        "one bay there is nobody to wait for; 0: they may begin together, and swapped cables are found later",
+        unit="s",
+        ge=0,
+        le=60,
+        default=3.0,
+    )
     control: Control = key("the control socket")
     journal: JournalConfig = key("the journal")
     source: Source = field(default=Source("<station>"), compare=False)

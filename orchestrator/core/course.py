@@ -4,11 +4,14 @@ Each kind of state has one function here; all of them ask the same questions in 
 the charger be trusted to stand by, does something keep us from charging, does the battery want to be charged.
 """
 
+from dataclasses import replace
+
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import finished
 from orchestrator.core.machine import RESTING, Trigger
-from orchestrator.core.safestop import LOST_S, gives_up
+from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, proved_to_last
+from orchestrator.core.witnesses.standby import current_without_order, sees_current
 from orchestrator.model import ENERGISED, ActiveFault, Effect, State
 
 Course = tuple[Trigger | None, str]
@@ -44,8 +47,9 @@ def course(f: Facts, faults: Faults) -> Course:
 def _energised(f: Facts, faults: Faults) -> Course:
     if faults and faults[0].effect >= Effect.PAUSE:
         return Trigger.STOP, faults[0].text
-    if f.memory.hold or f.memory.paused:
-        return Trigger.STOP, f.memory.hold or "paused by the operator"
+    asked = f.memory.hold or f.snapshot.ending or ("paused by the operator" if f.memory.paused else "")
+    if asked:
+        return Trigger.STOP, asked
     if f.memory.state is State.CHARGING:
         full = finished(f)
         if full is not None:
@@ -69,7 +73,8 @@ def _charging_reason(f: Facts, faults: Faults) -> str:
 
 def _precharging(f: Facts) -> Course:
     memory, rule, source = f.memory, f.rules.policy.precharge, f.rules.policy.source
-    if rule is None or f.pack_v is None:  # unknown means no, whoever lets it come to this
+    session = memory.session
+    if rule is None or session is None or f.pack_v is None:  # unknown means no, whoever lets it come to this
         return Trigger.STOP, "precharge without a rule for it, or without the pack's voltage"
     pulse = memory.state is State.PRECHARGE_PULSE
     target_v = rule.pulse.until_v if pulse else rule.below_v
@@ -78,11 +83,11 @@ def _precharging(f: Facts) -> Course:
     elif memory.reached_s is None:
         memory.reached_s = f.now_s
     reached = memory.reached_s is not None and f.now_s - memory.reached_s >= REACHED_S
-    if f.now_s - memory.mark_s >= rule.rise.within_min * 60:
-        memory.mark_s, memory.mark_v = f.now_s, f.pack_v  # it rose: the fault table has looked already
+    if session.rise_s >= rule.rise.within_min * 60:  # it rose: the fault table has looked already
+        memory.session = replace(session, rise_s=0.0, rise_v=f.pack_v)
     if pulse and reached:
         return Trigger.CONTINUE, f"the pack reached {target_v:g} V ({source.at('precharge.pulse.until_v')})"
-    if pulse and f.state_s >= rule.pulse.max_min * 60:
+    if pulse and session.pulse_s >= rule.pulse.max_min * 60:
         return Trigger.CONTINUE, f"{rule.pulse.max_min:g} min of pulses ({source.at('precharge.pulse.max_min')})"
     if reached:
         return Trigger.CHARGE, f"the pack reached {target_v:g} V ({source.at('precharge.below_v')})"
@@ -91,22 +96,40 @@ def _precharging(f: Facts) -> Course:
 
 
 def _stopping(f: Facts, faults: Faults) -> Course:
-    if f.stopped:
+    state, memory = f.memory.state, f.memory
+    if proved_to_last(f) if state is State.UNCONTROLLABLE else f.stopped:
         return _rest(f, faults)
-    silent = f.memory.state is State.STARTING and not f.charger.online and f.state_s >= LOST_S
-    if silent:
-        return Trigger.LOSE, _offline_reason(f)
     if gives_up(f):
-        return Trigger.GIVE_UP, f"the charger has not confirmed the stop for {f.state_s:.0f} s: {_why(f)}"
-    return None, f.memory.reason
+        return Trigger.GIVE_UP, _out_of_control(f)
+    if state is State.UNCONTROLLABLE:
+        return None, _out_of_control(f)
+    if state is State.STARTING and not memory.unverified and not f.charger.online and f.state_s >= LOST_S:
+        return Trigger.LOSE, _offline_reason(f)
+    return None, memory.reason
+
+
+def _out_of_control(f: Facts) -> str:
+    """First what to do, then why."""
+    memory, do = f.memory, f"CUT THE MAINS of this charger ({f.rules.bay.charger.port})"
+    if f.stopped:
+        lasts_s = f.now_s - memory.witnessed.proof[0]
+        return f"{do} unless it stays off: it has stood by for {lasts_s:.0f} s, {LASTS_S:g} s are believed"
+    since_s = memory.stopping_s if memory.stopping_s is not None else f.now_s - f.state_s
+    return f"{do} now: it has not obeyed the stop for {f.now_s - since_s:.0f} s: {_why(f)}"
 
 
 def _why(f: Facts) -> str:
-    if f.charger.problem:
-        return f.charger.problem
-    if not f.charger.online or f.reading is None:
-        return f"no answer on {f.rules.bay.charger.port}"
-    return f"it delivers {f.reading.current_a:.2f} A" if f.runs else "its status is not valid"
+    """What each witness says, the old marked as old."""
+    sees = f"; the BMU sees {f.pack_a:.1f} A" if f.pack_a is not None else "; the BMU is not heard"
+    if f.charger.problem or not f.charger.online or f.reading is None:
+        heard = f.snapshot.charger
+        last = f"; {heard.current_a:.2f} A, last heard {f.now_s - heard.t_s:.0f} s ago" if heard is not None else ""
+        return (f.charger.problem or f"no answer on {f.rules.bay.charger.port}") + last + sees
+    if f.runs:
+        return f"it delivers {f.reading.current_a:.2f} A{sees}"
+    if sees_current(f):
+        return f"it says {f.reading.current_a:.2f} A{sees}: believe the BMU"
+    return f"its status does not show a standby that lasts{sees}"
 
 
 def _offline_reason(f: Facts) -> str:
@@ -119,6 +142,8 @@ def _resting(f: Facts, faults: Faults) -> Course:
         return Trigger.STOP, fresh.text
     if f.runs:
         return Trigger.STOP, "the charger runs though it was not commanded to"
+    if f.unordered:
+        return Trigger.STOP, current_without_order(f) or f.memory.reason
     if f.memory.state is State.OFFLINE and not f.stopped:
         answers = f.charger.online and f.reading is not None
         return None, "the charger is being stopped before anything else" if answers else _offline_reason(f)
@@ -136,7 +161,7 @@ def _rest(f: Facts, faults: Faults) -> Course:
     if state is State.QUALIFYING and trigger is Trigger.QUALIFY:
         return _qualifying(f)
     if trigger is Trigger.QUALIFY and state not in (State.IDLE, State.FULL, State.SUSPENDED):
-        return Trigger.REST, reason
+        return (Trigger.REST if f.memory.session is None else Trigger.SUSPEND), reason
     return (None if LEADS.get(trigger) is state else trigger), reason
 
 
@@ -153,6 +178,8 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
         return Trigger.REST, waits.text
     if memory.hold:
         return Trigger.REST, memory.hold
+    if f.snapshot.ending:  # the charge goes on after it
+        return (Trigger.REST if memory.session is None else Trigger.SUSPEND), f.snapshot.ending
     if memory.paused:
         return Trigger.SUSPEND, "paused by the operator; start to go on"
     absent = _absent(f)
@@ -197,16 +224,23 @@ def _wanted(f: Facts) -> tuple[bool, str]:
 
 def _qualifying(f: Facts) -> Course:
     memory = f.memory
-    if not f.present:
-        memory.qualified_s = None
-        return None, f"waiting for fresh values: {f.missing}"
+    not_yet = f"waiting for fresh values: {f.missing}" if not f.present else ""
     if not f.connected:
-        memory.qualified_s = None
-        return None, "waiting for the contactor, behind which charger and battery cannot be compared"
+        not_yet = not_yet or "waiting for the contactor, behind which charger and battery cannot be compared"
+    if not_yet:
+        memory.qualified_s, memory.ready, memory.intends = None, False, False
+        return None, not_yet
     if memory.qualified_s is None:
         memory.qualified_s = f.now_s
     if f.now_s - memory.qualified_s < QUALIFY_S or not _seen_twice(f, memory.qualified_s) or not f.stopped:
         return None, "checking charger and battery before a charge"
+    memory.ready = True
+    if f.snapshot.waits:
+        memory.intends = False
+        return None, f.snapshot.waits
+    memory.intends = True
+    if not f.snapshot.running_kept:
+        return None, "writing down that a charge begins, so that a restart would know of it"
     rule = f.rules.policy.precharge
     if f.rules.manual and rule is not None and f.pack_v is not None and f.pack_v < rule.below_v:
         at = f.rules.policy.source.at("precharge.below_v")

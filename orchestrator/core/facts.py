@@ -7,6 +7,7 @@ from math import inf, isfinite
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.witnesses import standby
 from orchestrator.model import (
     ENERGISED,
     BatteryLink,
@@ -53,6 +54,7 @@ class Facts:
     __slots__ = (
         "amps",
         "battery",
+        "broken",
         "charger",
         "connected",
         "energised",
@@ -94,6 +96,8 @@ class Facts:
         self.soc = _fresh(battery.soc_pct, now_s, slow_s)
         self.soh = _fresh(battery.soh_pct, now_s, slow_s)
         self.connected = snapshot.connected
+        #: what of our own could not be judged in this step, in words
+        self.broken: list[str] = []
         self.energised = memory.state in ENERGISED
         self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
         #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
@@ -154,12 +158,14 @@ class Facts:
         return reading is not None and (reading.operation is Operation.RUNNING or reading.current_a > STANDBY_A)
 
     @property
+    def unordered(self) -> bool:
+        """The BMU goes on to see a charging current that nobody ordered: whatever the charger says, something runs."""
+        return self.memory.witnessed.unordered_s >= standby.UNORDERED_S and standby.sees_current(self)
+
+    @property
     def stopped(self) -> bool:
-        """A stop that was sent in this state was answered with standby: the only proof that is taken."""
-        reading, sent_s, since_s = self.reading, self.charger.stop_sent_s, self.memory.since_s
-        if reading is None or sent_s is None or since_s is None:
-            return False
-        return since_s <= sent_s <= reading.t_s and self.standby
+        """A stop that was sent in this state was answered with standby, by both witnesses."""
+        return standby.proved(self)
 
     @property
     def full_mode(self) -> bool:

@@ -12,9 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
+from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import OBEY_STOP_S
+from orchestrator.core.witnesses import measured, pack, paired, standby
 from orchestrator.model import ENERGISED, Effect, State
 
 Check = Callable[[Facts], str | None]
@@ -39,6 +40,8 @@ QUALIFYING = frozenset({State.QUALIFYING})
 UNSTOPPED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
 #: A heartbeat, the NMT start that answers it, and the next heartbeat, at the longest period that can be asked for.
 NMT_OBEY_S = 4.0
+#: Steady values that all change at once are read from the one a moment before the other.
+FOLLOWS_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +56,7 @@ class Row:
     where: frozenset[State]  #: the states it is looked for in; a fault that is raised is followed everywhere
     advice: str  #: what to do
     for_s: float = 0.0  #: the condition must last this long …
-    polls: int = 1  #: … and be seen in this many charger readings in a row
+    polls: int = 1  #: … and be seen in this many charger readings; both drain while it is away
     clean_s: float = 0.0  #: AUTO, RESET: how long the condition must be gone
     departs: bool = False  #: a battery that leaves in mid-charge looks like this; once it has left, it was no fault
 
@@ -75,6 +78,13 @@ FAULTS: tuple[Row, ...] = (
         "set the rotary switch or the station file, then start", polls=2),
     Row("rejected_frame", "C22", E.TRIP, Clear.RESET, reports.rejected_frame, ALWAYS,
         "this charger does not know our commands: check its model and version, then reset"),
+    Row("line_taken_over", "C26", E.STOP, Clear.BACKOFF, obedience.line_taken_over, AT_WORK,
+        "find the program that uses this port (fuser -v, ModemManager, a getty, a terminal program) and keep it away"),
+    Row("line_changed", "C26", E.WARN, Clear.AUTO, obedience.line_taken_over, ALWAYS - AT_WORK,
+        "find the program that uses this port (fuser -v, ModemManager, a getty, a terminal program) and keep it away",
+        clean_s=10),
+    Row("port_locked", "C27", E.STOP, Clear.AUTO, obedience.port_locked, ALWAYS,
+        "end that program (fuser -v shows it) and keep it away from this port", clean_s=2),
     Row("noisy_line", "C21", E.WARN, Clear.AUTO, reports.noisy_line, ALWAYS,
         "check the cable, its shield and its ground", clean_s=10),
     # whether it obeys
@@ -84,6 +94,9 @@ FAULTS: tuple[Row, ...] = (
         "it was stopped; find out why it ran, then start"),
     Row("rogue_run", "C5", E.TRIP, Clear.RESET, obedience.rogue_run, AT_REST,
         "somebody else commands this charger, or it is defective: find out, then reset"),
+    Row("current_without_order", "C29", E.TRIP, Clear.RESET, standby.current_without_order, AT_REST | UNSEEN,
+        "cut the charger's mains if the current goes on; check the bay's serial cable and what else charges this pack, "
+        "then reset", clean_s=5),
     Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNSTOPPED,
         "cut the charger's mains now; reset after it was repaired", for_s=OBEY_STOP_S),
     Row("contactor_lost", "C6", E.STOP, Clear.BACKOFF, obedience.contactor_lost, ALWAYS,
@@ -94,6 +107,10 @@ FAULTS: tuple[Row, ...] = (
         "find out who stopped it, then start", polls=2, departs=True),
     Row("setting_not_obeyed", "C9, C16", E.TRIP, Clear.RESET, obedience.setting_not_obeyed, ENERGISED,
         "check the charger, then reset"),
+    Row("limit_reverted", "C28", E.TRIP, Clear.RESET, obedience.limit_reverted, ENERGISED,
+        "this charger does not keep what it confirms: check it, then reset"),
+    Row("above_step", "C28", E.TRIP, Clear.RESET, obedience.above_step, ENERGISED,
+        "check the station file's steps_a against the charger, and the charger, then reset", for_s=2, polls=2),
     Row("over_current", "C11", E.TRIP, Clear.RESET, obedience.over_current, ALWAYS,
         "check the station file's steps_a against the charger, then reset", polls=2),
     Row("early_full", "C18", E.STOP, Clear.OPERATOR, obedience.early_full, ENERGISED,
@@ -102,20 +119,30 @@ FAULTS: tuple[Row, ...] = (
         "check the contacts between charger and battery", departs=True),
     Row("no_battery", "C14", E.STOP, Clear.BACKOFF, obedience.no_battery, ENERGISED,
         "check the contacts between charger and battery", departs=True),
+    Row("loose_plug", "C13", E.STOP, Clear.BACKOFF, obedience.loose_plug, ALWAYS,
+        "check the battery's plug and its contacts"),
     Row("wakes_too_long", "C15", E.TRIP, Clear.RESET, obedience.wakes_too_long, ENERGISED,
         "the pack may be defective: inspect it, then reset"),
     # charger and battery side by side
-    Row("over_voltage", "C10, B14", E.TRIP, Clear.RESET, pair.over_voltage, ALWAYS,
+    Row("over_voltage", "C10, B14", E.TRIP, Clear.RESET, measured.over_voltage, ALWAYS,
         "inspect pack and charger, check the voltages of policy and station, then reset"),
-    Row("volts_disagree", "B15", E.TRIP, Clear.RESET, pair.volts_disagree, ENERGISED,
+    Row("volts_disagree", "B15", E.TRIP, Clear.RESET, measured.volts_disagree, ENERGISED,
         "check that this BMU belongs to this charger's battery, then reset", for_s=3),
-    Row("not_paired", "B15", E.NO_START, Clear.AUTO, pair.volts_disagree, QUALIFYING,
+    Row("pairing_not_proved", "P8", E.STOP, Clear.OPERATOR, paired.pairing_not_proved, ENERGISED,
+        "check the serial cables and the node ids of the bays, then start"),
+    Row("not_paired", "B15", E.NO_START, Clear.AUTO, measured.volts_disagree, QUALIFYING,
         "check that this BMU belongs to this charger's battery", for_s=1, clean_s=1),
-    Row("amps_disagree", "B16", E.TRIP, Clear.RESET, pair.amps_disagree, ENERGISED,
+    Row("amps_disagree", "B16", E.TRIP, Clear.RESET, measured.amps_disagree, ENERGISED,
         "check for loads on the battery and for a wrong node id, then reset", for_s=5),
-    Row("charger_frozen", "C20", E.STOP, Clear.BACKOFF, pair.charger_frozen, ENERGISED,
-        "switch the charger off and on again; if it comes back, replace it"),
-    Row("back_feed", "C12", E.TRIP, Clear.RESET, pair.back_feed, ENERGISED,
+    Row("charger_frozen", "C20", E.STOP, Clear.BACKOFF, measured.charger_frozen, ENERGISED,
+        "switch the charger off and on again; if it comes back, replace it", for_s=FOLLOWS_S),
+    Row("charger_frozen_at_rest", "C31", E.NO_START, Clear.BACKOFF, measured.charger_frozen_at_rest, AT_REST,
+        "switch the charger off and on again; if it comes back, replace it", for_s=FOLLOWS_S),
+    Row("bmu_frozen", "B23", E.STOP, Clear.BACKOFF, measured.bmu_frozen, ENERGISED,
+        "restart the BMU; if it comes back, have it replaced", for_s=FOLLOWS_S),
+    Row("pack_collapsed", "B24", E.TRIP, Clear.RESET, pack.collapsed, ENERGISED,
+        "keep people away; inspect the pack and its contacts, then reset"),
+    Row("back_feed", "C12", E.TRIP, Clear.RESET, measured.back_feed, ENERGISED,
         "check charger and wiring, then reset", for_s=2),
     # the battery
     Row("bmu_silent", "B1, B5, B19, B21", E.STOP, Clear.BACKOFF, battery.bmu_silent, AT_WORK,
@@ -166,8 +193,15 @@ FAULTS: tuple[Row, ...] = (
         "have the BMU calibrated, then start"),
     Row("battery_exchanged", "B18", E.STOP, Clear.OPERATOR, state_of_charge.battery_exchanged, ALWAYS,
         "look which battery is in the bay, then start"),
-    Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, state_of_charge.wrong_policy, ALWAYS,
-        "this policy is for another pack: give the bay the policy of this battery", for_s=1, clean_s=5),
+    Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, pack.another_pack, ALWAYS - ENERGISED,
+        "give the bay the policy of this battery, or have its BMU calibrated", for_s=1, clean_s=5),
+    Row("another_pack", "B25", E.STOP, Clear.OPERATOR, pack.another_pack, ENERGISED,
+        "look which battery is in the bay, and have its BMU calibrated, then start", for_s=5),
+    # who else is on the bus
+    Row("other_master", "B27", E.WARN, Clear.AUTO, battery.other_master, ALWAYS,
+        "it does no harm as long as it only reads; keep other tools off this bus while batteries charge", clean_s=10),
+    Row("heartbeat_set", "B28", E.WARN, Clear.AUTO, battery.heartbeat_set, ALWAYS,
+        "keep other tools from changing this BMU's settings", clean_s=10),
     # the charge
     Row("precharge_no_rise", "C15", E.TRIP, Clear.RESET, charge.precharge_no_rise, ENERGISED,
         "the pack may be defective: inspect it, then reset"),
@@ -178,16 +212,17 @@ FAULTS: tuple[Row, ...] = (
     Row("ah_limit", "C17", E.TRIP, Clear.RESET, charge.ah_limit, ENERGISED,
         "the pack took more than it holds: inspect it, check the policy's max_ah, then reset"),
     # ourselves
-    Row("internal", "G5", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS,
-        "this is a defect of the software: report it with the journal, then reset"),
     Row("late", "G6", E.WARN, Clear.AUTO, ourselves.late, ALWAYS,
         "find out what keeps this machine busy", clean_s=10),
     Row("overrun", "G6", E.STOP, Clear.BACKOFF, ourselves.overrun, AT_WORK,
         "find out what keeps this machine busy"),
     Row("suspended", "G7", E.STOP, Clear.BACKOFF, ourselves.suspended, AT_WORK,
         "a gateway must not be suspended: switch that off in its operating system"),
-    Row("unkept", "G8", E.NO_START, Clear.AUTO, ourselves.unkept, ALWAYS,
+    Row("unkept", "G8, P9", E.NO_START, Clear.AUTO, ourselves.unkept, ALWAYS,
         "make space, or mend the disk of the journal's directory", clean_s=10),
+    # Last, since it tells of rows above that could not be judged.
+    Row("internal", "G5, P11", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS,
+        "this is a defect of the software: report it with the journal, then reset"),
 )  # fmt: skip
 
 ROW = {row.id: row for row in FAULTS}

@@ -4,6 +4,12 @@ from orchestrator.core.facts import Facts
 
 #: A charger that ends a charge below this state of charge is wrong, or the BMU is.
 EARLY_FULL_PCT = 80.0
+#: Where a policy says nothing else, a full pack has this share of its highest voltage.
+END_SHARE = 0.97
+#: Less than this share of what was set is a current that has tapered off.
+TAPERED_SHARE = 0.5
+#: A current that has just begun is low, too: it must have flowed for this long.
+SEEN_TAPER_S = 5.0
 
 
 def finished(f: Facts) -> str | None:
@@ -11,12 +17,28 @@ def finished(f: Facts) -> str | None:
     rule, source = f.rules.policy.finish, f.rules.policy.source
     if f.soc is not None and f.soc >= rule.soc_pct:
         return f"SOC {f.soc:.0f} % reached {rule.soc_pct:g} % ({source.at('finish.soc_pct')})"
-    if rule.charger_full and f.full_mode and f.soc is not None and f.soc >= early_below_pct(f):
+    if rule.charger_full and f.full_mode and f.soc is not None and f.soc >= early_below_pct(f) and ends_full(f):
         return f"the charger reports full (mode 5) ({source.at('finish.charger_full')})"
     taper, since_s = rule.taper, f.memory.taper_s
     if taper is not None and since_s is not None and f.now_s - since_s >= taper.for_s:
         return f"{f.amps:.2f} A, tapered below {taper.below_a:g} A for {taper.for_s:g} s ({source.at('finish.taper')})"
     return None
+
+
+def ends_full(f: Facts) -> bool:
+    """What led to the charger's end looks like full: the current had tapered off, or the pack was at its end voltage.
+
+    Mode 5 is also what a charger shows that somebody has stopped by other means.
+    """
+    rule, high_v, trail = f.rules.policy.finish, f.rules.policy.pack.voltage_v.high, f.memory.witnessed.trail
+    end_v = rule.taper.above_v if rule.taper is not None else END_SHARE * high_v
+    if max((sample.pack_v for sample in trail), default=f.pack_v or 0.0) >= end_v:
+        return True
+    flowed = [sample for sample in trail if sample.charger_a > 0]
+    if not flowed or flowed[-1].t_s - flowed[0].t_s < SEEN_TAPER_S:
+        return False
+    set_a = f.memory.step.current_a if f.memory.step is not None else max(sample.charger_a for sample in flowed)
+    return flowed[-1].charger_a < TAPERED_SHARE * set_a
 
 
 def early_below_pct(f: Facts) -> float:

@@ -1,12 +1,17 @@
 """How faults come and go: debounce, latch, backoff, clear. Mechanism only; what is a fault stands in the table.
 
 Theory of operation. A row's predicate says what is seen now. It becomes a fault after the row's time and number of
-polls, is then followed in every state, and ends as its `Clear` says. A fault whose condition is there is never cleared,
-and one that has latched only ever by a person.
+polls, is then followed in every state, and ends as its `Clear` says. Until it is one, its time and its polls drain
+while the condition is away (`drain.py`): what comes and goes is found out, too. A fault whose condition is there is
+never cleared, and one that has latched only ever by a person.
+
+A predicate that raises is a defect of ours: that row cannot be judged any more, so the bay trips by the row `internal`,
+which is judged last, and all the others go on.
 """
 
 from dataclasses import replace
 
+from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
 from orchestrator.core.memory import FaultMemory
@@ -22,6 +27,8 @@ STRIKES_S = 3600.0
 def update(f: Facts) -> dict[str, FaultMemory]:
     """The fault memory after this step's facts."""
     before, state = f.memory.faults, f.memory.state
+    passed_s = f.now_s - f.memory.looked_s if f.memory.looked_s is not None else 0.0
+    f.memory.looked_s = f.now_s
     departed = f.departed and not f.energised
     after: dict[str, FaultMemory] = {}
     for row in FAULTS:
@@ -30,24 +37,44 @@ def update(f: Facts) -> dict[str, FaultMemory]:
             continue
         left = departed and row.departs
         if left and not (fault is not None and fault.latched):
+            strikes = tuple(t for t in fault.strikes if t != fault.raised_s) if fault is not None else ()
+            if strikes:  # what it has just done was no fault; what it did before was
+                after[row.id] = FaultMemory(strikes=strikes)
             continue
         looked_for = not left and (state in row.where or (fault is not None and fault.raised_s is not None))
-        seen = row.check(f) if looked_for else None
+        seen = _seen(row, f) if looked_for else None
         if seen is not None:
-            after[row.id] = _present(row, fault or FaultMemory(), seen, f)
+            after[row.id] = _present(row, fault or FaultMemory(), seen, f, passed_s)
         elif fault is not None:
-            kept = _absent(row, fault, f.now_s)
+            kept = _absent(row, fault, f, passed_s)
             if kept is not None:
                 after[row.id] = kept
     return after
 
 
-def _present(row: Row, fault: FaultMemory, seen: str, f: Facts) -> FaultMemory:
+def _seen(row: Row, f: Facts) -> str | None:
+    """What the row's predicate sees."""
+    try:
+        return row.check(f)
+    except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
+        f.broken.append(f"{row.id} cannot be judged: {error!r}")
+        return None
+
+
+def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
+    """The readings that showed it, one more or a part of one less if there is a new one; and the newest reading."""
     poll_t_s = f.reading.t_s if f.reading else fault.poll_t_s
-    present_s = fault.present_s if fault.present_s is not None else f.now_s
-    polls = fault.polls + 1 if fault.polls == 0 or poll_t_s != fault.poll_t_s else fault.polls
-    fault = replace(fault, present_s=present_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
-    if fault.raised_s is not None or f.now_s - present_s < row.for_s or polls < row.polls:
+    if fault.polls and poll_t_s == fault.poll_t_s:
+        return fault.polls, poll_t_s
+    return (fault.polls + 1 if holds else max(0.0, fault.polls - DRAIN)), poll_t_s
+
+
+def _present(row: Row, fault: FaultMemory, seen: str, f: Facts, passed_s: float) -> FaultMemory:
+    polls, poll_t_s = _polls(fault, f, holds=True)
+    # The time before its first look is nobody's: the condition may have come just now.
+    seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
+    fault = replace(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
+    if fault.raised_s is not None or seen_s < row.for_s or polls < row.polls:
         return fault
     strikes = fault.strikes
     if row.clear is Clear.BACKOFF:
@@ -56,16 +83,21 @@ def _present(row: Row, fault: FaultMemory, seen: str, f: Facts) -> FaultMemory:
     return replace(fault, raised_s=f.now_s, text=seen, latched=latched, strikes=strikes)
 
 
-def _absent(row: Row, fault: FaultMemory, now_s: float) -> FaultMemory | None:
+def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMemory | None:
     """What is left of a fault while its condition is not there; None when nothing is."""
+    now_s = f.now_s
     if fault.raised_s is None:
         remembered = tuple(t for t in fault.strikes if now_s - t < STRIKES_S)
-        return FaultMemory(strikes=remembered) if remembered else None
+        seen_s = drained(fault.seen_s, passed_s, holds=False) if row.for_s else 0.0
+        polls, poll_t_s = _polls(fault, f, holds=False) if row.polls > 1 else (0.0, 0.0)
+        if not (remembered or seen_s or polls):
+            return None
+        return FaultMemory(seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, strikes=remembered)
     clean_s = fault.clean_s if fault.clean_s is not None else now_s
     wait_s = clear_after_s(row, fault)
     if wait_s is not None and now_s - clean_s >= wait_s:
         return FaultMemory(strikes=fault.strikes) if fault.strikes else None
-    return replace(fault, present_s=None, polls=0, clean_s=clean_s)
+    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s)
 
 
 def clear_after_s(row: Row, fault: FaultMemory) -> float | None:
@@ -90,11 +122,16 @@ def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
 
 
 def shown(faults: dict[str, FaultMemory]) -> tuple[ActiveFault, ...]:
-    """The faults in force, for people: what was seen and what to do."""
+    """The faults in force, for people: what was seen and what to do. What has tripped begins with what to do."""
     return tuple(
-        ActiveFault(name, effect(name, fault), f"{fault.text}; {_advice(ROW[name], fault)}", fault.raised_s or 0.0)
+        ActiveFault(name, effect(name, fault), _text(name, fault), fault.raised_s or 0.0)
         for name, fault in raised(faults)
     )
+
+
+def _text(name: str, fault: FaultMemory) -> str:
+    advice = _advice(ROW[name], fault)
+    return f"{advice} – {fault.text}" if effect(name, fault) is Effect.TRIP else f"{fault.text}; {advice}"
 
 
 def _advice(row: Row, fault: FaultMemory) -> str:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from orchestrator.core.witnesses.followed import Witnessed
 from orchestrator.model import Command, Session, State, Step
 
 
@@ -9,9 +10,10 @@ from orchestrator.model import Command, Session, State, Step
 class FaultMemory:
     """One row of the fault table whose condition is, or lately was, true."""
 
-    present_s: float | None = None  #: when the condition became true, None while it is false
-    polls: int = 0  #: charger readings in a row that showed it
-    poll_t_s: float = 0.0  #: the newest of them
+    present: bool = False  #: whether the condition was true at the last look …
+    seen_s: float = 0.0  #: … and for how long it has been, draining while it is not
+    polls: float = 0.0  #: charger readings that showed it, draining likewise
+    poll_t_s: float = 0.0  #: the newest reading that was looked at
     raised_s: float | None = None  #: when it became a fault, None while it is being debounced
     clean_s: float | None = None  #: when the condition became false again
     text: str = ""  #: what was seen when it was raised
@@ -37,12 +39,21 @@ class Memory:
     state: State = State.STARTING
     since_s: float | None = None  #: when the state was entered; None before the first step
     last_s: float | None = None  #: when the last step was taken
+    looked_s: float | None = None  #: when the fault table was last looked through
     reason: str = "the service has just started"
     faults: dict[str, FaultMemory] = field(default_factory=dict)
     stop_reason: str = ""  #: why the last charge was stopped
     resets: tuple[tuple[float, str], ...] = ()  #: (when, fault id) of a person's resets within the last hour
     hold: str = ""  #: why a person must start before the next charge; "" is free to go
     paused: bool = False  #: the operator paused the bay
+    stopping_s: float | None = None  #: since when a stop has been tried that was not proved to last …
+    verified_s: float | None = None  #: … and when standby was last proved
+    left_s: float | None = None  #: when the battery left in mid-charge; None: it did not, or that is dealt with
+    returned_s: float | None = None  #: when a battery came back so soon that only its plug can have been loose
+    reverts: tuple[float, ...] = ()  #: when a setting that the charger had confirmed went back by itself
+    confirmed: bool = False  #: the charger's newest reply showed the step that it was told
+    search_s: float = 0.0  #: how long a running charger has been looking for a battery …
+    wake_s: float = 0.0  #: … and recovering or precharging one by its own choice; both drain
     full_pct: float | None = None  #: the SOC at which this battery was charged full here; None: it was not, or it left
     boots: int = 0  #: boot-ups of the BMU that were dealt with
     session: Session | None = None
@@ -58,8 +69,6 @@ class Memory:
     raise_s: float | None = None  #: since when a higher step has been allowed
     taper_s: float | None = None  #: since when the current has been tapered off
     reached_s: float | None = None  #: since when the pack has been above the stage's voltage
-    mark_s: float = 0.0  #: precharge: where the expected rise is counted from …
-    mark_v: float = 0.0  #: … and the pack voltage then
     sample: tuple[float, float] | None = None  #: (t_s, °C), the newest …
     sample_before: tuple[float, float] | None = None  #: … and the one before
     charge: tuple[float, float | None] = (0.0, None)  #: (t_s, SOC), the newest; None since this battery is here
@@ -68,13 +77,12 @@ class Memory:
     peak: tuple[float, float] | None = None  #: (t_s, SOC) of the highest SOC of the present run of the charger
     warmth: tuple[tuple[float, float], ...] = ()  #: (t_s, °C) of the last minutes, oldest first
     runs_s: float | None = None  #: since when the charger has reported that it runs, or delivers current
-    idle_a_s: float | None = None  #: since when a running charger has delivered nothing
-    mode_s: float = 0.0  #: since when the charger has shown its present mode …
-    mode: int = 0  #: … which is this one
+    idle_s: float = 0.0  #: how long a running charger has delivered nothing; drains
     limit: int | None = None  #: the current-limit step that the charger shows …
     limit_before: int | None = None  #: … the one that it showed before …
     limit_s: float = 0.0  #: … and since when it shows this one
     still: Still | None = None  #: the charger's measurements, for as long as they do not change
+    witnessed: Witnessed = Witnessed()
     closed: bool = False  #: the contactor is to be closed
     ready: bool = False  #: everything speaks for a charge; it waits for its turn
     intends: bool = False  #: it is its turn, and a charge begins once that is on disk

@@ -13,7 +13,7 @@ from orchestrator.core.machine import fire
 from orchestrator.core.memory import Memory
 from orchestrator.core.operator import hear
 from orchestrator.core.rules import Rules
-from orchestrator.core.safestop import must_stop
+from orchestrator.core.safestop import follow_stop, must_stop
 from orchestrator.core.sequence import next_order
 from orchestrator.core.track import follow, follow_state
 from orchestrator.model import (
@@ -39,8 +39,9 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
     State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
     State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
 }
-#: After these a charge is over; a pause or a stop that is still being verified does not end it.
-SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.OFFLINE, State.TRIPPED, State.UNCONTROLLABLE})
+#: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
+#: not end it: its limits would begin anew with each of them.
+SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.TRIPPED})
 
 
 def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
@@ -56,7 +57,6 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     f = Facts(now_s, snapshot, memory, rules)
     follow(f, last_s)
     answer = hear(memory, snapshot.request, now_s) if snapshot.request is not None else ""
-    memory.hold = snapshot.ending or memory.hold
     memory.faults = latches.update(f)
     faults = latches.shown(memory.faults)
     ended = _move(f, faults)
@@ -70,7 +70,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
             setpoint=setpoint,
             step=chosen,
             faults=faults,
-            alarm=memory.state is State.UNCONTROLLABLE,
+            alarm=_alarm(memory),
             closed=memory.closed,
             session=ended or memory.session,
             answer=answer,
@@ -79,22 +79,37 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     )
 
 
+def _alarm(memory: Memory) -> bool:
+    """People must know: a charger does not obey, or nobody knows whether the one that ran has stopped."""
+    unknown = memory.unverified and memory.state in (State.STARTING, State.OFFLINE)
+    locked = memory.faults.get("port_locked")
+    return memory.state is State.UNCONTROLLABLE or unknown or (locked is not None and locked.raised_s is not None)
+
+
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
     """Let the state follow the facts; the session that has ended by it, if any."""
     memory, before = f.memory, f.memory.state
     trigger, reason = course(f, faults)
     memory.reason = reason
     memory.state = fire(before, trigger) if trigger is not None else before
-    if memory.state is before:
-        return None
-    follow_state(f, before)
-    if memory.state is State.STOPPING:
-        memory.stop_reason = reason
-    if memory.session is None or memory.state not in SESSION_ENDS:
+    if memory.state is not before:
+        follow_stop(f, before)
+        follow_state(f, before)
+        if memory.state is State.STOPPING:
+            memory.stop_reason = reason
+    if memory.session is None or not _is_over(f, before):
         return None
     ended = replace(memory.session, result=memory.stop_reason if before is State.STOPPING else reason)
     memory.session = None
     return ended
+
+
+def _is_over(f: Facts, before: State) -> bool:
+    """Whether the open charge has ended. One that the last run of the service left open ends with its battery."""
+    exchanged = f.memory.faults.get("battery_exchanged")
+    another = f.departed or (exchanged is not None and exchanged.raised_s is not None)
+    goes_on = f.memory.state is before or before is State.STARTING
+    return f.memory.state in SESSION_ENDS and (another or not goes_on)
 
 
 def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step | None]:
@@ -111,6 +126,7 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step
         chosen, memory.raise_s = Step(0, rules.steps_a[0], "precharge is always on the lowest step"), None
     if memory.step is not None and memory.session is not None and chosen.index != memory.step.index:
         memory.session = replace(memory.session, step_changes=memory.session.step_changes + 1)
+        memory.confirmed = False  # it is told another one
     memory.step = chosen
     return Setpoint(run=True, current_limit=chosen.index, charge_mode=mode, precharge=precharge), chosen
 

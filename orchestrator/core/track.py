@@ -3,21 +3,25 @@
 from dataclasses import replace
 
 from orchestrator.core.checks.battery import WARMING_S
-from orchestrator.core.checks.obedience import NO_CURRENT_A
-from orchestrator.core.checks.pair import STILL_ABOVE_A
+from orchestrator.core.checks.obedience import NO_CURRENT_A, REVERTS_S
 from orchestrator.core.checks.state_of_charge import (
     SOC_DRIFT_PCT_PER_S,
     SOC_OTHER_PCT,
     SOC_RATE_PCT_PER_S,
     SOC_STEP_PCT,
 )
+from orchestrator.core.drain import drained
 from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S, Facts
 from orchestrator.core.finish import tapers
 from orchestrator.core.memory import Still
-from orchestrator.model import ENERGISED, ChargeMode, Operation, Session, State
+from orchestrator.core.witnesses import followed
+from orchestrator.core.witnesses.measured import STILL_ABOVE_A
+from orchestrator.model import ENERGISED, ChargeMode, ChargerReading, Operation, Session, State
 
 #: How far apart the kept temperatures are.
 WARMTH_EVERY_S = 10.0
+#: A battery that leaves in mid-charge and is back within this was not taken away: its plug is loose.
+LOOSE_PLUG_S = 60.0
 
 Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
 
@@ -25,22 +29,21 @@ Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
 def follow(f: Facts, last_s: float | None) -> None:
     """Bring the memory up to this step; `last_s` is the time of the one before."""
     memory, reading = f.memory, f.reading
+    passed_s = f.now_s - last_s if last_s is not None else 0.0
     running = reading is not None and reading.operation is Operation.RUNNING
     memory.runs_s = _since(f.runs, memory.runs_s, f.now_s)
-    idle = running and reading is not None and reading.current_a < NO_CURRENT_A
-    charging = reading is not None and reading.charge_mode is ChargeMode.CHARGE
-    memory.idle_a_s = _since(idle and charging, memory.idle_a_s, f.now_s)
     memory.taper_s = _since(memory.state is State.CHARGING and tapers(f), memory.taper_s, f.now_s)
     memory.ran = memory.ran or (f.energised and running)
-    if reading is not None and reading.charge_mode is not None and reading.charge_mode != memory.mode:
-        memory.mode, memory.mode_s = int(reading.charge_mode), f.now_s
-    if reading is not None and reading.current_limit != memory.limit:
-        memory.limit_before, memory.limit, memory.limit_s = memory.limit, reading.current_limit, f.now_s
+    memory.witnessed = followed.follow(f, passed_s)
+    if reading is not None:
+        _follow_modes(f, reading, passed_s)
+        _follow_settings(f, reading)
     _follow_still(f)
+    _follow_departure(f)
     _follow_charge(f)
     _follow_warmth(f)
     _follow_battery(f)
-    _follow_session(f, last_s)
+    _follow_session(f, passed_s)
 
 
 def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  # noqa: FBT001 - the condition itself
@@ -50,13 +53,48 @@ def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  #
     return now_s if since_s is None else since_s
 
 
+def _follow_modes(f: Facts, reading: ChargerReading, passed_s: float) -> None:
+    """For how long a running charger has done what leads nowhere."""
+    memory, mode = f.memory, reading.charge_mode
+    running = reading.operation is Operation.RUNNING
+    waking = mode in (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)
+    idle = mode is ChargeMode.CHARGE and reading.current_a < NO_CURRENT_A
+    memory.search_s = drained(memory.search_s, passed_s, holds=running and mode is ChargeMode.BATTERY_SEARCH)
+    memory.wake_s = drained(memory.wake_s, passed_s, holds=running and waking)
+    memory.idle_s = drained(memory.idle_s, passed_s, holds=running and idle)
+
+
+def _follow_settings(f: Facts, reading: ChargerReading) -> None:
+    """The step that the charger shows, and how often it went back from one that it had confirmed."""
+    memory, step = f.memory, f.memory.step
+    if reading.current_limit != memory.limit:
+        memory.limit_before, memory.limit, memory.limit_s = memory.limit, reading.current_limit, f.now_s
+    told = f.energised and f.rules.manual and step is not None
+    shows = told and step is not None and reading.current_limit == step.index
+    if told and memory.confirmed and not shows and reading.operation is Operation.RUNNING:
+        memory.reverts = (*(t_s for t_s in memory.reverts if f.now_s - t_s < REVERTS_S), f.now_s)
+    memory.confirmed = shows
+
+
 def _follow_still(f: Facts) -> None:
-    """Since when the charger's volts and amps are the same to the last digit, while current flows."""
+    """Since when the charger's volts and amps are the same to the last digit."""
     reading, pack_v, pack_a, still = f.reading, f.pack_v, f.pack_a, f.memory.still
-    if reading is None or pack_v is None or pack_a is None or reading.current_a <= STILL_ABOVE_A:
+    if reading is None or pack_v is None or pack_a is None or (f.energised and reading.current_a <= STILL_ABOVE_A):
         f.memory.still = None
     elif still is None or (still.volts, still.amps) != (reading.voltage_v, reading.current_a):
         f.memory.still = Still(f.now_s, reading.voltage_v, reading.current_a, pack_v, pack_a)
+
+
+def _follow_departure(f: Facts) -> None:
+    """A battery that leaves in mid-charge and is back at once: its plug is loose."""
+    memory = f.memory
+    memory.returned_s = None
+    if f.departed:
+        if memory.session is not None and memory.left_s is None:
+            memory.left_s = f.now_s
+    elif memory.left_s is not None and f.battery.online and not f.silent:
+        memory.returned_s = f.now_s if f.now_s - memory.left_s < LOOSE_PLUG_S else None
+        memory.left_s = None
 
 
 def _follow_charge(f: Facts) -> None:
@@ -123,13 +161,13 @@ def _follow_battery(f: Facts) -> None:
         memory.boots = f.battery.boots
 
 
-def _follow_session(f: Facts, last_s: float | None) -> None:
+def _follow_session(f: Facts, passed_s: float) -> None:
     """Count time and charge. A gap in the charger's readings counts as nothing beyond their age limit.
 
     In standby nothing is counted: a suspended charge may last for days, and the offset of a measurement is no charge.
     """
-    memory, reading = f.memory, f.reading
-    if memory.session is None:
+    memory, reading, session = f.memory, f.reading, f.memory.session
+    if session is None:
         return
     ah = wh = 0.0
     if reading is not None and reading.t_s != memory.counted_t_s:
@@ -137,8 +175,7 @@ def _follow_session(f: Facts, last_s: float | None) -> None:
             hours = min(reading.t_s - memory.counted_t_s, CHARGER_STALE_S) / 3600
             ah, wh = reading.current_a * hours, reading.current_a * reading.voltage_v * hours
         memory.counted_t_s = reading.t_s
-    session = memory.session
-    passed_s = f.now_s - last_s if last_s is not None else 0.0
+    pulse, continuous = (memory.state is stage for stage in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS))
     memory.session = replace(
         session,
         elapsed_s=f.now_s - session.started_s,
@@ -146,6 +183,9 @@ def _follow_session(f: Facts, last_s: float | None) -> None:
         charged_ah=session.charged_ah + ah,
         charged_wh=session.charged_wh + wh,
         soc_pct=f.soc if f.soc is not None else session.soc_pct,
+        pulse_s=session.pulse_s + (passed_s if pulse else 0.0),
+        continuous_s=session.continuous_s + (passed_s if continuous else 0.0),
+        rise_s=session.rise_s + (passed_s if pulse or continuous else 0.0),
     )
 
 
@@ -154,12 +194,18 @@ def follow_state(f: Facts, before: State) -> None:
     memory = f.memory
     memory.since_s = f.now_s
     memory.ran, memory.reached_s, memory.taper_s, memory.qualified_s = False, None, None, None
-    memory.mark_s, memory.mark_v = f.now_s, f.pack_v or 0.0
     memory.step, memory.raise_s = None, None
+    memory.ready, memory.intends, memory.confirmed = False, False, False
     if memory.state not in ENERGISED:
         memory.order = None
-    elif before not in ENERGISED:
+        return
+    memory.unverified, memory.stopping_s, memory.verified_s = True, None, None
+    if before not in ENERGISED:
         memory.resumed, memory.resume_s, memory.order, memory.full_pct = False, f.now_s, None, None
+        memory.search_s = memory.idle_s = 0.0  # after a pause the charger looks for the battery anew
         if memory.session is None:
+            memory.wake_s = 0.0
             memory.session = Session(started_s=f.now_s, soc_start_pct=f.soc, soc_pct=f.soc)
             memory.counted_t_s = f.reading.t_s if f.reading else None
+    if memory.state is not State.CHARGING and memory.session is not None and memory.session.rise_v is None:
+        memory.session = replace(memory.session, rise_s=0.0, rise_v=f.pack_v)

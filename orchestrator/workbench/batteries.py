@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.config.station import Limits
+from orchestrator.core.cells import chemistry
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.model import BatteryLink, BatteryReading, BatteryStatus, Measurement
@@ -14,6 +15,9 @@ FRESH_S, OLD_S = 0.05, 30.0
 HEARTBEAT_S = 0.5
 #: How far beside a bound "just below" and "just above" lie: the resolution of what a BMU sends.
 NEAR = {"voltage_v": 0.01, "temperature_c": 0.1, "soc_pct": 1.0, "soh_pct": 1.0}
+
+#: Two volts of a cell that are no farther apart are of one state of charge.
+NEAR_CELL_V = 0.02
 
 #: What two instruments of this kind may differ by, measuring the same: cable, resolution, offset.
 WITHIN_V, WITHIN_A = 0.5, 0.5
@@ -70,14 +74,26 @@ FAST = frozenset({"voltage_v", "current_a", "status", "temperature_c"})
 SLOW = frozenset({"soc_pct", "soh_pct"})
 
 
+def fitting_v(rules: Rules, soc_pct: float) -> float:
+    """What the policy's pack has at this state of charge."""
+    pack = rules.policy.pack
+    return round(chemistry(pack).ocv_v(soc_pct) * pack.cells_in_series, 2)
+
+
+def fitting_pct(rules: Rules, pack_v: float) -> float:
+    """A state of charge that the policy's pack may have at this voltage; an empty one has any that is low."""
+    pack = rules.policy.pack
+    kind = chemistry(pack)
+    fits = (soc for soc in range(100) if abs(kind.ocv_v(soc) - pack_v / pack.cells_in_series) < NEAR_CELL_V)
+    return float(next(fits, 99.0 if pack_v > fitting_v(rules, 90.0) else 1.0))
+
+
 def healthy(rules: Rules) -> Shown:
     """In the middle of everything."""
-    pack, precharge = rules.policy.pack, rules.policy.precharge
-    low_v = precharge.below_v if precharge is not None else pack.voltage_v.low
     soc = min(rules.policy.start.soc_below_pct, rules.policy.recharge.soc_below_pct) / 2
     return Shown(
         {
-            "voltage_v": (low_v + rules.max_v) / 2, "status": 0.0, "soc_pct": soc, "soh_pct": 100.0,
+            "voltage_v": fitting_v(rules, soc), "status": 0.0, "soc_pct": soc, "soh_pct": 100.0,
             "temperature_c": (rules.temperature_c.low + rules.temperature_c.high) / 2,
         }
     )  # fmt: skip
@@ -93,8 +109,17 @@ def batteries(rules: Rules) -> dict[str, Shown]:
                 ("just below", bound - NEAR[field_name]), ("at", bound), ("just above", bound + NEAR[field_name]),
             ):  # fmt: skip
                 name = f"{field_name} {word} {bound:g}"
-                classes[name] = replace(base, values={**base.values, field_name: value})
+                classes[name] = replace(base, values={**base.values, **_with(rules, field_name, value)})
     return classes | _events(base, rules)
+
+
+def _with(rules: Rules, field_name: str, value: float) -> dict[str, float]:
+    """This value, and what goes with it: volts and SOC of one pack hang together."""
+    if field_name == "soc_pct":
+        return {"soc_pct": value, "voltage_v": fitting_v(rules, value)}
+    if field_name == "voltage_v":
+        return {"voltage_v": value, "soc_pct": fitting_pct(rules, value)}
+    return {field_name: value}
 
 
 def _bounds(rules: Rules) -> dict[str, set[float]]:
@@ -130,15 +155,16 @@ def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
     pack, precharge = rules.policy.pack, rules.policy.precharge
     status = {**base.values, "status": float(1 << BatteryStatus.BMU_ERROR)}
     limit = {**base.values, "status": float(1 << BatteryStatus.LOW_TEMPERATURE)}
-    full = {**base.values, "soc_pct": rules.policy.finish.soc_pct}
+    full = {**base.values, **_with(rules, "soc_pct", rules.policy.finish.soc_pct)}
     deep: dict[str, Shown] = {}
     if precharge is not None and rules.manual:
         low_v = (pack.voltage_v.low + precharge.below_v) / 2
-        deep["deeply discharged"] = replace(base, values={**base.values, "voltage_v": low_v})
+        deep["deeply discharged"] = replace(base, values={**base.values, "voltage_v": low_v, "soc_pct": 1.0})
     return deep | {
         "full": replace(base, values=full),
         "takes nothing": replace(base, takes=0.0),
-        "tapers": replace(base, takes=0.01, values={**base.values, "voltage_v": rules.max_v - 0.1}),
+        "tapers": replace(base, takes=0.01, values={**base.values, **_with(rules, "voltage_v", rules.max_v - 0.1)}),
+        "of another kind": replace(base, values={**base.values, "voltage_v": pack.voltage_v.low, "soc_pct": 50.0}),
         **{name: replace(base, values={**base.values, **value}) for name, value in _beyond(rules.bay.limits).items()},
         "absent": replace(base, connected=False, link=_fixed(online=False, speaks=False, problem="no answer")),
         "silent": replace(base, link=_fixed(online=False, speaks=False, problem="no answer")),
@@ -159,4 +185,5 @@ def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
         "another voltage than the charger's": replace(base, differs_v=5.0),
         "another current than the charger's": replace(base, differs_a=5.0),
         "discharges": replace(base, differs_a=-20.0),
+        "read by another master": replace(base, link=lambda now_s, _: {"other_master": "a", "other_master_t_s": now_s}),
     }

@@ -10,12 +10,17 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from orchestrator.core.latches import effect, raised
+from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.model import ENERGISED, Decision, Snapshot, State
 from orchestrator.workbench.properties import Property
 from orchestrator.workbench.story import BEGIN_S, Counterexample, Move, Taken
+
+#: In these standby is yet to be proved.
+WAITS = frozenset({*UNVERIFIED, State.OFFLINE, State.QUALIFYING})
 
 Step = Callable[[float, Snapshot, Memory, Rules], tuple[Decision, Memory]]
 T = TypeVar("T")
@@ -45,7 +50,7 @@ def outline(memory: Memory) -> tuple[object, ...]:
 
 def gist(memory: Memory) -> tuple[object, ...]:
     """What tells two memories apart here: what decides where a bay can go, without times, values and texts."""
-    energised = memory.state in ENERGISED
+    energised, witnessed = memory.state in ENERGISED, memory.witnessed
     return (
         *outline(memory),
         any(fault.latched for fault in memory.faults.values()),
@@ -54,7 +59,10 @@ def gist(memory: Memory) -> tuple[object, ...]:
         memory.session is not None,
         memory.full_pct is not None,
         memory.qualified_s is not None,
-        energised and (memory.resumed, memory.ran, memory.order and memory.order.action),
+        energised and (memory.resumed, memory.ran, memory.order and memory.order.action, witnessed.proved),
+        memory.state in WAITS and bool(witnessed.proof),
+        memory.unverified,
+        memory.intends,
     )
 
 
@@ -90,9 +98,10 @@ class Walk:
     def take(self, place: Place, move: Move) -> Taken:
         """One step from there."""
         now_s = place.now_s + move.dt_s
-        snapshot = self.inputs.snapshot(move, now_s, place.memory)
+        memory = Persisted.of(place.memory, now_s).memory(now_s) if move.restart else place.memory
+        snapshot = self.inputs.snapshot(move, now_s, memory)
         try:
-            decision, after = self.step(now_s, snapshot, place.memory, self.rules)
+            decision, after = self.step(now_s, snapshot, memory, self.rules)
         except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
             stays = Decision(place.memory.state, f"{type(error).__name__}: {error}")
             return Taken(move, now_s, snapshot, place.memory, stays, place.memory, self.rules, error=repr(error))

@@ -97,6 +97,8 @@ CHARGERS: Mapping[str, Charger] = {
     "stands by, no stop written yet": _both(_STANDBY, _link(stop_sent_s=None, sent=None)),
     "runs, whatever it is told": _ran_by_itself,
     "delivers, though it says stopped": _reading(operation=Operation.STOPPED, current_a=2.0),
+    "stands by and was set up anew": _both(_STANDBY, _link(taken_over="9600 baud", taken_over_t_s=lambda now_s: now_s)),
+    "shares its port": _link(locked_by="gpsd (pid 812)"),
     "runs without current": _both(_ran_by_itself, _reading(current_a=0.0)),
     "searches": _reading(charge_mode=ChargeMode.BATTERY_SEARCH, current_a=0.0),
     "recovers": _reading(charge_mode=ChargeMode.BATTERY_RECOVERY, current_a=0.0),
@@ -142,6 +144,10 @@ class StationInputs:
                     if charger in self.chargers and battery in self.batteries:
                         yield Move(TICK_S, charger, battery, request)
         yield Move(TICK_S, "obeys", "healthy", internal="seen by the checker")
+        yield Move(TICK_S, "obeys", "healthy", ending="the service ends: SIGTERM")
+        for charger in ("obeys", "runs, whatever it is told", "silent"):
+            if charger in self.chargers:
+                yield Move(TICK_S, charger, "healthy", restart=True)
 
     def pairs(self) -> Iterator[Move]:
         """Every charger with every battery in the next moment."""
@@ -162,7 +168,8 @@ class StationInputs:
         age_s = said.reading.pop("age_s")
         reading = None if said.silent else ChargerReading(t_s=now_s - age_s, current_a=amps, **said.reading)
         values, link = shown.at(now_s, memory, 0.0 if reading is None else amps)
-        return Snapshot(reading, ChargerLink(**said.link), values, link, move.request, move.internal)
+        link_of_charger = ChargerLink(**said.link)
+        return Snapshot(reading, link_of_charger, values, link, move.request, move.internal, ending=move.ending)
 
     def _obedient(self, shown: Shown, now_s: float, memory: Memory) -> Said:
         """A charger that has just done what the last step ordered."""

@@ -17,7 +17,7 @@ from orchestrator.model import Decision, State
 from orchestrator.workbench.replay import Again
 
 #: What a policy alone keeps from step to step: its own debounces and holds.
-OWN = ("faults", "step", "raise_s", "taper_s", "reached_s", "mark_s", "mark_v")
+OWN = ("faults", "step", "raise_s", "taper_s", "reached_s")
 
 
 @dataclass(slots=True)

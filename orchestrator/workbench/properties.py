@@ -13,6 +13,8 @@ from orchestrator.workbench.story import Taken
 #: The ages that evidence may have (DESIGN §6): a charger's silence is noticed within 2 s, fast values of a BMU go stale
 #: after 1.5 s, slow ones after three readings.
 CHARGER_S, FAST_S, SLOW_S = 2.0, 1.5, 3.0
+#: Current into the pack of more than this is one, and for how long a BMU may average it.
+BMU_SEES_A, UNORDERED_S = 1.0, 2.0
 #: From the order to stop until it must be proved, and a margin of steps.
 VERIFY_S = 3.0
 
@@ -93,6 +95,8 @@ def tripped_until_reset(taken: Taken) -> str | None:
     """TRIPPED is left by a person's reset, or to stop a charger that runs."""
     if taken.before.state is not State.TRIPPED or taken.after.state in (State.TRIPPED, State.STOPPING):
         return None
+    if taken.move.restart and taken.after.state in UNPROVED:
+        return None  # the stop is verified anew; what has latched is looked after by its own property
     return None if taken.snapshot.request is Request.RESET else f"left for {taken.after.state} without a reset"
 
 
@@ -113,10 +117,16 @@ def charge_begins_qualified(taken: Taken) -> str | None:
 
 
 def rest_is_verified(taken: Taken) -> str | None:
-    """A state of standby is entered only with a reading, asked for after a stop was sent in vain, that shows it."""
+    """A state of standby is entered only with a reading, asked for after a stop was sent, that shows it.
+
+    And only if the BMU sees no current.
+    """
     found = taken.before.state is not State.STARTING and taken.after.state is State.OFFLINE  # it was there
-    if taken.before.state not in UNPROVED or not (found or taken.after.state in STANDBY):
+    if taken.before.state not in UNPROVED or not (found or taken.after.state in STANDBY) or taken.move.restart:
         return None
+    amps = taken.snapshot.battery.current_a
+    if amps is not None and taken.now_s - amps.t_s <= FAST_S and amps.value > BMU_SEES_A:
+        return f"{taken.after.state} while the BMU sees {amps.value:.1f} A"
     reading, sent_s = taken.snapshot.charger, taken.snapshot.charger_link.stop_sent_s
     if reading is None or sent_s is None or reading.t_s < sent_s:
         return f"{taken.after.state} without a status from after the stop"
@@ -158,9 +168,43 @@ def unproved_stops(taken: Taken) -> str | None:
 
 
 def alarmed(taken: Taken) -> str | None:
-    """The interlock output is open in UNCONTROLLABLE, and only there."""
-    wrong = taken.decision.alarm is not (taken.after.state is State.UNCONTROLLABLE)
+    """People are told of a charger that is out of control, and of one that a run before left and nobody verified."""
+    left = taken.after.unverified and taken.after.state in (State.STARTING, State.OFFLINE)
+    shared = bool(taken.snapshot.charger_link.locked_by)
+    must, may = taken.after.state is State.UNCONTROLLABLE or left, shared or "port_locked" in taken.after.faults
+    wrong = (must and not taken.decision.alarm) or (taken.decision.alarm and not (must or may))
     return f"alarm {taken.decision.alarm} in {taken.after.state}" if wrong else None
+
+
+def unordered_current_stops(taken: Taken) -> str | None:
+    """DESIGN §2: a charger that reports 0 A while the BMU sees 14 A is running."""
+    amps, before = taken.snapshot.battery.current_a, taken.before
+    if amps is None or amps.value <= BMU_SEES_A or taken.now_s - amps.t_s > FAST_S or taken.move.restart:
+        return None
+    since_s = before.witnessed.unordered_s  # of sights one after another, by the core's own count
+    if taken.after.state in STANDBY and since_s >= UNORDERED_S and taken.decision.command != STOP:
+        return f"{taken.after.state} without a stop, and the BMU has seen {amps.value:.1f} A for {since_s:.1f} s"
+    return None
+
+
+def a_death_in_mid_charge_holds(taken: Taken) -> str | None:
+    """A charge that nobody ended waits for a person."""
+    ran = taken.before.state in ENERGISED or taken.before.unverified
+    if not taken.move.restart or not ran:
+        return None
+    return None if "found_running" in taken.after.faults else f"{taken.after.state} without a fault that waits"
+
+
+def counts_over_restarts(taken: Taken) -> str | None:
+    """No limit begins anew with a restart."""
+    before, after = taken.before.session, taken.after.session
+    if not taken.move.restart or before is None or after is None:
+        return None
+    less = [
+        name for name in ("charged_ah", "energised_s", "pulse_s", "continuous_s", "rise_s")
+        if getattr(after, name) < getattr(before, name)
+    ]  # fmt: skip
+    return f"{less[0]} went from {getattr(before, less[0]):.2f} to {getattr(after, less[0]):.2f}" if less else None
 
 
 def stops_in_time(taken: Taken) -> str | None:
@@ -172,15 +216,16 @@ def stops_in_time(taken: Taken) -> str | None:
 
 
 def precharge_ends(taken: Taken) -> str | None:
-    """A stage of precharge never takes longer than its policy allows."""
-    rule, since_s = taken.rules.policy.precharge, taken.after.since_s
-    if taken.after.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS) or since_s is None:
+    """A stage of precharge never takes longer than its policy allows, all pauses and restarts left out."""
+    rule, session = taken.rules.policy.precharge, taken.after.session
+    if taken.after.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS):
         return None
-    if rule is None:
-        return "precharge without a rule for it"
+    if rule is None or session is None:
+        return "precharge without a rule for it, or outside of a charge"
     pulse = taken.after.state is State.PRECHARGE_PULSE
     minutes = rule.pulse.max_min if pulse else rule.continuous.max_min
-    return f"{taken.after.state} beyond {minutes:g} min" if taken.now_s - since_s > minutes * 60 else None
+    lasted_s = session.pulse_s if pulse else session.continuous_s
+    return f"{taken.after.state} beyond {minutes:g} min" if lasted_s > minutes * 60 else None
 
 
 def session_ends(taken: Taken) -> str | None:
@@ -205,7 +250,10 @@ PROPERTIES: tuple[Property, ...] = (
     Property("voltage limit", "nothing runs above the station's voltage", within_volts),
     Property("temperature limit", "nothing runs outside the station's temperatures", within_temperature),
     Property("standing stop", "stop is the order until standby is proved", unproved_stops),
-    Property("alarm", "the alarm means UNCONTROLLABLE", alarmed),
+    Property("alarm", "the alarm means that a charger is, or may be, out of control", alarmed),
+    Property("unordered", "current that nobody ordered is stopped, whatever the charger says", unordered_current_stops),
+    Property("death", "a service that dies in mid-charge waits for a person", a_death_in_mid_charge_holds),
+    Property("counters", "no limit begins anew with a restart", counts_over_restarts),
     Property("in time", "STOPPING ends within 3 s, one way or the other", stops_in_time),
     Property("precharge", "precharge never exceeds its time", precharge_ends),
     Property("hours", "a charge never exceeds its hours", session_ends),

@@ -21,11 +21,15 @@ class Move:
     battery: str
     request: Request | None = None
     internal: str = ""
+    ending: str = ""
+    restart: bool = False  #: the service has died, and begins again with what it had written down
 
     def __str__(self) -> str:
         asked = f"; operator: {self.request}" if self.request else ""
         broke = f"; internal error: {self.internal}" if self.internal else ""
-        return f"charger: {self.charger}; battery: {self.battery}{asked}{broke}"
+        ends = "; the service ends" if self.ending else ""
+        lives = "the service is killed and starts again; " if self.restart else ""
+        return f"{lives}charger: {self.charger}; battery: {self.battery}{asked}{broke}{ends}"
 
 
 @dataclass(frozen=True, slots=True)

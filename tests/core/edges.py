@@ -8,7 +8,9 @@ from orchestrator.config.policy import Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.witnesses.followed import Witnessed
 from orchestrator.model import (
+    ENERGISED,
     BatteryLink,
     BatteryReading,
     ChargeMode,
@@ -63,9 +65,11 @@ class Edge:
 
     @property
     def facts(self) -> Facts:
-        measured = {name: None if x is None else Measurement(x, NOW_S) for name, x in self.bmu.items()}
+        values = self.bmu if self.state in ENERGISED else {"current_a": 0.0, **self.bmu}
+        measured = {name: None if x is None else Measurement(x, NOW_S) for name, x in values.items()}
+        proof = witnessed() if "stop_sent_s" in self.charger_link else {}
         memory = Memory(**{"state": self.state, "since_s": ago(self.state_s), "ran": True, "runs_s": ago(50),
-                           **self.memory})  # fmt: skip
+                           **proof, **self.memory})  # fmt: skip
         snapshot = Snapshot(
             charger=replace(READING, **self.charger),
             charger_link=replace(ChargerLink(online=True), **self.charger_link),
@@ -82,8 +86,13 @@ def session(hours: float = 1.0, ah: float = 1.0, soc_start_pct: float | None = 0
 
 
 def marked(minutes: float, volts: float) -> dict[str, Any]:
-    """The pack had this voltage so many minutes ago."""
-    return {"mark_s": ago(minutes * 60), "mark_v": volts}
+    """The pack had this voltage so many minutes of precharge ago."""
+    return {"session": Session(ago(9999), rise_s=minutes * 60, rise_v=volts)}
+
+
+def witnessed(**known: Any) -> dict[str, Any]:
+    """What is known of both witnesses; a stop of this state and two replies to it, unless something else is said."""
+    return {"witnessed": Witnessed(**{"stop_s": ago(1), "proof": (ago(0.5), NOW_S), **known})}
 
 
 def raised(*names: str) -> dict[str, Any]:

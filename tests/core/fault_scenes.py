@@ -17,7 +17,7 @@ from orchestrator.model import (
     Request,
     State,
 )
-from tests.core.bays import POLICY, charging, full, idle, pulse, qualifying, running_at_the_start
+from tests.core.bays import POLICY, charging, full, idle, pulse, qualifying, running_at_the_start, suspended
 from tests.core.world import TICK_S, World, bay
 
 Act = Callable[[World], object]
@@ -38,8 +38,15 @@ def warm(celsius: float) -> Callable[[], World]:
     return lambda: World(temperature_c=celsius).charging()
 
 
+def with_soc(percent: float) -> Callable[[], World]:
+    return lambda: World(soc_pct=percent).charging()
+
+
 def nearly_at_90() -> World:
-    return World(soc_pct=88.0).charging()
+    """With a pack that takes little by now, so that nothing flows above the lower step."""
+    world = World(soc_pct=88.0)
+    world.amps = 7.0
+    return world.charging()
 
 
 def hot() -> World:
@@ -180,6 +187,57 @@ def returns_as_another(world: World) -> None:
     world.arrive(soc_pct=80.0)
 
 
+def waiting() -> World:
+    """Qualified, while another bay begins its charge."""
+    world = World()
+    world.ours = {"waits": "bay-2 begins a charge"}
+    world.until(S.QUALIFYING)
+    world.run(60)
+    return world
+
+
+def goes_on(world: World) -> None:
+    world.ours = {}
+    measures_again(world)
+
+
+def swapped() -> World:
+    """The charger has just begun, and the BMU of its bay sees nothing of it."""
+    world = World()
+    world.shunt = 0.0
+    world.until(S.CHARGING)
+    while not world.charger.running:
+        world.tick()
+    return world
+
+
+def reverts(world: World) -> None:
+    """The charger confirms the step that it is told, and twice goes back from it; the third time is to come."""
+    for shown in (0, 4, 0, 4):
+        world.shows["current_limit"] = shown
+        world.tick()
+    world.shows["current_limit"] = 0
+
+
+def comes_back_at_once(world: World) -> None:
+    world.leave()
+    world.run(5)
+    world.arrive()
+
+
+def line_found(world: World) -> None:
+    charger(taken_over="115200 baud", taken_over_t_s=world.now_s + TICK_S)(world)
+
+
+def starts_on_a_line_of_its_own(world: World) -> None:
+    charger(taken_over_t_s=None)(world)
+    world.ask(Request.START)
+
+
+def somebody_else(what: str) -> Act:
+    return lambda world: bmu(**{what: "by another master", f"{what}_t_s": world.now_s + TICK_S})(world)
+
+
 def falls_with_odd_figures(world: World) -> None:
     value(remaining_ah=10.0, available_wh=100.0, soc_pct=48.0)(world)
     world.run(899.75, dt_s=0.25)
@@ -218,6 +276,7 @@ class Scene:
 
 
 ILLEGAL = "charge mode 9 (documented: 1 … 8)"
+BELOW_V = POLICY.source.at("precharge.below_v")
 PACK_V, SOH = POLICY.source.at("pack.voltage_v"), POLICY.source.at("pack.soh_min_pct")
 BIT = {bit: float(1 << bit) for bit in BatteryStatus}
 NO_PRECHARGE = replace(POLICY, precharge=None)
@@ -238,18 +297,26 @@ SCENES: tuple[Scene, ...] = (
           ("automatic mode", "says manual"), S.IDLE, 0.5),
     Scene("rejected_frame", error_frame(ErrorBit.COMMAND), QUIET_LINE, ("0x1F", "wrong command"), S.TRIPPED),
     Scene("rejected_frame", error_frame(ErrorBit.ORDER), QUIET_LINE, ("0x1F", "wrong order"), S.TRIPPED),
+    Scene("line_taken_over", line_found, charger(taken_over_t_s=None), ("/dev/ttyX to 115200 baud",), S.SUSPENDED),
+    Scene("line_changed", line_found, starts_on_a_line_of_its_own, ("/dev/ttyX to 115200 baud",), S.SUSPENDED,
+          begin=suspended, anywhere=False),
+    Scene("port_locked", charger(locked_by="getty (process 812)"), charger(locked_by=""),
+          ("/dev/ttyX: getty (process 812)", "in spite of it"), S.SUSPENDED),
     Scene("noisy_line", charger(bad_pct=5.1), charger(bad_pct=5.0), ("5 % of the last minute",), S.CHARGING),
     Scene("charger_silent", world_has(charger_answers=False), world_has(charger_answers=True),
           ("/dev/ttyX: no answer",), S.UNCONTROLLABLE, 1.25),
     Scene("charger_silent", world_has(port_hangs=True), world_has(port_hangs=False),
           ("/dev/ttyX has sent no status for 1.5 s",), S.UNCONTROLLABLE, 1.75),
     Scene("charger_silent", charger(online=False, problem="/dev/ttyX: Input/output error"),
-          charger(online=True, problem=""), ("/dev/ttyX: Input/output error",), S.OFFLINE),
+          charger(online=True, problem=""), ("/dev/ttyX: Input/output error",), S.UNCONTROLLABLE),
     Scene("charger_silent", charger(online=False, misses=2), charger(online=True), ("/dev/ttyX has not answered",),
-          S.OFFLINE),
+          S.UNCONTROLLABLE),
     Scene("found_running", nothing, nothing, ("found running",), S.IDLE, begin=running_at_the_start, anywhere=False),
     Scene("rogue_run", starts_by_itself, nothing, ("2.00 A",), S.TRIPPED, begin=idle, anywhere=False),
     Scene("rogue_run", world_has(leak_a=0.51), world_has(leak_a=0.5), ("0.51 A",), S.UNCONTROLLABLE, begin=full,
+          anywhere=False),
+    Scene("current_without_order", world_has(pack_amps=1.01), world_has(pack_amps=None),
+          ("1.01 A flow", "the charger says 0.00 A", "believe the BMU"), S.UNCONTROLLABLE, 2.25, begin=idle,
           anywhere=False),
     Scene("will_not_stop", stopped_in_vain, hears, ("14.00 A",), S.UNCONTROLLABLE, 3.25, anywhere=False),
     Scene("contactor_lost", world_has(connected=False, contactor_problem="/dev/gpiochip0: gone"),
@@ -263,15 +330,20 @@ SCENES: tuple[Scene, ...] = (
           5.25, anywhere=False, lapse=False),
     Scene("setting_not_obeyed", shows(precharge=Precharge.OFF), shows_truth, ("told 'precharge 1'",), S.TRIPPED, 5.25,
           begin=pulse, anywhere=False, lapse=False),
+    Scene("limit_reverted", reverts, shows_truth, ("went back by itself 3 times",), S.TRIPPED, anywhere=False),
+    Scene("above_step", deaf(Action.SET_LIMIT, soc_pct=90.0), hears, ("14.00 A", "9.10 A", "8 A were commanded"),
+          S.TRIPPED, 2.5, begin=with_soc(88.0), anywhere=False),
     Scene("over_current", world_has(amps=15.71), world_has(amps=None), ("15.71 A", "15.70 A"), S.TRIPPED, 0.5),
     Scene("early_full", shows(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED), shows_truth,
           ("mode 5", "only 50 %"), S.IDLE, 0.5, anywhere=False),
     Scene("open_circuit", world_has(amps=0.09), world_has(amps=None), ("delivered nothing for 10 s",), S.SUSPENDED,
-          10.5, anywhere=False),
+          10.25, anywhere=False),
     Scene("no_battery", shows(charge_mode=ChargeMode.BATTERY_SEARCH), shows_truth, ("looking for a battery for 1 min",),
-          S.SUSPENDED, 60.5, anywhere=False),
+          S.SUSPENDED, 60.25, anywhere=False),
+    Scene("loose_plug", comes_back_at_once, nothing, ("left in mid-charge", "back at once"), S.SUSPENDED,
+          anywhere=False),
     Scene("wakes_too_long", shows(charge_mode=ChargeMode.BATTERY_RECOVERY), shows_truth, ("for 30 min",), S.TRIPPED,
-          1800.5, anywhere=False),
+          1800.25, anywhere=False),
     Scene("over_voltage", world_has(volts=55.21), world_has(volts=None), ("55.21 V at the charger", "55.2 V"),
           S.TRIPPED),
     Scene("over_voltage", value(voltage_v=55.21), AS_BEFORE, ("55.21 V at the charger",), S.TRIPPED),
@@ -279,12 +351,22 @@ SCENES: tuple[Scene, ...] = (
           lambda world: (AS_BEFORE(world), world_has(volts=None)(world)), ("55.21 V at the pack", "55.2 V"), S.TRIPPED),
     Scene("volts_disagree", world_has(volts=49.01), world_has(volts=None), ("49.01 V", "48.00 V"), S.TRIPPED, 3.25,
           anywhere=False),
+    Scene("pairing_not_proved", nothing, world_has(shunt=1.0), ("begun with 14.00 A", "node 16", "0.00 A of it"),
+          S.IDLE, 2.75, begin=swapped, anywhere=False),
     Scene("not_paired", world_has(volts=46.99), world_has(volts=None), ("46.99 V", "48.00 V"), S.SUSPENDED, 1.25,
           begin=qualifying, anywhere=False),
-    Scene("amps_disagree", world_has(pack_amps=12.59), world_has(pack_amps=None), ("14.00 A", "12.59 A"), S.TRIPPED,
+    Scene("amps_disagree", world_has(shunt=12.59 / 14), world_has(shunt=1.0), ("14.00 A", "12.59 A"), S.TRIPPED,
           5.25, anywhere=False),
     Scene("charger_frozen", still(voltage_v=48.21), measures_again,
-          ("48.00 V and 14.00 A for 60 s", "0.21 V"), S.UNCONTROLLABLE, 60.0, anywhere=False),
+          ("48.00 V and 14.00 A for 63 s", "0.21 V"), S.UNCONTROLLABLE, 63.0, anywhere=False),
+    Scene("charger_frozen_at_rest", still(voltage_v=48.21), goes_on, ("48.00 V for 6", " s at rest", "0.21 V"),
+          S.SUSPENDED, 3.25, begin=waiting, anywhere=False),
+    Scene("bmu_frozen", world_has(counts=False, volts=48.21), world_has(counts=True, volts=None),
+          ("every word for 63 s", "0.21 V"), S.SUSPENDED, 63.0, anywhere=False),
+    Scene("pack_collapsed", value(voltage_v=38.21), AS_BEFORE, ("sunk to 38.21 V", "below 39 V", BELOW_V), S.TRIPPED,
+          anywhere=False),
+    Scene("pack_collapsed", value(voltage_v=45.59), AS_BEFORE, ("from 48.00 to 45.59 V", "14.00 A"), S.TRIPPED,
+          anywhere=False),
     Scene("back_feed", world_has(pack_amps=-0.51), world_has(pack_amps=None), ("0.51 A",), S.TRIPPED, 2.25),
     Scene("bmu_silent", world_has(battery_answers=False), world_has(battery_answers=True), ("node 16",),
           S.OFFLINE, 1.5),
@@ -330,8 +412,8 @@ SCENES: tuple[Scene, ...] = (
     Scene("implausible", bmu(implausible={"soc_pct": "SOC 140 %", "temperature_c": "x"}), bmu(implausible={}),
           ("SOC 140 %",), S.TRIPPED),
     Scene("implausible", bmu(implausible={"soc_pct": "SOC 141 %"}), bmu(implausible={}), ("SOC 141 %",), S.SUSPENDED),
-    Scene("under_voltage", value(voltage_v=25.99), AS_BEFORE, ("25.99 V", "26 V", PACK_V), S.CHARGING,
-          1.25, anywhere=False),
+    Scene("under_voltage", value(voltage_v=25.99), value(voltage_v=33.0), ("25.99 V", "26 V", PACK_V),
+          S.PRECHARGE_PULSE, 1.25, begin=pulse, anywhere=False),
     Scene("needs_precharge", value(status=BIT[BatteryStatus.LOW_VOLTAGE]), AS_BEFORE, ("no precharge",), S.CHARGING,
           1.25, begin=with_policy(NO_PRECHARGE), anywhere=False),
     Scene("soh_low", value(soh_pct=59.0), AS_BEFORE, ("59 %", "60 %", SOH), S.CHARGING),
@@ -345,8 +427,15 @@ SCENES: tuple[Scene, ...] = (
     Scene("soc_not_believed", falls_with_odd_figures, NO_FIGURES, ("fallen from 50 to 48 %", "10.00 Ah"), S.IDLE, 0.5,
           anywhere=False, lapse=False),
     Scene("battery_exchanged", returns_as_another, nothing, ("from 50 to 80 % in 5 s",), S.IDLE, anywhere=False),
-    Scene("wrong_policy", value(voltage_v=38.99, soc_pct=51.0), AS_BEFORE, ("38.99 V at SOC 51 %", "39 V", "13 cells"),
-          S.CHARGING, 1.25, anywhere=False),
+    Scene("wrong_policy", value(voltage_v=45.0, soc_pct=51.0), AS_BEFORE,
+          ("45.00 V at SOC 51 %", "13 NMC/NCA cells", "3.46 V a cell", "at least 3.50 V"), S.SUSPENDED, 1.25,
+          begin=qualifying, anywhere=False),
+    Scene("another_pack", value(voltage_v=45.65, soc_pct=55.0), AS_BEFORE, ("45.65 V at SOC 55 %", "at least 3.5"),
+          S.IDLE, 5.25, anywhere=False),
+    Scene("other_master", somebody_else("other_master"), bmu(other_master_t_s=None), ("by another master",),
+          S.CHARGING),
+    Scene("heartbeat_set", somebody_else("heartbeat_set"), bmu(heartbeat_set_t_s=None), ("by another master",),
+          S.CHARGING),
     Scene("precharge_no_rise", value(voltage_v=33.29), value(voltage_v=34.0), ("0.29 V in 5.0 min", "0.3 V"),
           S.TRIPPED, 299.0, begin=pulse, anywhere=False),
     Scene("precharge_too_long", nothing, nothing, ("4.0 min", "39 V"), S.TRIPPED, 240.0, begin=short_continuous,

@@ -123,7 +123,7 @@ def test_a_deaf_charger_is_said_to_be_deaf_though_stops_are_repeated() -> None:
     assert site.decision.state is State.UNCONTROLLABLE
     assert set(site.raised) == {"will_not_stop"}
     site.charger.ignores_stop = False
-    site.until(State.TRIPPED, 3)
+    site.until(State.TRIPPED, 13)
 
 
 def test_a_line_that_was_cut_is_no_disobedience() -> None:
@@ -131,6 +131,6 @@ def test_a_line_that_was_cut_is_no_disobedience() -> None:
     site.until(State.CHARGING, 20)
     site.run(10)
     loses_its_line(site)
-    site.run(3)
+    site.run(13)
     assert set(site.raised) == {"charger_silent"}
     assert site.decision.state is State.SUSPENDED

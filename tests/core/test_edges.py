@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 
-from orchestrator.core.checks import battery, charge, obedience, ourselves, pair, reports, state_of_charge
-from orchestrator.core.finish import finished, tapers
+from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
+from orchestrator.core.finish import ends_full, finished, tapers
 from orchestrator.core.memory import Still
 from orchestrator.core.sequence import RESUME, RUN
+from orchestrator.core.witnesses import measured
+from orchestrator.core.witnesses.followed import Sample
 from orchestrator.model import (
     Action,
     BatteryReading,
@@ -22,10 +24,12 @@ from orchestrator.model import (
     ErrorBit,
     Measurement,
     Operation,
+    Session,
     State,
+    Step,
 )
 from tests.core.bays import POLICY
-from tests.core.edges import AT, CONTINUOUS, NO_PRECHARGE, PULSE, Edge, ago, marked, raised, session
+from tests.core.edges import AT, CONTINUOUS, NO_PRECHARGE, PULSE, Edge, ago, marked, raised, session, witnessed
 
 LIMIT_3 = Command(Action.SET_LIMIT, 3)
 
@@ -54,11 +58,16 @@ CHARGE = (
     Edge(charge.precharge_no_rise, None, marked(6, 48.0)),
     Edge(charge.precharge_no_rise, None, marked(6, 48.0), PULSE, policy=NO_PRECHARGE),
     Edge(charge.precharge_no_rise, None, marked(6, 48.0), PULSE, bmu={"voltage_v": None}),
-    Edge(charge.precharge_too_long, None, state=CONTINUOUS, state_s=1200),
-    Edge(charge.precharge_too_long, None, state=PULSE, state_s=1206),
-    Edge(charge.precharge_too_long, None, state=CONTINUOUS, state_s=1206, policy=NO_PRECHARGE),
+    Edge(charge.precharge_no_rise, None, {}, PULSE),
+    Edge(charge.precharge_no_rise, None, {"session": Session(0.0, rise_s=9999)}, PULSE),
+    Edge(charge.precharge_too_long, None, state=CONTINUOUS),
+    Edge(charge.precharge_too_long, None, {"session": Session(0.0, continuous_s=1200)}, CONTINUOUS),
+    Edge(charge.precharge_too_long, None, {"session": Session(0.0, pulse_s=9999)}, CONTINUOUS),
+    Edge(charge.precharge_too_long, None, {"session": Session(0.0, continuous_s=1206)}, PULSE),
+    Edge(charge.precharge_too_long, None, {"session": Session(0.0, continuous_s=1206)}, CONTINUOUS,
+         policy=NO_PRECHARGE),
     Edge(charge.precharge_too_long, "continuous precharge has taken 20.1 min and the pack is below 39 V "
-         f"({AT('precharge.continuous.max_min')})", state=CONTINUOUS, state_s=1206),
+         f"({AT('precharge.continuous.max_min')})", {"session": Session(0.0, continuous_s=1206)}, CONTINUOUS),
     Edge(charge.time_limit, None),
     Edge(charge.time_limit, None, session(hours=12)),
     Edge(charge.time_limit, f"charging has taken 12.00 h ({AT('finish.max_hours')})", session(hours=12.001)),
@@ -73,14 +82,36 @@ CHARGE = (
          f"({AT('finish.max_ah')}), so from there 22.00 Ah", session(ah=22.01, soc_start_pct=70)),
 )  # fmt: skip
 
+
+def trail(*samples: tuple[float, float, float, float]) -> dict[str, Any]:
+    """Seconds ago, the pack's volts and amps, the charger's amps; oldest first."""
+    seen = tuple(Sample(ago(age_s), pack_v, pack_a, pack_v, amps) for age_s, pack_v, pack_a, amps in samples)
+    return {**witnessed(trail=seen), "step": Step(4, 14.0, "")}
+
+
+TAPERED = trail((5.0, 53.0, 6.9, 6.9), (0.0, 53.0, 6.9, 6.9))
 FINISH = (
+    Edge(ends_full, True, TAPERED),
+    Edge(ends_full, False, trail((4.9, 53.0, 6.9, 6.9), (0.0, 53.0, 6.9, 6.9))),
+    Edge(ends_full, False, trail((9.0, 53.0, 14.0, 14.0), (0.0, 53.0, 7.0, 7.0))),
+    Edge(ends_full, True, trail((9.0, 53.0, 14.0, 14.0), (0.5, 53.0, 6.9, 6.9), (0.0, 53.0, 0.0, 0.0))),
+    Edge(ends_full, False, trail((9.0, 53.0, 0.0, 0.0), (0.0, 53.0, 0.0, 0.0))),
+    Edge(ends_full, True, trail((1.0, 53.6, 14.0, 14.0), (0.0, 53.0, 14.0, 14.0))),
+    Edge(ends_full, False, trail((1.0, 53.59, 14.0, 14.0), (0.0, 53.0, 14.0, 14.0))),
+    Edge(ends_full, True, bmu={"voltage_v": 53.6}),
+    Edge(ends_full, False, bmu={"voltage_v": None}),
+    Edge(ends_full, True, trail((1.0, 53.55, 14.0, 14.0)),
+         policy=replace(POLICY, finish=replace(POLICY.finish, taper=None))),
+    Edge(ends_full, False, trail((1.0, 53.54, 14.0, 14.0)),
+         policy=replace(POLICY, finish=replace(POLICY.finish, taper=None))),
     Edge(finished, None, bmu={"soc_pct": 99.9}),
     Edge(finished, None, bmu={"soc_pct": None}),
     Edge(finished, f"SOC 100 % reached 100 % ({AT('finish.soc_pct')})", bmu={"soc_pct": 100.0}),
     Edge(finished, None, bmu={"soc_pct": 79.9}, charger={"charge_mode": ChargeMode.FULL}),
-    Edge(finished, f"the charger reports full (mode 5) ({AT('finish.charger_full')})", bmu={"soc_pct": 80.0},
-         charger={"charge_mode": ChargeMode.FULL}),
-    Edge(finished, None, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL},
+    Edge(finished, f"the charger reports full (mode 5) ({AT('finish.charger_full')})", TAPERED,
+         bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
+    Edge(finished, None, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
+    Edge(finished, None, TAPERED, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL},
          policy=replace(POLICY, finish=replace(POLICY.finish, charger_full=False))),
     Edge(finished, None, {"taper_s": ago(119.9)}),
     Edge(finished, f"10.00 A, tapered below 1 A for 120 s ({AT('finish.taper')})", {"taper_s": ago(120)}),
@@ -158,13 +189,16 @@ BATTERY = (
     Edge(battery.under_temperature, None, raised("under_temperature"), bmu={"temperature_c": 3.0}),
     Edge(battery.under_voltage, None, bmu={"voltage_v": 26.0}),
     Edge(battery.under_voltage, f"the pack has 25.90 V, below 26 V ({AT('pack.voltage_v')})",
-         bmu={"voltage_v": 25.9}),
+         bmu={"voltage_v": 25.9, "soc_pct": 3.0}),
+    Edge(battery.under_voltage, None, bmu={"voltage_v": 25.9}),  # that is another pack
     Edge(battery.under_voltage, None, bmu={"voltage_v": None}),
     Edge(battery.soh_low, None, bmu={"soh_pct": 60.0}),
     Edge(battery.soh_low, f"SOH 59 %, below 60 % ({AT('pack.soh_min_pct')})", bmu={"soh_pct": 59.0}),
     Edge(battery.soh_low, None, bmu={"soh_pct": None}),
 )  # fmt: skip
 
+NOT_FULL = "the charger stopped though it was told to run, and its mode 5 is not taken for full: the current had not " \
+           "tapered off and the pack has not reached its end voltage"  # fmt: skip
 UNCONFIRMED = "the charger was told '{}' for {} s and its status does not show it"
 OBEDIENCE = (
     Edge(obedience.will_not_start, None),
@@ -184,7 +218,14 @@ OBEDIENCE = (
     Edge(obedience.stopped_by_itself, None, {"ran": False}, charger={"operation": Operation.STOPPED}),
     Edge(obedience.stopped_by_itself, None, state=State.STOPPING, charger={"operation": Operation.STOPPED}),
     Edge(obedience.stopped_by_itself, None, charger={"operation": Operation.STOPPED, "t_s": ago(9)}),
-    Edge(obedience.stopped_by_itself, None,
+    Edge(obedience.stopped_by_itself, NOT_FULL, bmu={"soc_pct": 85.0},
+         charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
+    Edge(obedience.stopped_by_itself, None, TAPERED, bmu={"soc_pct": 85.0},
+         charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
+    Edge(obedience.stopped_by_itself, NOT_FULL, TAPERED, bmu={"soc_pct": 85.0},
+         charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL},
+         policy=replace(POLICY, finish=replace(POLICY.finish, charger_full=False))),
+    Edge(obedience.stopped_by_itself, None, bmu={"soc_pct": 79.0},  # that is early_full
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
     Edge(obedience.found_running, "the charger was found running though it was not commanded to"),
     Edge(obedience.found_running, None, charger={"operation": Operation.STOPPED, "current_a": 0.5}),
@@ -200,19 +241,15 @@ OBEDIENCE = (
     Edge(obedience.early_full, "the charger reports full (mode 5), the BMU only 79 %", bmu={"soc_pct": 79.0},
          charger={"charge_mode": ChargeMode.FULL}),
     Edge(obedience.open_circuit, None),
-    Edge(obedience.open_circuit, None, {"idle_a_s": ago(10)}),
+    Edge(obedience.open_circuit, None, {"idle_s": 10.0}),
     Edge(obedience.open_circuit, "the charger runs but has delivered nothing for 11 s at SOC 50 %",
-         {"idle_a_s": ago(11)}),
-    Edge(obedience.open_circuit, None, {"idle_a_s": ago(11)}, bmu={"soc_pct": 95.0}),
-    Edge(obedience.open_circuit, None, {"idle_a_s": ago(11)}, bmu={"soc_pct": None}),
-    Edge(obedience.no_battery, None, {"mode": 1, "mode_s": ago(90), "runs_s": ago(60)}),
-    Edge(obedience.no_battery, None, {"mode": 1, "mode_s": ago(60), "runs_s": ago(90)}),
-    Edge(obedience.no_battery, None, {"mode": 1, "mode_s": ago(90), "runs_s": None}),
-    Edge(obedience.no_battery, "the charger has been looking for a battery for 2 min",
-         {"mode": 1, "mode_s": ago(121), "runs_s": ago(999)}),
-    *(Edge(obedience.wakes_too_long, "the charger has been in recovery or precharge for 31 min",
-           {"mode": mode, "mode_s": ago(1860), "runs_s": ago(9999)}) for mode in (2, 3)),
-    Edge(obedience.wakes_too_long, None, {"mode": 4, "mode_s": ago(1860), "runs_s": ago(9999)}),
+         {"idle_s": 11.0}),
+    Edge(obedience.open_circuit, None, {"idle_s": 11.0}, bmu={"soc_pct": 95.0}),
+    Edge(obedience.open_circuit, None, {"idle_s": 11.0}, bmu={"soc_pct": None}),
+    Edge(obedience.no_battery, None, {"search_s": 60.0}),
+    Edge(obedience.no_battery, "the charger has been looking for a battery for 2 min", {"search_s": 121.0}),
+    Edge(obedience.wakes_too_long, None, {"wake_s": 1800.0}),
+    Edge(obedience.wakes_too_long, "the charger has been in recovery or precharge for 31 min", {"wake_s": 1860.0}),
 )  # fmt: skip
 
 SOC = (
@@ -265,47 +302,46 @@ SOC = (
     Edge(state_of_charge.battery_exchanged, "a step, in which the BMU was not heard: this may be another battery",
          {"exchange": (ago(4.9), "a step")}),
     Edge(state_of_charge.battery_exchanged, None, {"exchange": (ago(5), "a step")}),
-    Edge(state_of_charge.wrong_policy, None, bmu={"voltage_v": 38.0}),
-    Edge(state_of_charge.wrong_policy, None, bmu={"voltage_v": 39.0, "soc_pct": 51.0}),
-    Edge(state_of_charge.wrong_policy, "the pack has 38.00 V at SOC 51 %: below 39 V "
-         f"({AT('precharge.below_v')}) a pack of 13 cells is empty", bmu={"voltage_v": 38.0, "soc_pct": 51.0}),
-    Edge(state_of_charge.wrong_policy, None, bmu={"voltage_v": 38.0, "soc_pct": 51.0}, policy=NO_PRECHARGE),
-    Edge(state_of_charge.wrong_policy, None, bmu={"voltage_v": None, "soc_pct": 51.0}),
-    Edge(state_of_charge.wrong_policy, None, bmu={"voltage_v": 38.0, "soc_pct": None}),
 )  # fmt: skip
 
 FROZEN = "the charger has said 48.00 V and 10.00 A for 60 s, while the BMU's values moved by {} V and {} A: " \
          "its measurement is frozen"  # fmt: skip
 PAIR = (
-    Edge(pair.over_voltage, None, charger={"voltage_v": 55.2}, bmu={"voltage_v": 55.2}),
-    Edge(pair.over_voltage, "55.21 V at the charger, the limit is 55.2 V", charger={"voltage_v": 55.21}),
-    Edge(pair.over_voltage, "55.21 V at the pack, the limit is 55.2 V", bmu={"voltage_v": 55.21}),
-    Edge(pair.over_voltage, None, charger={"t_s": ago(9)}, bmu={"voltage_v": None}),
-    Edge(pair.volts_disagree, None, charger={"voltage_v": 49.0}),
-    Edge(pair.volts_disagree,
+    Edge(measured.over_voltage, None, charger={"voltage_v": 55.2}, bmu={"voltage_v": 55.2}),
+    Edge(measured.over_voltage, "55.21 V at the charger, the limit is 55.2 V", charger={"voltage_v": 55.21}),
+    Edge(measured.over_voltage, "55.21 V at the pack, the limit is 55.2 V", bmu={"voltage_v": 55.21}),
+    Edge(measured.over_voltage, None, charger={"t_s": ago(9)}, bmu={"voltage_v": None}),
+    Edge(measured.volts_disagree, None, charger={"voltage_v": 49.0}),
+    Edge(measured.volts_disagree,
          "the charger reads 49.01 V, the BMU 48.00 V: not the same battery, or a bad connection",
          charger={"voltage_v": 49.01}),
-    Edge(pair.volts_disagree, None, charger={"voltage_v": 53.0}, bmu={"voltage_v": 54.08}),
-    Edge(pair.volts_disagree, None, charger={"voltage_v": 9.0}, snapshot={"connected": False}),
-    Edge(pair.volts_disagree, None, charger={"t_s": ago(9)}),
-    Edge(pair.volts_disagree, None, bmu={"voltage_v": None}),
-    Edge(pair.amps_disagree, None, bmu={"current_a": 9.0}),
-    Edge(pair.amps_disagree, "the charger reads 10.00 A, the BMU 8.99 A", bmu={"current_a": 8.99}),
-    Edge(pair.amps_disagree, None, charger={"current_a": 14.0}, bmu={"current_a": 12.61}),
-    Edge(pair.amps_disagree, None, bmu={"current_a": None}),
-    Edge(pair.amps_disagree, None, charger={"t_s": ago(9)}),
-    Edge(pair.charger_frozen, None, still(59.9, 40.0, 1.0)),
-    Edge(pair.charger_frozen, None, still(60, 47.9, 9.5)),
-    Edge(pair.charger_frozen, None, still(60, 0.0, 10.0), bmu={"voltage_v": 0.2}),
-    Edge(pair.charger_frozen, FROZEN.format("0.25", "0.00"), still(60, 47.75, 10.0)),
-    Edge(pair.charger_frozen, FROZEN.format("0.00", "0.51"), still(60, 48.0, 10.51)),
-    Edge(pair.charger_frozen, None, still(60, 40.0, 1.0), bmu={"voltage_v": None}),
-    Edge(pair.charger_frozen, None, still(60, 40.0, 1.0), bmu={"current_a": None}),
-    Edge(pair.charger_frozen, None),
-    Edge(pair.back_feed, None, bmu={"current_a": -0.5}),
-    Edge(pair.back_feed, "the BMU reports a discharge of 0.51 A while the charger runs", bmu={"current_a": -0.51}),
-    Edge(pair.back_feed, None, {"runs_s": None}, bmu={"current_a": -0.51}),
-    Edge(pair.back_feed, None, bmu={"current_a": None}),
+    Edge(measured.volts_disagree, None, charger={"voltage_v": 53.0}, bmu={"voltage_v": 54.08}),
+    Edge(measured.volts_disagree, None, charger={"voltage_v": 9.0}, snapshot={"connected": False}),
+    Edge(measured.volts_disagree, None, charger={"t_s": ago(9)}),
+    Edge(measured.volts_disagree, None, bmu={"voltage_v": None}),
+    Edge(measured.amps_disagree, None, bmu={"current_a": 9.0}),
+    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.00 A; the charger is likelier wrong, by the "
+         "step that was set (8 A)", {"step": Step(2, 8.0, "")}, bmu={"current_a": 8.0}),
+    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A; the BMU is likelier wrong, by the step "
+         "that was set (10 A)", {"step": Step(2, 10.0, "")}, bmu={"current_a": 14.0}),
+    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A", {"step": Step(2, 2.0, "")},
+         bmu={"current_a": 14.0}),
+    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.99 A", bmu={"current_a": 8.99}),
+    Edge(measured.amps_disagree, None, charger={"current_a": 14.0}, bmu={"current_a": 12.61}),
+    Edge(measured.amps_disagree, None, bmu={"current_a": None}),
+    Edge(measured.amps_disagree, None, charger={"t_s": ago(9)}),
+    Edge(measured.charger_frozen, None, still(59.9, 40.0, 1.0)),
+    Edge(measured.charger_frozen, None, still(60, 47.9, 9.5)),
+    Edge(measured.charger_frozen, None, still(60, 0.0, 10.0), bmu={"voltage_v": 0.2}),
+    Edge(measured.charger_frozen, FROZEN.format("0.25", "0.00"), still(60, 47.75, 10.0)),
+    Edge(measured.charger_frozen, FROZEN.format("0.00", "0.51"), still(60, 48.0, 10.51)),
+    Edge(measured.charger_frozen, None, still(60, 40.0, 1.0), bmu={"voltage_v": None}),
+    Edge(measured.charger_frozen, None, still(60, 40.0, 1.0), bmu={"current_a": None}),
+    Edge(measured.charger_frozen, None),
+    Edge(measured.back_feed, None, bmu={"current_a": -0.5}),
+    Edge(measured.back_feed, "the BMU reports a discharge of 0.51 A while the charger runs", bmu={"current_a": -0.51}),
+    Edge(measured.back_feed, None, {"runs_s": None}, bmu={"current_a": -0.51}),
+    Edge(measured.back_feed, None, bmu={"current_a": None}),
 )  # fmt: skip
 
 

@@ -45,7 +45,11 @@ def holding(**changes: Any) -> dict[str, Any]:
 
 
 def reached(seconds: float) -> dict[str, Any]:
-    return {"reached_s": ago(seconds), "mark_s": NOW_S}
+    return {"reached_s": ago(seconds), "session": Session(ago(60), rise_v=33.0)}
+
+
+def precharged(seconds: float) -> dict[str, Any]:
+    return {"session": Session(ago(9999), pulse_s=seconds, rise_v=33.0)}
 
 
 STANDS_BY = {"operation": Operation.STOPPED, "current_a": 0.0}
@@ -57,8 +61,9 @@ SILENT_BMU: dict[str, Any] = {
 }
 FULL, SUSPENDED, OFFLINE, IDLE = State.FULL, State.SUSPENDED, State.OFFLINE, State.IDLE
 QUALIFYING, STOPPING, STARTING, TRIPPED = State.QUALIFYING, State.STOPPING, State.STARTING, State.TRIPPED
+NO_RULE = "precharge without a rule for it, or without the pack's voltage"
 CHECKING = "checking charger and battery before a charge"
-NEVER = "the charger has not confirmed the stop for 3 s: {}"
+NEVER = "CUT THE MAINS of this charger (/dev/ttyX) now: it has not obeyed the stop for 3 s: {}; the BMU sees 0.0 A"
 
 GOES = (
     Edge(goes, (None, "step 2 (8.0 A): because"), holding()),
@@ -78,26 +83,27 @@ GOES = (
          bmu={"voltage_v": 35.0}),
     Edge(goes, (Trigger.CONTINUE, f"the pack reached 35.1 V ({AT('precharge.pulse.until_v')})"), reached(2), PULSE,
          bmu={"voltage_v": 35.1}),
-    Edge(goes, (None, f"the pack is below 39 V: pulse precharge ({AT('precharge.pulse')})"), {}, PULSE, 599.9,
+    Edge(goes, (None, f"the pack is below 39 V: pulse precharge ({AT('precharge.pulse')})"), precharged(599.9), PULSE,
          bmu={"voltage_v": 35.0}),
-    Edge(goes, (Trigger.CONTINUE, f"10 min of pulses ({AT('precharge.pulse.max_min')})"), {}, PULSE, 600,
+    Edge(goes, (Trigger.CONTINUE, f"10 min of pulses ({AT('precharge.pulse.max_min')})"), precharged(600), PULSE,
          bmu={"voltage_v": 35.0}),
-    Edge(goes, (None, f"the pack is below 39 V: continuous precharge ({AT('precharge.continuous')})"), {}, CONTINUOUS,
-         999, bmu={"voltage_v": 38.9}),
+    Edge(goes, (None, f"the pack is below 39 V: continuous precharge ({AT('precharge.continuous')})"), precharged(999),
+         CONTINUOUS, bmu={"voltage_v": 38.9}),
+    Edge(goes, (Trigger.STOP, NO_RULE), {}, PULSE, bmu={"voltage_v": 35.0}),
     Edge(goes, (Trigger.CHARGE, f"the pack reached 39 V ({AT('precharge.below_v')})"), reached(2), CONTINUOUS,
          bmu={"voltage_v": 39.0}),
-    *(Edge(goes, (Trigger.STOP, "precharge without a rule for it, or without the pack's voltage"), {}, PULSE, **how)
+    *(Edge(goes, (Trigger.STOP, NO_RULE), precharged(0), PULSE, **how)
       for how in ({"policy": NO_PRECHARGE}, {"bmu": {"voltage_v": None}})),
     Edge(goes, (None, "stopped for it"), {"reason": "stopped for it"}, STOPPING, 2.9),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("it delivers 10.00 A")), state=STOPPING, state_s=3),
-    Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX")), state=STOPPING, state_s=3,
-         charger_link={"online": False}),
-    Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX")), state=STOPPING, state_s=3,
-         charger={"t_s": ago(9)}),
-    Edge(goes, (Trigger.GIVE_UP, NEVER.format("unplugged")), state=STOPPING, state_s=3,
+    Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 0 s ago")), state=STOPPING,
+         state_s=3, charger_link={"online": False}),
+    Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 9 s ago")), state=STOPPING,
+         state_s=3, charger={"t_s": ago(9)}),
+    Edge(goes, (Trigger.GIVE_UP, NEVER.format("unplugged; 10.00 A, last heard 0 s ago")), state=STOPPING, state_s=3,
          charger_link={"online": False, "problem": "unplugged"}),
-    Edge(goes, (Trigger.GIVE_UP, NEVER.format("its status is not valid")), state=STOPPING, state_s=3,
-         charger={"operation": None, "current_a": 0.0}),
+    Edge(goes, (Trigger.GIVE_UP, NEVER.format("its status does not show a standby that lasts")), state=STOPPING,
+         state_s=3, charger={"operation": None, "current_a": 0.0}),
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, STARTING, 3,
          charger={"t_s": ago(9)}, charger_link={"online": False}),
     Edge(goes, (None, "still looking"), {"reason": "still looking"}, STARTING, 2.9, charger={"t_s": ago(9)},
@@ -146,11 +152,12 @@ GOES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(("minutes", "marked_s"), [(5.0, NOW_S), (4.99, ago(4.99 * 60))])
-def test_a_pack_that_rose_is_looked_at_from_then_on(minutes: float, marked_s: float) -> None:
+@pytest.mark.parametrize(("minutes", "rise_s", "rise_v"), [(5.0, 0.0, 35.0), (4.99, 4.99 * 60, 34.0)])
+def test_a_pack_that_rose_is_looked_at_from_then_on(minutes: float, rise_s: float, rise_v: float) -> None:
     f = Edge(goes, None, marked(minutes, 34.0), PULSE, bmu={"voltage_v": 35.0}).facts
     goes(f)
-    assert (f.memory.mark_s, f.memory.mark_v) == (marked_s, 35.0 if marked_s == NOW_S else 34.0)
+    assert f.memory.session is not None
+    assert (f.memory.session.rise_s, f.memory.session.rise_v) == (rise_s, rise_v)
 
 
 # --- what is followed from step to step -------------------------------------------------------------------------------
@@ -167,7 +174,8 @@ def followed(name: str) -> Callable[[Facts], object]:
     return rule
 
 
-idle_a_s, still_values, peak = followed("idle_a_s"), followed("still"), followed("peak")
+idle_s, still_values, peak = followed("idle_s"), followed("still"), followed("peak")
+search_s, wake_s = followed("search_s"), followed("wake_s")
 charge_step, exchange, counted = followed("charge_step"), followed("exchange"), followed("session")
 STILL = Still(NOW_S, 48.0, 10.0, 48.0, 10.0)
 BEGUN = Session(
@@ -175,11 +183,19 @@ BEGUN = Session(
 )
 NOW = replace(BEGUN, elapsed_s=100.0, energised_s=90.25, soc_pct=50.0)
 FOLLOWS = (
-    Edge(idle_a_s, None, charger={"current_a": 0.1}),
-    Edge(idle_a_s, NOW_S, charger={"current_a": 0.09}),
-    Edge(idle_a_s, ago(5), {"idle_a_s": ago(5)}, charger={"current_a": 0.0}),
-    Edge(idle_a_s, None, charger={"current_a": 0.0, "operation": Operation.STOPPED}),
-    Edge(idle_a_s, None, charger={"current_a": 0.0, "charge_mode": ChargeMode.BATTERY_SEARCH}),
+    Edge(idle_s, 0.0, charger={"current_a": 0.1}),
+    Edge(idle_s, 0.25, charger={"current_a": 0.09}),
+    Edge(idle_s, 5.25, {"idle_s": 5.0}, charger={"current_a": 0.0}),
+    Edge(idle_s, 4.9375, {"idle_s": 5.0}),
+    Edge(idle_s, 5.0, {"idle_s": 5.0}, charger={"t_s": ago(9)}),  # unknown is neither
+    Edge(idle_s, 0.0, charger={"current_a": 0.0, "operation": Operation.STOPPED}),
+    Edge(idle_s, 0.0, charger={"current_a": 0.0, "charge_mode": ChargeMode.BATTERY_SEARCH}),
+    Edge(search_s, 0.25, charger={"charge_mode": ChargeMode.BATTERY_SEARCH}),
+    Edge(search_s, 0.0, charger={"charge_mode": ChargeMode.BATTERY_SEARCH, "operation": Operation.STOPPED}),
+    Edge(search_s, 0.9375, {"search_s": 1.0}),
+    *(Edge(wake_s, 0.25, charger={"charge_mode": mode})
+      for mode in (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)),
+    Edge(wake_s, 0.9375, {"wake_s": 1.0}),
     Edge(still_values, STILL),
     Edge(still_values, replace(STILL, t_s=ago(9)), {"still": replace(STILL, t_s=ago(9))}),
     Edge(still_values, STILL, {"still": replace(STILL, t_s=ago(9), volts=48.1)}),
@@ -264,7 +280,20 @@ def test_a_session_counts_from_its_beginning(charger: dict[str, Any], counted_t_
     follow_state(f, QUALIFYING)
     assert f.memory.session == Session(NOW_S, soc_start_pct=50.0, soc_pct=50.0)
     assert f.memory.counted_t_s == counted_t_s
-    assert (f.memory.mark_s, f.memory.mark_v) == (NOW_S, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("state", "before", "now"),
+    [
+        (PULSE, Session(ago(9), rise_s=7.0), Session(ago(9), rise_s=0.0, rise_v=33.0)),
+        (PULSE, Session(ago(9), rise_s=7.0, rise_v=32.9), Session(ago(9), rise_s=7.0, rise_v=32.9)),
+        (State.CHARGING, Session(ago(9)), Session(ago(9))),
+    ],
+)
+def test_a_rise_counts_from_the_first_precharge_of_a_charge(state: State, before: Session, now: Session) -> None:
+    f = Edge(goes, None, {"session": before}, state, bmu={"voltage_v": 33.0}).facts
+    follow_state(f, QUALIFYING)
+    assert f.memory.session == now
 
 
 boots = followed("boots")
@@ -287,7 +316,7 @@ implausible, soh_low, emergency = map(faults_after, ("implausible", "soh_low", "
 charger_silent, bmu_silent = map(faults_after, ("charger_silent", "bmu_silent"))
 UNPLUGGED: dict[str, Any] = {"charger_link": {"online": False, "problem": "unplugged"}}
 DEPARTED: dict[str, Any] = {**SILENT_BMU, "charger": {**STANDS_BY, "voltage_v": 0.0}, "charger_link": STOP_SENT}
-DEBOUNCED = FaultMemory(present_s=ago(9), polls=9, poll_t_s=ago(1))
+DEBOUNCED = FaultMemory(present=True, seen_s=9, polls=9, poll_t_s=ago(1))
 
 
 def faults(**rows: FaultMemory) -> dict[str, Any]:
@@ -359,7 +388,7 @@ def test_from_stage_to_stage_the_charge_goes_on() -> None:
     decision, after = whole(Edge(goes, None, memory, PULSE, bmu={"voltage_v": 35.1}, charger={"voltage_v": 35.1}))
     assert decision.state is CONTINUOUS
     assert after.resumed
-    assert decision.session == NOW
+    assert decision.session == replace(NOW, pulse_s=0.25, rise_s=0.0, rise_v=35.1)
 
 
 def test_a_charge_that_ends_at_rest_says_why_it_ends_there() -> None:

@@ -25,8 +25,8 @@ def test_steady_values_of_a_steady_battery_are_not_frozen() -> None:
 
 def test_a_charger_that_moves_with_the_battery_is_not_frozen() -> None:
     world = charging()
-    for volts in range(480, 540, 5):
-        world.values["voltage_v"] = volts / 10
+    for step, volts in enumerate(range(480, 540, 5)):
+        world.values |= {"voltage_v": volts / 10, "soc_pct": 50.0 + 4 * step}
         world.run(59, dt_s=1.0)
     assert not fault_ids(world, 0)
 

@@ -30,7 +30,10 @@ def test_a_silent_charger_is_stopped_blindly_until_it_answers(state: State) -> N
     assert all(decision.command == STOP for decision in world.decisions[before:])
     world.charger_answers = True
     world.deaf.clear()
-    world.run(2)
+    if flowing:  # ten seconds of standby are one
+        world.run(9.75)
+        assert world.is_in(State.UNCONTROLLABLE)
+    world.run(1.25)
     assert world.is_in(*VERIFIED, State.QUALIFYING)
     assert not world.charger.running
     assert not world.decision.alarm
@@ -53,7 +56,10 @@ def test_a_deaf_charger_that_runs_is_uncontrollable_until_it_stops(state: State)
     assert "nothing can start here" in world.ask(Request.START)
     assert "still there" in world.ask(Request.RESET)
     world.deaf.clear()
-    world.until(State.TRIPPED, 2.0)
+    world.run(9.75)
+    assert world.is_in(State.UNCONTROLLABLE)
+    assert world.decision.alarm
+    world.until(State.TRIPPED, 1.0)
     assert not world.decision.alarm
 
 
@@ -112,8 +118,8 @@ def test_half_an_ampere_is_standby() -> None:
     world = charging()
     world.leak_a = 0.5
     world.ask(Request.STOP)
-    world.tick()
-    assert world.is_in(State.IDLE)
+    assert world.tick().state is State.STOPPING  # one reply is not enough
+    assert world.tick().state is State.IDLE
     assert world.decision.command is None
 
 
@@ -127,21 +133,21 @@ def test_a_stop_from_before_this_one_proves_nothing() -> None:
     assert world.charger_link.stop_sent_s == sent_s
     assert world.is_in(State.STOPPING)
     world.writes = True
-    world.tick()
-    assert world.is_in(State.IDLE)
+    assert world.tick().state is State.STOPPING
+    assert world.tick().state is State.IDLE
 
 
 def test_the_evidence_says_why_the_stop_is_not_confirmed() -> None:
     for spoil, words in (
-        (delivers, "it delivers 0.51 A"),
-        (shows_nothing, "its status is not valid"),
-        (answers_late, "no answer on /dev/ttyX"),
+        (delivers, "it delivers 0.51 A; the BMU sees 0.5 A"),
+        (shows_nothing, "its status does not show a standby that lasts; the BMU sees 0.0 A"),
+        (answers_late, "no answer on /dev/ttyX; 0.00 A, last heard 3 s ago; the BMU sees 0.0 A"),
     ):
         world = charging()
         spoil(world)
         world.ask(Request.STOP)
         reason = world.until(State.UNCONTROLLABLE).reason
-        assert reason == f"the charger has not confirmed the stop for 3 s: {words}"
+        assert reason == (f"CUT THE MAINS of this charger (/dev/ttyX) now: it has not obeyed the stop for 3 s: {words}")
 
 
 # --- at rest ----------------------------------------------------------------------------------------------------------
@@ -210,8 +216,8 @@ def test_the_start_stops_first_and_believes_only_its_own_stop() -> None:
     world.run(2)
     assert all(decision.command == STOP and decision.state is State.STARTING for decision in world.decisions)
     world.writes = True
-    world.tick()
-    assert world.is_in(State.IDLE)
+    assert world.tick().state is State.STARTING
+    assert world.tick().state is State.IDLE
 
 
 def test_a_charger_that_is_not_there_is_no_alarm() -> None:
@@ -227,12 +233,23 @@ def test_a_charger_that_is_not_there_is_no_alarm() -> None:
 def test_a_charger_that_is_found_late_has_its_time_to_stop() -> None:
     world = running_at_the_start()
     world.deaf.add(Action.STOP)
-    world.charger_answers = False
+    world.charger_answers = world.battery_answers = False
     world.run(2.75)
     world.charger_answers = True
     world.run(3.0)
     assert world.is_in(State.STARTING)
     assert world.tick().state is State.UNCONTROLLABLE
+
+
+def test_a_current_that_the_bmu_sees_at_the_start_is_given_three_seconds_whoever_answers() -> None:
+    for answers in (True, False):
+        world = running_at_the_start()
+        world.deaf.add(Action.STOP)
+        world.charger_answers = answers
+        world.run(3.0)
+        assert world.is_in(State.STARTING)
+        assert world.tick().state is State.UNCONTROLLABLE
+        assert world.decision.alarm
 
 
 def test_a_charger_whose_status_never_becomes_valid_is_given_up() -> None:

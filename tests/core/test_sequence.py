@@ -320,8 +320,10 @@ def test_a_lost_half_of_a_stop_lets_no_charger_run_on_its_old_values() -> None:
     site = Lossy(Turn.OPERATION_STOP, count=0, at=0)
     site.until(State.CHARGING, 10)
     site.run(10)
-    site.count, site.at = 1, site.frames
-    assert site.run(1, Request.PAUSE).state is State.SUSPENDED
+    site.count, site.at = 99, site.frames
+    site.run(0.5, Request.PAUSE)
+    site.until(State.SUSPENDED, 1.5)
+    site.count = 0
     assert site.charger.run, "the second frame was to be lost"
     site.pack.set_soc(92)  # on its way to step 2
     site.run(1)

@@ -174,7 +174,7 @@ def arrival(world: World, **said: float) -> None:
 def test_what_a_bmu_says_right_after_its_boot_is_nothing(said: float) -> None:
     """0 °C, then 22 °C half a second later, is not a jump; 99 °C is no fire; 0 V and 0 % are no empty pack."""
     world = idle()
-    world.values.update(soc_pct=50.0, temperature_c=22.0)
+    world.values.update(soc_pct=50.0, temperature_c=22.0, voltage_v=48.0)
     world.volts = 48.0
     arrival(world, temperature_c=said, voltage_v=abs(said), soc_pct=abs(said))
     world.until(State.CHARGING, 10)

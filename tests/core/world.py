@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestrator.config.load import load_policy
-from orchestrator.config.policy import Policy
+from orchestrator.config.policy import Pack, Policy
 from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits
+from orchestrator.core.cells import chemistry
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
@@ -90,6 +91,22 @@ class Charger:
                 self.run = self.run or not self.resting
 
 
+#: A pack that fits its SOC is this far inside of what belongs to it.
+WELL_INSIDE_V = 0.005
+
+
+def fitting_soc_pct(pack_v: float, cells: int = 13) -> float:
+    """What a healthy pack has at this voltage: nothing when it is deeply discharged, else half of it."""
+    return 2.0 if pack_v < 3.23 * cells else 50.0
+
+
+def fitting_v(pack: Pack, soc_pct: float, pack_v: float) -> float:
+    """The voltage next to `pack_v` that a pack can have at this state of charge."""
+    low_v, high_v = chemistry(pack).bounds_v(soc_pct)
+    cell_v = min(max(pack_v / pack.cells_in_series, low_v + WELL_INSIDE_V), high_v - WELL_INSIDE_V)
+    return cell_v * pack.cells_in_series if cell_v != pack_v / pack.cells_in_series else pack_v
+
+
 class World:
     """Everything true of one bay; `run` lets time pass in ticks, `decision` is the newest."""
 
@@ -114,12 +131,17 @@ class World:
             "current_a": 0.0,
             "status": 0.0,
             "temperature_c": 20.0,
-            "soc_pct": 50.0,
+            "soc_pct": fitting_soc_pct(battery.get("voltage_v", 48.0)),
             "soh_pct": 100.0,
             **battery,
         }
+        self._fitted_pct = self.values["soc_pct"] if "voltage_v" in battery else None
+        self._fitted_v = self.values["voltage_v"]
+        self.counted_min = 60.0  #: what a BMU counts goes on moving, whatever stands still
+        self.counts = True
         self.frozen: set[str] = set()  #: values that are not read any more
         self.pack_amps: float | None = None  #: what the BMU measures, if not what flows
+        self.shunt = 1.0  #: what share of it the BMU measures
         self.reading: ChargerReading | None = None
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
@@ -159,6 +181,7 @@ class World:
 
     def tick(self, dt_s: float = TICK_S, request: Request | None = None) -> Decision:
         self.now_s += dt_s
+        self._fit()
         self._obey(dt_s)
         internal, self.internal = self.internal, ""
         decision, self.memory = step(self.now_s, self.snapshot(request, internal), self.memory, self.rules)
@@ -210,7 +233,7 @@ class World:
             self.reading = self._reading()
         if self.battery_answers:
             self.heard_s = self.now_s
-            for name, value in self.values.items():
+            for name, value in ({"time_to_empty_min": self.counted_min} | self.values).items():
                 if value is None:
                     self.measured.pop(name, None)
                 elif name not in self.frozen:
@@ -266,4 +289,12 @@ class World:
             if command.action not in self.deaf:
                 self.charger.obey(command)
         if self.values["current_a"] is not None:
-            self.values["current_a"] = self._amps() if self.pack_amps is None else self.pack_amps
+            self.values["current_a"] = self._amps() * self.shunt if self.pack_amps is None else self.pack_amps
+        self.counted_min += self._amps() * dt_s / 60 if self.counts else 0.0
+
+    def _fit(self) -> None:
+        """Where a test has set the SOC alone, the voltage follows it."""
+        soc_pct, pack_v = self.values["soc_pct"], self.values["voltage_v"]
+        if soc_pct != self._fitted_pct and soc_pct is not None and pack_v is not None and pack_v == self._fitted_v:
+            self.values["voltage_v"] = fitting_v(self.rules.policy.pack, soc_pct, pack_v)
+        self._fitted_pct, self._fitted_v = soc_pct, self.values["voltage_v"]

@@ -46,7 +46,7 @@ def test_the_timers_are_written_and_the_node_is_started() -> None:
 
 def test_no_tpdo_is_configured_or_heard_unless_asked_for() -> None:
     bench = Bench()
-    assert set(bench.node.cob_ids) == {0x590, 0x710, 0x090}
+    assert set(bench.node.cob_ids) == {0x590, 0x610, 0x710, 0x090}
     bench.answer_reads(3.0, WORDS)
     assert all(cob_id == REQUEST and data[0] == 0x40 for cob_id, data in bench.sent)
 

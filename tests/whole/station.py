@@ -186,11 +186,14 @@ class Service:
         return [record["to"] for record in self.journal(bay, "transition")]
 
 
-def orchestrator(*args: str, env: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+def orchestrator(
+    *args: str, env: Mapping[str, str] | None = None, cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run one verb of the command line."""
     return subprocess.run(
         [sys.executable, "-m", "orchestrator", *args],
         env={**os.environ, **(env or {})},
+        cwd=cwd,
         capture_output=True,
         text=True,
         timeout=30,

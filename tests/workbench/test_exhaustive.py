@@ -22,13 +22,13 @@ BROKEN = {
     ),
     "broken/volts": (
         "charges, as measured",
-        "→ SUSPENDED: the charger reads 41.10 V, the BMU 40.60 V: not the same battery, or a bad connection; check "
+        "→ SUSPENDED: the charger reads 47.95 V, the BMU 47.45 V: not the same battery, or a bad connection; check "
         "that this BMU belongs to this charger's battery; no order",
     ),
     "broken/amps": (
         "charges, as measured",
-        "→ TRIPPED: the charger reads 14.00 A, the BMU 14.50 A; check for loads on the battery and for a wrong node "
-        "id, then reset; no order",
+        "→ TRIPPED: check for loads on the battery and for a wrong node id, then reset – the charger reads 14.00 A, "
+        "the BMU 14.50 A; the BMU is likelier wrong, by the step that was set (14 A); no order",
     ),
 }  # fmt: skip
 

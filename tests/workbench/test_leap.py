@@ -117,6 +117,5 @@ def test_an_outline_has_all_of_the_memory_that_is_no_measurement() -> None:
     """A field that is new in the memory must be told here or there."""
     told = set(outline.__code__.co_names) & set(vars(Memory()))
     measured = {"state", "reason", "faults", "session", "counted_t_s", "last_s", "resume_s", "order_s", "tries", "step",
-                "sample", "sample_before", "warmth", "mark_v", "mode_s", "limit_s", "charge", "peak",
-                "still"}  # fmt: skip
+                "sample", "sample_before", "warmth", "limit_s", "charge", "peak", "still", "looked_s"}  # fmt: skip
     assert told | measured == set(vars(Memory()))

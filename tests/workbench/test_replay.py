@@ -86,9 +86,9 @@ def test_a_value_that_was_altered_is_seen_in_the_memory(journal: Path, tmp_path:
     """Where the sentences do not show it, the memory that it leads to does."""
     copy = tmp_path / "copy"
     shutil.copytree(journal, copy)
-    (path,) = (one for one in copy.glob("snapshots*.jsonl") if '"voltage_v":48.0,"current_a":2.0' in one.read_text())
+    (path,) = (one for one in copy.glob("snapshots*.jsonl") if '"voltage_v":50.4,"current_a":2.0' in one.read_text())
     text = path.read_text(encoding="utf-8")
-    path.write_text(text.replace('"voltage_v":48.0,"current_a":2.0', '"voltage_v":48.1,"current_a":2.0', 1))
+    path.write_text(text.replace('"voltage_v":50.4,"current_a":2.0', '"voltage_v":48.1,"current_a":2.0', 1))
     wrong = [one.wrong for one in again(read([copy])["bay-1"]) if one.wrong]
     assert any(text.startswith("memory.session was Session(") for text in wrong)
 

@@ -84,7 +84,7 @@ def test_the_weather_is_straight_between_its_rows() -> None:
         (Defect.SILENT, Sensor.SOC_PCT, 0.0, "stale_reading"),
         (Defect.OFFSET, Sensor.VOLTAGE_V, -3.0, "volts_disagree"),
         (Defect.OFFSET, Sensor.TEMPERATURE_C, 12.0, "temperature_invalid"),
-        (Defect.STUCK, Sensor.CURRENT_A, 0.0, "amps_disagree"),
+        (Defect.STUCK, Sensor.CURRENT_A, 0.0, "pairing_not_proved"),
         (Defect.DRIFT, Sensor.TEMPERATURE_C, 90.0, "runaway"),
     ],
 )

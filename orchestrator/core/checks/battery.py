@@ -1,6 +1,7 @@
 """Faults of the battery and of its BMU."""
 
 from orchestrator.core.facts import Facts
+from orchestrator.core.witnesses.pack import another_pack
 from orchestrator.model import BatteryStatus
 
 #: Hysteresis of the pauses for heat and for cold.
@@ -14,6 +15,8 @@ WARMING_S = 180.0
 SILENT_PERIODS, ANSWERING_PERIODS = 2.5, 4.5
 #: SDO abort codes (upper half) that say: the object is not there, or not like this. The others may pass.
 REFUSALS = frozenset({0x0601, 0x0602, 0x0604, 0x0606, 0x0607, 0x0609})
+#: What somebody else did on the bus is news for this long.
+NEWS_S = 10.0
 #: NMT states as a heartbeat tells them (CiA 301).
 OPERATIONAL = 0x05
 NMT_NAMES = {0x00: "boot-up", 0x04: "stopped", 0x7F: "pre-operational"}
@@ -170,7 +173,7 @@ def implausible(f: Facts) -> str | None:
 def under_voltage(f: Facts) -> str | None:
     """FAULTS B14: below what may be woken."""
     pack, source = f.rules.policy.pack, f.rules.policy.source
-    if f.pack_v is None or f.pack_v >= pack.voltage_v.low:
+    if f.pack_v is None or f.pack_v >= pack.voltage_v.low or another_pack(f) is not None:
         return None
     return f"the pack has {f.pack_v:.2f} V, below {pack.voltage_v.low:g} V ({source.at('pack.voltage_v')})"
 
@@ -189,3 +192,15 @@ def soh_low(f: Facts) -> str | None:
     if f.soh is None or f.soh >= pack.soh_min_pct:
         return None
     return f"SOH {f.soh:.0f} %, below {pack.soh_min_pct:g} % ({source.at('pack.soh_min_pct')})"
+
+
+def other_master(f: Facts) -> str | None:
+    """FAULTS B27: only said; what it does to the BMU shows elsewhere."""
+    seen_s = f.battery.other_master_t_s
+    return f.battery.other_master if seen_s is not None and f.now_s - seen_s < NEWS_S else None
+
+
+def heartbeat_set(f: Facts) -> str | None:
+    """FAULTS B28."""
+    seen_s = f.battery.heartbeat_set_t_s
+    return f.battery.heartbeat_set if seen_s is not None and f.now_s - seen_s < NEWS_S else None

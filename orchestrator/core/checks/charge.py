@@ -9,10 +9,12 @@ SOC_ERROR_PCT = 20.0
 
 def precharge_no_rise(f: Facts) -> str | None:
     """FAULTS C15."""
-    rule = f.rules.policy.precharge
+    rule, session = f.rules.policy.precharge, f.memory.session
     if rule is None or f.pack_v is None or f.memory.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS):
         return None
-    lasted_s, rise_v = f.now_s - f.memory.mark_s, f.pack_v - f.memory.mark_v
+    if session is None or session.rise_v is None:
+        return None
+    lasted_s, rise_v = session.rise_s, f.pack_v - session.rise_v
     if lasted_s < rule.rise.within_min * 60 or rise_v >= rule.rise.volts:
         return None
     at = f.rules.policy.source.at("precharge.rise")
@@ -21,11 +23,14 @@ def precharge_no_rise(f: Facts) -> str | None:
 
 def precharge_too_long(f: Facts) -> str | None:
     """FAULTS C15."""
-    rule = f.rules.policy.precharge
-    if rule is None or f.memory.state is not State.PRECHARGE_CONTINUOUS or f.state_s <= rule.continuous.max_min * 60:
+    rule, session = f.rules.policy.precharge, f.memory.session
+    if rule is None or session is None or f.memory.state is not State.PRECHARGE_CONTINUOUS:
+        return None
+    if session.continuous_s <= rule.continuous.max_min * 60:
         return None
     at = f.rules.policy.source.at("precharge.continuous.max_min")
-    return f"continuous precharge has taken {f.state_s / 60:.1f} min and the pack is below {rule.below_v:g} V ({at})"
+    minutes = session.continuous_s / 60
+    return f"continuous precharge has taken {minutes:.1f} min and the pack is below {rule.below_v:g} V ({at})"
 
 
 def time_limit(f: Facts) -> str | None:

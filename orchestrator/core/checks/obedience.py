@@ -1,8 +1,9 @@
 """Faults of a charger that does not do as it is told, or does not answer."""
 
 from orchestrator.core.facts import CHARGER_STALE_S, Facts
-from orchestrator.core.finish import early_below_pct
-from orchestrator.model import Action, ChargeMode, Operation
+from orchestrator.core.finish import early_below_pct, ends_full
+from orchestrator.core.witnesses.standby import sees_current
+from orchestrator.model import Action, Operation, State
 
 #: A setting must be read back within this time (about ten attempts), and a run must be seen (FAULTS C7, C9).
 OBEY_S = 5.0
@@ -19,6 +20,10 @@ NO_CURRENT_A = 0.1
 IDLE_MAX_S = 10.0
 #: Nearly full packs may take no current.
 NEARLY_FULL_PCT = 95.0
+#: So many settings that go back within this time are no accident.
+MAX_REVERTS, REVERTS_S = 3, 60.0
+#: What somebody else did to the line is news for this long.
+NEWS_S = 5.0
 
 
 def charger_silent(f: Facts) -> str | None:
@@ -46,10 +51,18 @@ def rogue_run(f: Facts) -> str | None:
 
 
 def will_not_stop(f: Facts) -> str | None:
-    """FAULTS C6: it answers, and the answer is that it goes on. (A line that is cut is no disobedience.)"""
-    if not f.runs or f.reading is None:
+    """FAULTS C6: it answers, and its answer or the BMU says that it goes on. (A line that is cut is no disobedience: it
+    is given up, too, but goes on by itself once it is mended.)"""
+    if f.reading is None:
         return None
-    return f"the charger does not obey the stop, which is repeated: it still delivers {f.reading.current_a:.2f} A"
+    if f.runs:
+        return f"the charger does not obey the stop, which is repeated: it still delivers {f.reading.current_a:.2f} A"
+    if not sees_current(f):
+        return None
+    return (
+        f"the stop, which is repeated, is not obeyed: the BMU still sees {f.pack_a:.2f} A, the charger says "
+        f"{f.reading.current_a:.2f} A"
+    )
 
 
 def will_not_start(f: Facts) -> str | None:
@@ -63,9 +76,59 @@ def stopped_by_itself(f: Facts) -> str | None:
     """FAULTS C4: an emergency stop past this service looks like this, too; it is not for us to start again."""
     if f.reading is None or not f.energised or not f.memory.ran:
         return None
-    if f.reading.operation is not Operation.STOPPED or (f.full_mode and f.rules.policy.finish.charger_full):
+    if f.reading.operation is not Operation.STOPPED:
         return None
-    return "the charger stopped though it was told to run"
+    if not f.full_mode:
+        return "the charger stopped though it was told to run"
+    if early_full(f) is not None or (f.rules.policy.finish.charger_full and ends_full(f)):
+        return None
+    return (
+        "the charger stopped though it was told to run, and its mode 5 is not taken for full: the current had not "
+        "tapered off and the pack has not reached its end voltage"
+    )
+
+
+def limit_reverted(f: Facts) -> str | None:
+    """FAULTS C28: settings that it confirms and then drops."""
+    step, reverts = f.memory.step, f.memory.reverts
+    recent = [t_s for t_s in reverts if f.now_s - t_s < REVERTS_S]
+    if step is None or len(recent) < MAX_REVERTS:
+        return None
+    return (
+        f"the charger confirmed the step that it was told and went back by itself {len(recent)} times within a minute"
+    )
+
+
+def above_step(f: Facts) -> str | None:
+    """FAULTS C28: what flows is held against what was commanded, whatever the charger shows as its setting."""
+    step = f.memory.step
+    if f.memory.state is not State.CHARGING or step is None or f.amps is None or not f.rules.manual:
+        return None
+    allowed_a = step.current_a * f.rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
+    if f.amps <= allowed_a:
+        return None
+    return f"{f.amps:.2f} A flow, more than {allowed_a:.2f} A, where {step.current_a:g} A were commanded"
+
+
+def port_locked(f: Facts) -> str | None:
+    """FAULTS C27."""
+    if not f.charger.locked_by:
+        return None
+    port = f.rules.bay.charger.port
+    return f"another program holds {port}: {f.charger.locked_by}; the charger is stopped in spite of it"
+
+
+def line_taken_over(f: Facts) -> str | None:
+    """FAULTS C26."""
+    found_s = f.charger.taken_over_t_s
+    if found_s is None or f.now_s - found_s >= NEWS_S:
+        return None
+    return f"another program set {f.rules.bay.charger.port} to {f.charger.taken_over}; it has been set up again"
+
+
+def loose_plug(f: Facts) -> str | None:
+    """FAULTS C13: it left in mid-charge and was back within a minute."""
+    return "the battery left in mid-charge and was back at once" if f.memory.returned_s == f.now_s else None
 
 
 def setting_not_obeyed(f: Facts) -> str | None:
@@ -118,27 +181,21 @@ def early_full(f: Facts) -> str | None:
 
 def open_circuit(f: Facts) -> str | None:
     """FAULTS C13."""
-    since_s = f.memory.idle_a_s
-    if since_s is None or f.now_s - since_s <= IDLE_MAX_S or f.soc is None or f.soc >= NEARLY_FULL_PCT:
+    idle_s = f.memory.idle_s
+    if idle_s <= IDLE_MAX_S or f.soc is None or f.soc >= NEARLY_FULL_PCT:
         return None
-    return f"the charger runs but has delivered nothing for {f.now_s - since_s:.0f} s at SOC {f.soc:.0f} %"
+    return f"the charger runs but has delivered nothing for {idle_s:.0f} s at SOC {f.soc:.0f} %"
 
 
 def no_battery(f: Facts) -> str | None:
     """FAULTS C14."""
-    return _mode_too_long(f, (ChargeMode.BATTERY_SEARCH,), SEARCH_MAX_S, "has been looking for a battery")
+    return _too_long(f.memory.search_s, SEARCH_MAX_S, "has been looking for a battery")
 
 
 def wakes_too_long(f: Facts) -> str | None:
     """FAULTS C15, the charger's own recovery and precharge."""
-    modes = (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)
-    return _mode_too_long(f, modes, WAKE_MAX_S, "has been in recovery or precharge")
+    return _too_long(f.memory.wake_s, WAKE_MAX_S, "has been in recovery or precharge")
 
 
-def _mode_too_long(f: Facts, modes: tuple[ChargeMode, ...], limit_s: float, what: str) -> str | None:
-    if f.memory.mode not in modes or f.memory.runs_s is None:
-        return None
-    lasted_s = f.now_s - max(f.memory.mode_s, f.memory.runs_s)  # a charger at rest may show any mode for hours
-    if lasted_s <= limit_s:
-        return None
-    return f"the charger {what} for {lasted_s / 60:.0f} min"
+def _too_long(lasted_s: float, limit_s: float, what: str) -> str | None:
+    return f"the charger {what} for {lasted_s / 60:.0f} min" if lasted_s > limit_s else None

@@ -10,8 +10,8 @@ SUSPENDED_S = 2.0
 
 
 def internal(f: Facts) -> str | None:
-    """FAULTS G5."""
-    return f.snapshot.internal or None
+    """FAULTS G5, P11."""
+    return "; ".join(filter(None, (f.snapshot.internal, *f.broken))) or None
 
 
 def late(f: Facts) -> str | None:

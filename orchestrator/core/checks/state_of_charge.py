@@ -3,7 +3,7 @@
 Each of them alone may be a BMU that has corrected itself, so it only warns; two together are believed.
 """
 
-from orchestrator.core.facts import Facts
+from orchestrator.core.facts import TERMINAL_V, Facts
 
 #: From one reading to the next the SOC may take a step of this much, and what a tiny pack takes in each second.
 SOC_STEP_PCT, SOC_RATE_PCT_PER_S = 5.0, 1.0
@@ -18,8 +18,6 @@ FALLING_S, FALLING_PCT = 900.0, 2.0
 ENERGY_FACTOR, CAPACITY_FACTOR = 1.5, 3.0
 #: Below this nothing is compared: the figures are too coarse.
 LEAST_AH, LEAST_SOC_PCT, LEAST_A = 1.0, 10.0, 1.0
-#: No pack that is more than half full is deeply discharged, however wrong its SOC.
-HALF_FULL_PCT = 50.0
 #: What is doubtful alone.
 DOUBTS = ("soc_jump", "soc_falls", "figures_disagree")
 
@@ -44,7 +42,7 @@ def figures_disagree(f: Facts) -> str | None:
     if battery.remaining_ah is None or f.soc is None or f.pack_v is None or f.pack_a is None:
         return None
     ah = f.slow(battery.remaining_ah)
-    if ah is None or ah < LEAST_AH:
+    if ah is None or ah < LEAST_AH or f.pack_v < TERMINAL_V:
         return None
     wh = f.slow(battery.available_wh)
     if wh is not None and not 1 / ENERGY_FACTOR <= wh / (ah * f.pack_v) <= ENERGY_FACTOR:
@@ -77,16 +75,3 @@ def battery_exchanged(f: Facts) -> str | None:
     if exchange is None or f.now_s - exchange[0] >= EXCHANGE_NEWS_S:
         return None
     return f"{exchange[1]}, in which the BMU was not heard: this may be another battery"
-
-
-def wrong_policy(f: Facts) -> str | None:
-    """FAULTS P3: by its voltage this pack is deeply discharged, by its SOC it is not: it has fewer cells."""
-    policy = f.rules.policy
-    if policy.precharge is None or f.soc is None or f.pack_v is None:
-        return None
-    if f.soc <= HALF_FULL_PCT or f.pack_v >= policy.precharge.below_v:
-        return None
-    return (
-        f"the pack has {f.pack_v:.2f} V at SOC {f.soc:.0f} %: below {policy.precharge.below_v:g} V "
-        f"({policy.source.at('precharge.below_v')}) a pack of {policy.pack.cells_in_series} cells is empty"
-    )

@@ -1,0 +1,49 @@
+"""What to do about a bay when `step()` itself has raised: stop it, by the same deadline and with the same alarm.
+
+Nothing is judged here but the plainest words of the charger. The memory knows since when the bay is being stopped, so
+that the next step, if it does not raise, goes on from there.
+"""
+
+from dataclasses import replace
+
+from orchestrator.core.contactor import closes
+from orchestrator.core.latches import shown
+from orchestrator.core.machine import UNVERIFIED
+from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.operator import STOPPED
+from orchestrator.core.safestop import OBEY_STOP_S
+from orchestrator.model import STOP, Decision, Request, Snapshot, State
+
+FAULT = "internal"
+#: Less of it is an answer to what a stop has just ended; the BMU is not asked, since it may be what cannot be judged.
+ANSWERS = "could not be judged: a defect of this software; its charger is being stopped"
+
+
+def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tuple[Decision, Memory]:
+    """The decision and the memory after an exception, whose words are `error`."""
+    memory = memory.copy()
+    memory.last_s = now_s
+    if memory.state not in UNVERIFIED or memory.stopping_s is None:
+        memory.stopping_s = memory.since_s = now_s
+        memory.state, memory.stop_reason = State.STOPPING, f"{FAULT}: {error}"
+    memory.unverified, memory.ready, memory.intends, memory.order = True, False, False, None
+    known = memory.faults.get(FAULT)
+    since_s = known.raised_s if known is not None and known.raised_s is not None else now_s
+    memory.faults[FAULT] = FaultMemory(present=True, raised_s=since_s, text=error, latched=True)
+    if snapshot.request is Request.STOP:
+        memory.hold = STOPPED
+    tried_s = now_s - memory.stopping_s
+    if tried_s >= OBEY_STOP_S:
+        memory.state = State.UNCONTROLLABLE
+    out = memory.state is State.UNCONTROLLABLE
+    memory.closed = closes(memory.state, closed=memory.closed, standby=False)
+    memory.reason = (
+        f"CUT THE MAINS of this charger: this software has failed to judge the bay for {tried_s:.0f} s, and cannot "
+        f"verify the stop that it repeats ({error})"
+        if out
+        else f"stopping: {FAULT}: {error}"
+    )
+    refused = snapshot.request is not None and snapshot.request is not Request.STOP
+    decision = Decision(memory.state, memory.reason, STOP, faults=shown(memory.faults), alarm=out,
+                        closed=memory.closed, answer=f"this bay {ANSWERS}" if refused else "")  # fmt: skip
+    return replace(decision, session=memory.session), memory

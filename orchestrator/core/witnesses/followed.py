@@ -1,0 +1,125 @@
+"""What is followed of both witnesses from step to step."""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from orchestrator.core.drain import drained
+from orchestrator.core.witnesses.standby import UNORDERED_MOST_S, sees_current
+
+if TYPE_CHECKING:
+    from orchestrator.core.facts import Facts
+
+#: How far back the trail goes, and how far apart its samples are.
+TRAIL_S, TRAIL_EVERY_S = 10.0, 0.5
+#: Less of the charger's current proves nothing about whose pack it flows into.
+FIRST_A = 0.5
+#: The BMU must see this share of it, on top of what flowed before.
+OWN_SHARE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Pack and charger at one moment."""
+
+    t_s: float
+    pack_v: float
+    pack_a: float
+    charger_v: float
+    charger_a: float
+
+
+@dataclass(frozen=True, slots=True)
+class Frozen:
+    """What the BMU has said since `t_s` without any change, and where the charger was then."""
+
+    t_s: float
+    words: tuple[float | None, ...]
+    charger_v: float
+    charged_ah: float
+
+
+@dataclass(frozen=True, slots=True)
+class Witnessed:
+    """Made anew by every step."""
+
+    stop_s: float | None = None  #: when the first whole stop of the present state was handed to the port
+    proof: tuple[float, ...] = ()  #: when the first and the newest of the status replies since then were asked for that
+    #: showed standby, without a break
+    sees: bool = False  #: the BMU sees a charging current that nobody ordered …
+    unordered_s: float = 0.0  #: … and for how long it has; drains
+    trail: tuple[Sample, ...] = ()  #: of the last seconds under current, oldest first
+    frozen: Frozen | None = None
+    before_a: float = 0.0  #: what the BMU saw before this charge began
+    proved: bool = False  #: the BMU has seen the charge begin
+    alone_s: float = 0.0  #: for how long the charger has delivered without that; drains
+
+
+def follow(f: "Facts", passed_s: float) -> Witnessed:
+    """What is known after this step's facts; `passed_s` since the step before."""
+    known = f.memory.witnessed
+    stop_s = _stop_s(f)
+    sees = sees_current(f) and not f.energised
+    return replace(
+        _first_amperes(f, known, passed_s),
+        stop_s=stop_s,
+        proof=_proof(f, stop_s, known.proof if stop_s == known.stop_s else ()),
+        sees=sees,
+        unordered_s=0.0 if f.energised else _unordered_s(known, passed_s, sees=sees),
+        trail=_trail(f, known.trail),
+        frozen=_frozen(f, known.frozen),
+    )
+
+
+def _unordered_s(known: Witnessed, passed_s: float, *, sees: bool) -> float:
+    """The time before it was first seen is nobody's: it may have begun just now."""
+    if sees and not known.sees:
+        return known.unordered_s
+    return min(UNORDERED_MOST_S, drained(known.unordered_s, passed_s, holds=sees))
+
+
+def _stop_s(f: "Facts") -> float | None:
+    """The first whole stop of this state; the later ones repeat it."""
+    since_s, sent_s, known_s = f.memory.since_s, f.charger.stop_sent_s, f.memory.witnessed.stop_s
+    if since_s is None or sent_s is None or sent_s < since_s:
+        return None
+    return known_s if known_s is not None and known_s >= since_s else sent_s
+
+
+def _proof(f: "Facts", stop_s: float | None, proof: tuple[float, ...]) -> tuple[float, ...]:
+    reading = f.reading
+    if stop_s is None or reading is None or not f.standby or sees_current(f):
+        return ()
+    if reading.t_s < stop_s or reading.t_s in proof:
+        return proof
+    return (*proof[:1], reading.t_s)
+
+
+def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
+    if not f.energised or f.pack_v is None or f.pack_a is None or f.volts is None or f.amps is None:
+        return () if not f.energised else trail
+    if trail and f.now_s - trail[-1].t_s < TRAIL_EVERY_S:
+        return trail
+    sample = Sample(f.now_s, f.pack_v, f.pack_a, f.volts, f.amps)
+    return (*(one for one in trail if f.now_s - one.t_s <= TRAIL_S), sample)
+
+
+def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
+    session, battery = f.memory.session, f.snapshot.battery
+    if f.volts is None or session is None or not f.energised or f.pack_v is None:
+        return None
+    words = tuple(
+        value.value if (value := getattr(battery, name)) is not None else None for name in type(battery).__slots__
+    )
+    if frozen is not None and frozen.words == words:
+        return frozen
+    return Frozen(f.now_s, words, f.volts, session.charged_ah)
+
+
+def _first_amperes(f: "Facts", known: Witnessed, passed_s: float) -> Witnessed:
+    if not f.energised:
+        return replace(known, before_a=f.pack_a or 0.0, proved=False, alone_s=0.0)
+    if known.proved or f.amps is None or f.pack_a is None:
+        return known
+    flows = f.amps >= FIRST_A
+    proved = flows and f.pack_a - known.before_a >= OWN_SHARE * f.amps
+    return replace(known, proved=proved, alone_s=drained(known.alone_s, passed_s, holds=flows and not proved))

@@ -1,0 +1,112 @@
+"""Volts and amps of charger and BMU side by side, and which of the two is likelier wrong."""
+
+from orchestrator.core.cells import chemistry
+from orchestrator.core.facts import Facts
+
+#: A pack under charge may lose this to the vehicle that it sits in before it counts as back-feed.
+BACK_FEED_A = 0.5
+#: Values that are the same for this long, while the other one's have moved by twenty times the resolution or more, are
+#: not measured any more. The charger's are judged above this current; at rest by its volts alone.
+STILL_S, STILL_ABOVE_A = 60.0, 1.0
+MOVED_V, MOVED_A = 0.2, 0.5
+#: A BMU that counts must have moved a figure when this share of a whole charge has flowed.
+MOVED_SHARE = 0.02
+
+
+def over_voltage(f: Facts) -> str | None:
+    """FAULTS C10, B14."""
+    limit_v = f.rules.max_v
+    if f.volts is not None and f.volts > limit_v:
+        return f"{f.volts:.2f} V at the charger, the limit is {limit_v:g} V"
+    if f.pack_v is not None and f.pack_v > limit_v:
+        return f"{f.pack_v:.2f} V at the pack, the limit is {limit_v:g} V"
+    return None
+
+
+def volts_disagree(f: Facts) -> str | None:
+    """FAULTS B15."""
+    if f.volts is None or f.pack_v is None or not f.connected:
+        return None
+    limits = f.rules.policy.faults
+    if abs(f.volts - f.pack_v) <= max(limits.volts_differ_v, limits.volts_differ_pct / 100 * f.pack_v):
+        return None
+    text = f"the charger reads {f.volts:.2f} V, the BMU {f.pack_v:.2f} V: not the same battery, or a bad connection"
+    return text + _likelier_wrong(_fits_soc(f, f.volts), _fits_soc(f, f.pack_v), "the pack's SOC")
+
+
+def amps_disagree(f: Facts) -> str | None:
+    """FAULTS B16."""
+    if f.amps is None or f.pack_a is None:
+        return None
+    tolerance_a = max(f.rules.policy.faults.amps_differ_a, f.rules.policy.faults.amps_differ_pct / 100 * f.amps)
+    if abs(f.amps - f.pack_a) <= tolerance_a:
+        return None
+    text = f"the charger reads {f.amps:.2f} A, the BMU {f.pack_a:.2f} A"
+    step = f.memory.step
+    if step is None:
+        return text
+    charger_fits, bmu_fits = (abs(amps - step.current_a) <= tolerance_a for amps in (f.amps, f.pack_a))
+    return text + _likelier_wrong(charger_fits, bmu_fits, f"the step that was set ({step.current_a:g} A)")
+
+
+def _fits_soc(f: Facts, volts: float) -> bool:
+    if f.soc is None:
+        return True
+    low_v, high_v = chemistry(f.rules.policy.pack).bounds_v(f.soc)
+    return low_v <= volts / f.rules.policy.pack.cells_in_series <= high_v
+
+
+def _likelier_wrong(charger_fits: bool, bmu_fits: bool, by_what: str) -> str:  # noqa: FBT001 - the two of one question
+    if charger_fits == bmu_fits:
+        return ""
+    return f"; {'the BMU' if charger_fits else 'the charger'} is likelier wrong, by {by_what}"
+
+
+def charger_frozen(f: Facts) -> str | None:
+    """FAULTS C20: its values stand still, and the battery's do not. Alone the one proves nothing: a good supply on a
+    flat cell may show the same digits for minutes."""
+    still = f.memory.still
+    if still is None or f.now_s - still.t_s < STILL_S or f.pack_v is None or f.pack_a is None:
+        return None
+    moved_v, moved_a = abs(f.pack_v - still.pack_v), abs(f.pack_a - still.pack_a)
+    if still.amps <= STILL_ABOVE_A or (moved_v <= MOVED_V and moved_a <= MOVED_A):
+        return None
+    return (
+        f"the charger has said {still.volts:.2f} V and {still.amps:.2f} A for {f.now_s - still.t_s:.0f} s, "
+        f"while the BMU's values moved by {moved_v:.2f} V and {moved_a:.2f} A: its measurement is frozen"
+    )
+
+
+def charger_frozen_at_rest(f: Facts) -> str | None:
+    """FAULTS C31."""
+    still = f.memory.still
+    if still is None or not f.standby or not f.connected or f.now_s - still.t_s < STILL_S or f.pack_v is None:
+        return None
+    moved_v = abs(f.pack_v - still.pack_v)
+    if moved_v <= MOVED_V or abs(f.pack_v - still.volts) <= MOVED_V:  # it moved to where the charger had been all along
+        return None
+    return (
+        f"the charger has said {still.volts:.2f} V for {f.now_s - still.t_s:.0f} s at rest, while the BMU's voltage "
+        f"moved by {moved_v:.2f} V: its measurement is frozen"
+    )
+
+
+def bmu_frozen(f: Facts) -> str | None:
+    """FAULTS B23, the mirror of `charger_frozen`: every word of the BMU stands still, though a charge goes in."""
+    frozen, session = f.memory.witnessed.frozen, f.memory.session
+    if frozen is None or session is None or f.volts is None or f.now_s - frozen.t_s < STILL_S:
+        return None
+    moved_v, moved_ah = abs(f.volts - frozen.charger_v), session.charged_ah - frozen.charged_ah
+    if moved_v <= MOVED_V and moved_ah < MOVED_SHARE * f.rules.policy.finish.max_ah:
+        return None
+    return (
+        f"the BMU has said the same in every word for {f.now_s - frozen.t_s:.0f} s, while the charger's voltage moved "
+        f"by {moved_v:.2f} V and {moved_ah:.2f} Ah went in: its values are frozen"
+    )
+
+
+def back_feed(f: Facts) -> str | None:
+    """FAULTS C12."""
+    if f.memory.runs_s is None or f.pack_a is None or f.pack_a >= -BACK_FEED_A:
+        return None
+    return f"the BMU reports a discharge of {-f.pack_a:.2f} A while the charger runs"

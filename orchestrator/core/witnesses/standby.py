@@ -1,0 +1,43 @@
+"""Standby by both witnesses: no charger stands by while the BMU sees current flow into its pack.
+
+Proved is standby by two status replies, each asked for after the whole stop was handed to the port, with nothing else
+between them; and by the BMU, where it can be heard, with a value from after the stop.
+"""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from orchestrator.core.facts import Facts
+
+#: Current into the pack of more than this is no offset of a measurement (FAULTS C29).
+CHARGING_A = 1.0
+#: For so long a BMU may still say what was: its own averaging. What lasts for longer counts as this much, so that it is
+#: forgotten again within half a minute.
+UNORDERED_S, UNORDERED_MOST_S = 2.0, 6.0
+
+
+def sees_current(f: "Facts") -> bool:
+    """The BMU says, freshly, that current flows into its pack."""
+    return f.pack_a is not None and f.pack_a > CHARGING_A
+
+
+def proved(f: "Facts") -> bool:
+    """The only proof of standby that is taken."""
+    known = f.memory.witnessed
+    if len(known.proof) < 2 or known.stop_s is None or not f.standby:
+        return False
+    measured = f.snapshot.battery.current_a
+    return f.pack_a is None or measured is None or (measured.t_s >= known.stop_s and not sees_current(f))
+
+
+def current_without_order(f: "Facts") -> str | None:
+    """FAULTS C29."""
+    if not f.unordered or f.pack_a is None:
+        return None
+    if f.reading is None:
+        return f"the BMU sees {f.pack_a:.2f} A flow into the pack, nothing was commanded, and the charger is not heard"
+    return (
+        f"the BMU sees {f.pack_a:.2f} A flow into the pack while the charger says {f.reading.current_a:.2f} A and "
+        "nothing was commanded: believe the BMU. Either the charger's word is wrong, its cable belongs to another bay, "
+        "or something else charges this pack"
+    )

@@ -1,0 +1,412 @@
+"""What survives a restart: nothing latched, held or counted is lost, and nothing begins to charge that may not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from itertools import pairwise
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from orchestrator.config.policy import Policy
+from orchestrator.core.latches import BACKOFF_S
+from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.operator import MAX_RESETS, STOPPED
+from orchestrator.core.persisted import RUNNING, UNFINISHED, Persisted, PersistedFault, from_first_format
+from orchestrator.model import ENERGISED, STOP, Action, ChargerLink, Request, Session, State
+from tests.core.bays import IN, POLICY, charging, idle
+from tests.core.fault_scenes import SCENES
+from tests.core.world import World, bay
+
+every_state = pytest.mark.parametrize("state", State)
+
+
+def restarted(world: World, gap_s: float = 5.0, clock_s: float = 50.0) -> World:
+    """The service is killed now; another one begins after `gap_s`, on a clock that reads `clock_s`. Nothing is stopped
+    meanwhile but by whoever stops it."""
+    kept = Persisted.of(world.memory, world.now_s)
+    world.now_s = clock_s
+    world.memory = kept.aged(gap_s).memory(clock_s)
+    world.reading, world.measured, world.heard_s = None, {}, clock_s
+    world.charger_link = ChargerLink(online=True)
+    world.battery_link = replace(world.battery_link, boot_t_s=None, heartbeat_t_s=None, heartbeat_s=None)
+    world.decisions = []
+    return world
+
+
+def tripped_by(world: World, name: str) -> bool:
+    return bool(world.decisions) and name in world.raised
+
+
+def stopped_meanwhile(world: World) -> None:
+    """By the guardian."""
+    world.charger.resting, world.charger.run = True, False
+
+
+# --- from every state -------------------------------------------------------------------------------------------------
+
+
+@every_state
+def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None:
+    world = IN[state]()
+    ran = state in RUNNING
+    assert Persisted.of(world.memory, world.now_s).running is ran
+    restarted(world)
+    world.deaf.clear()
+    world.tick()
+    assert world.decision.command == STOP
+    assert world.is_in(State.STARTING)
+    assert world.decision.alarm is ran  # nobody knows yet
+    world.run(120)
+    assert not world.decision.alarm
+    if ran:
+        assert not any(decision.state in ENERGISED for decision in world.decisions)
+        assert UNFINISHED in world.raised["found_running"]
+        assert world.ask(Request.START if state is not State.UNCONTROLLABLE else Request.RESET) == ""
+    elif state is State.TRIPPED:
+        assert world.is_in(State.TRIPPED)
+
+
+@every_state
+def test_a_charger_that_may_run_and_is_not_heard_is_an_alarm_over_any_number_of_restarts(state: State) -> None:
+    if state not in RUNNING:
+        return
+    world = IN[state]()
+    for _ in range(3):
+        restarted(world)
+        world.charger_answers = False
+        for _ in range(60):
+            world.tick()
+            assert world.decision.alarm
+            assert world.decision.command == STOP
+        assert world.is_in(State.UNCONTROLLABLE)
+    world.charger_answers = True
+    world.deaf.clear()
+    world.run(12)
+    assert not world.decision.alarm
+
+
+@pytest.mark.parametrize("request_", [Request.STOP, Request.PAUSE])
+def test_a_persons_word_outlives_the_service(request_: Request) -> None:
+    world = charging()
+    assert world.ask(request_) == ""
+    for _ in range(3):
+        restarted(world)
+        world.run(60)
+        assert not any(decision.state in ENERGISED for decision in world.decisions)
+    assert world.memory.hold == (STOPPED if request_ is Request.STOP else "")
+    assert world.memory.paused is (request_ is Request.PAUSE)
+    assert world.ask(Request.START) == ""
+    world.until(State.CHARGING, 10)
+
+
+# --- what is counted --------------------------------------------------------------------------------------------------
+
+
+def with_finish(max_hours: float = 12.0, max_ah: float = 44.0) -> Policy:
+    return replace(POLICY, finish=replace(POLICY.finish, max_hours=max_hours, max_ah=max_ah))
+
+
+def in_order(world: World) -> None:
+    """The service ends: it stops the charge, verifies that, and begins anew."""
+    world.ours = {"ending": "the service ends: SIGTERM"}
+    world.run(3)
+    assert world.state not in ENERGISED
+    assert not Persisted.of(world.memory, world.now_s).running
+    world.ours = {}
+    restarted(world)
+
+
+def killed(world: World) -> None:
+    """It dies, the guardian stops the charger, and a person starts again."""
+    stopped_meanwhile(world)
+    restarted(world)
+    world.run(3)
+    assert world.is_in(State.IDLE)
+    assert world.ask(Request.START) == ""
+
+
+def out_of_reach(world: World) -> None:
+    """The BMU is silent for longer than any backoff."""
+    world.battery_answers = False
+    world.run(400)
+    world.battery_answers = True
+    world.memory.faults.pop("bmu_silent", None)  # not what is asked here
+
+
+def cut_off(world: World) -> None:
+    """The charger is not heard for a while: out of control, and back."""
+    world.charger_answers = False
+    world.run(10)
+    assert world.is_in(State.UNCONTROLLABLE)
+    world.charger_answers = True
+    world.memory.faults.pop("charger_silent", None)
+
+
+BREAKS: tuple[Callable[[World], None], ...] = (in_order, killed, out_of_reach, cut_off)
+every_break = pytest.mark.parametrize("breaks", BREAKS, ids=lambda breaks: breaks.__name__)
+
+
+@every_break
+def test_no_number_of_breaks_lets_more_in_than_the_policy_allows(breaks: Callable[[World], None]) -> None:
+    world = World(bay(with_finish(max_ah=0.3)), soc_pct=0.0)
+    flowed_as, number = 0.0, 0
+    while not tripped_by(world, "ah_limit"):
+        world.until(State.CHARGING, 60)
+        for _ in range(60):
+            world.tick()
+            flowed_as += world.reading.current_a * 0.25 if world.reading else 0.0
+        if world.is_in(State.CHARGING):
+            breaks(world)
+        number += 1
+        assert number < 12, world.decision
+    assert number >= 4
+    assert 0.25 <= flowed_as / 3600 <= 0.31  # some of it flows in the breaks
+
+
+@every_break
+def test_no_number_of_breaks_lets_a_charge_last_longer(breaks: Callable[[World], None]) -> None:
+    world = World(bay(with_finish(max_hours=0.02)), soc_pct=0.0)
+    world.amps = 3.0
+    energised = number = 0
+    while not tripped_by(world, "time_limit"):
+        world.until(State.CHARGING, 60)
+        for _ in range(60):
+            energised += world.tick().state in ENERGISED
+        if world.is_in(State.CHARGING):
+            breaks(world)
+        number += 1
+        assert number < 12, world.decision
+    assert 60 <= energised * 0.25 <= 75  # some of it passes in the breaks
+
+
+def short_precharge() -> Policy:
+    rule = POLICY.precharge
+    assert rule is not None
+    return replace(POLICY, precharge=replace(
+        rule, pulse=replace(rule.pulse, max_min=0.5), continuous=replace(rule.continuous, max_min=1.0),
+        rise=replace(rule.rise, within_min=0.4)))  # fmt: skip
+
+
+@every_break
+def test_no_number_of_breaks_lets_a_pack_be_precharged_without_a_rise(breaks: Callable[[World], None]) -> None:
+    world = World(bay(short_precharge()), voltage_v=33.0)
+    energised = number = 0
+    while not tripped_by(world, "precharge_no_rise"):
+        world.until(State.PRECHARGE_PULSE, 60)
+        for _ in range(32):
+            energised += world.tick().state in ENERGISED
+        if world.state in ENERGISED:
+            breaks(world)
+        number += 1
+        assert number < 12, world.decision
+    assert energised * 0.25 <= 30
+
+
+@every_break
+def test_no_number_of_breaks_lets_a_precharge_last_longer(breaks: Callable[[World], None]) -> None:
+    world = World(bay(short_precharge()), voltage_v=33.0)
+    seconds, number = {State.PRECHARGE_PULSE: 0.0, State.PRECHARGE_CONTINUOUS: 0.0}, 0
+    while not tripped_by(world, "precharge_too_long"):
+        end_s = world.now_s + 60
+        while world.tick().state not in ENERGISED:
+            assert world.now_s < end_s, (world.decision, seconds)
+        for _ in range(32):
+            world.tick()
+            world.values["voltage_v"] = 33.0 + 0.022 * sum(seconds.values())  # it rises enough, and not to the end
+            if world.state in seconds:
+                seconds[world.state] += 0.25
+        if world.state in ENERGISED:
+            breaks(world)
+        number += 1
+        assert number < 25, (world.decision, seconds)
+    assert seconds[State.PRECHARGE_PULSE] <= 35
+    assert seconds[State.PRECHARGE_CONTINUOUS] <= 70
+
+
+def test_a_battery_that_was_changed_meanwhile_begins_anew() -> None:
+    world = charging()
+    world.run(60)
+    in_order(world)
+    assert world.memory.session is not None
+    world.battery_answers, world.volts = False, 0.0
+    world.run(5)
+    assert world.is_in(State.IDLE)
+    assert world.decision.reason == "no battery"
+    assert world.memory.session is None
+    assert len([one for one in world.decisions if one.session is not None and one.session.result]) == 1
+
+
+def test_another_soc_after_the_restart_is_another_battery() -> None:
+    world = charging()
+    world.run(10)
+    in_order(world)
+    world.values |= {"soc_pct": 85.0, "voltage_v": 51.5}
+    world.run(30)
+    assert "battery_exchanged" in world.raised
+    assert world.memory.session is None
+    assert not any(decision.state in ENERGISED for decision in world.decisions)
+
+
+def test_strikes_count_on_over_restarts() -> None:
+    world = charging()
+    for number in range(1, len(BACKOFF_S) + 1):
+        world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+        world.tick()
+        world.battery_link = replace(world.battery_link, implausible={})
+        world.run(3)
+        restarted(world, clock_s=1e6 * number)
+        assert len(world.memory.faults["implausible"].strikes) == number
+        world.tick()
+        assert "implausible" in world.raised  # the backoff goes on, too
+        world.until(State.CHARGING, 400)
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.tick()
+    world.battery_link = replace(world.battery_link, implausible={})
+    world.until(State.TRIPPED, 3)
+    restarted(world)
+    world.run(600, dt_s=1.0)
+    assert world.is_in(State.TRIPPED)
+
+
+def test_a_backoff_is_over_when_the_gateway_was_off_for_longer() -> None:
+    world = charging()
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.tick()
+    world.battery_link = replace(world.battery_link, implausible={})
+    world.run(3)
+    restarted(world, gap_s=60.0)
+    world.until(State.CHARGING, 10)
+
+
+def test_resets_are_counted_over_restarts() -> None:
+    world = idle()
+    for _ in range(MAX_RESETS):
+        world.internal = "ValueError()"
+        world.until(State.TRIPPED, 3)
+        assert world.ask(Request.RESET) == ""
+        restarted(world, gap_s=60.0)
+        world.run(2)
+    world.internal = "ValueError()"
+    world.until(State.TRIPPED, 3)
+    assert "was reset 3 times within an hour" in world.ask(Request.RESET)
+
+
+# --- any day, with restarts in it -------------------------------------------------------------------------------------
+
+acts = st.lists(
+    st.tuples(st.integers(0, len(SCENES) * 2 + 7), st.sampled_from([1, 3, 8, 40]),
+              st.none() | st.floats(0.0, 4000.0)), min_size=1, max_size=10)  # fmt: skip
+
+
+def do(world: World, number: int) -> None:
+    if number < len(SCENES):
+        SCENES[number].spoil(world)
+    elif number < 2 * len(SCENES):
+        SCENES[number - len(SCENES)].heal(world)
+    else:
+        others: tuple[Callable[[], object], ...] = (
+            *(partial(world.ask, request) for request in Request),
+            world.leave, world.arrive, lambda: world.deaf.add(Action.STOP), world.deaf.clear,
+        )  # fmt: skip
+        others[number - 2 * len(SCENES)]()
+
+
+@settings(max_examples=60)
+@given(acts=acts)
+def test_nothing_is_lost_and_nothing_begins_by_itself(acts: list[tuple[int, int, float | None]]) -> None:
+    world = charging()
+    for number, ticks, gap_s in acts:
+        do(world, number)
+        for _ in range(ticks):
+            world.tick()
+        if gap_s is None:
+            continue
+        before, now_s, ran = world.memory, world.now_s, world.state in RUNNING
+        restarted(world, gap_s)
+        assert_kept(before, now_s, world.memory, world.now_s, gap_s)
+        for _ in range(20):
+            world.tick()
+            assert not ran or world.state not in ENERGISED
+            for name, fault in before.faults.items():
+                assert not fault.latched or world.memory.faults[name].latched
+            if ran:
+                assert world.raised.keys() & {"found_running"}
+
+
+def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, gap_s: float) -> None:
+    for name, fault in before.faults.items():
+        if name == "found_running" or (fault.raised_s is None and not fault.strikes):
+            continue
+        kept = after.faults[name]
+        assert kept.latched is fault.latched
+        assert kept.text == (fault.text if fault.raised_s is not None else "")
+        for then, now in ((fault.raised_s, kept.raised_s), (fault.clean_s, kept.clean_s)):
+            assert (then is None) is (now is None)
+            if then is not None and now is not None:
+                assert after_s - now == pytest.approx(before_s - then + gap_s)
+        assert [after_s - t for t in kept.strikes] == pytest.approx([before_s - t + gap_s for t in fault.strikes])
+    assert (after.hold, after.paused, after.full_pct) == (before.hold, before.paused, before.full_pct)
+    assert [name for _, name in after.resets] == [name for _, name in before.resets]
+    if before.session is not None:
+        assert after.session is not None
+        aged = after_s - after.session.started_s
+        assert aged == pytest.approx(before_s - before.session.started_s + gap_s)
+        assert replace(after.session, started_s=0.0) == replace(before.session, started_s=0.0)
+
+
+# --- forms ------------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_kept_twice_is_the_same() -> None:
+    world = charging()
+    world.internal = "ValueError()"
+    world.run(2)
+    kept = Persisted.of(world.memory, world.now_s)
+    again = Persisted.of(kept.memory(world.now_s), world.now_s)
+    assert again.gist == kept.gist
+    assert replace(again, soc=None, session=None) == replace(kept, soc=None, session=None)
+
+
+def test_the_gist_changes_with_what_must_be_on_disk_and_not_with_time() -> None:
+    world = charging()
+    gists = [Persisted.of(world.memory, world.now_s).gist]
+    world.run(10)
+    assert Persisted.of(world.memory, world.now_s).gist == gists[0]
+    for change in (partial(world.ask, Request.PAUSE), partial(world.ask, Request.STOP),
+                   partial(setattr, world, "internal", "ValueError()")):  # fmt: skip
+        change()
+        world.run(2)
+        gists.append(Persisted.of(world.memory, world.now_s).gist)
+    assert all(before != after for before, after in pairwise(gists))
+
+
+def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
+    kept = Persisted(faults={"of_tomorrow": PersistedFault("something", latched=True, raised=1.0)})
+    memory = kept.memory(100.0)
+    assert memory.faults == {}
+    assert memory.hold == "something; start to go on"
+
+
+@pytest.mark.parametrize(
+    ("name", "latched", "strikes"), [("internal", True, 0), ("system_stop", False, 0), ("implausible", True, 4)]
+)
+def test_the_first_format_is_read(name: str, latched: bool, strikes: int) -> None:
+    fault = from_first_format(name, "text")
+    assert (fault.text, fault.latched, len(fault.strikes)) == ("text", latched, strikes)
+    memory = Persisted(faults={name: fault}).memory(100.0)
+    assert memory.faults[name].latched is latched
+    assert memory.faults[name].raised_s == 100.0
+
+
+def test_an_empty_past_is_a_new_bay() -> None:
+    assert Persisted().memory(5.0) == Memory(charge=(0.0, None))
+    assert Persisted.of(Memory(), 5.0) == Persisted()
+
+
+def test_a_fault_that_is_only_being_debounced_is_not_kept() -> None:
+    memory = Memory(faults={"volts_disagree": FaultMemory(present=True, seen_s=2.0)}, session=Session(1.0))
+    kept = Persisted.of(memory, 3.0)
+    assert kept.faults == {}
+    assert kept.session == Session(2.0)
