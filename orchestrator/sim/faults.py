@@ -4,15 +4,15 @@
 charger did because of them, and what the pack has become, stays.
 """
 
-import termios
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
 from orchestrator.model import ChargeMode, ControlMode
+from orchestrator.sim import hostile
 from orchestrator.sim.can_wire import NodeFaults
 from orchestrator.sim.charger import Push
-from orchestrator.sim.charger_frames import Kind, Lie
+from orchestrator.sim.charger_frames import Kind
 from orchestrator.sim.pack import DRIVEN_K_PER_S
 from orchestrator.sim.rig import Rig
 
@@ -190,54 +190,6 @@ def _port_gone(rig: Rig, _: float | None) -> None:
     rig.wire.close()
 
 
-def _line_taken_over(rig: Rig, value: float | None) -> None:
-    rig.wire.set_speed(termios.B115200 if value is None else int(value))
-
-
-def _port_locked(rig: Rig, _: float | None) -> None:
-    rig.wire.lock()
-
-
-def _says_standby(rig: Rig, _: float | None) -> None:
-    rig.wire.lies |= {Kind.OPERATION: 0, Kind.CURRENT: 0}
-
-
-def _says_standby_now_and_then(rig: Rig, value: float | None) -> None:
-    every = 2 if value is None else int(value)
-    rig.wire.liars |= {Kind.OPERATION: Lie(0, every), Kind.CURRENT: Lie(0, every)}
-
-
-def _limit_reverts(rig: Rig, value: float | None) -> None:
-    rig.bay.charger.reverts_s = 0.25 if value is None else value
-
-
-def _runs_again(rig: Rig, value: float | None) -> None:
-    rig.bay.charger.restless_s = 3.0 if value is None else value
-
-
-def _obeys_once(rig: Rig, _: float | None) -> None:
-    rig.bay.charger.stops_left = 1
-
-
-def _stopped_elsewhere(rig: Rig, _: float | None) -> None:
-    rig.bay.charger.rest(0)
-
-
-def _bmu_frozen(rig: Rig, _: float | None) -> None:
-    frozen = rig.bay.readout()
-    for name in frozen.__slots__:
-        rig.bay.falsify[name] = lambda _, value=getattr(frozen, name): value
-
-
-def _pack_collapsed(rig: Rig, value: float | None) -> None:
-    pack = rig.bay.pack
-    pack.bias_v += (31.0 if value is None else value) - pack.ocv_v
-
-
-def _another_pack(rig: Rig, value: float | None) -> None:
-    rig.bay.pack.cells = 10 if value is None else int(value)
-
-
 def _heal(rig: Rig, _: float | None) -> None:
     charger, pack = rig.bay.charger, rig.bay.pack
     charger.reversed = charger.rogue = charger.ignores_stop = False
@@ -296,18 +248,22 @@ FAULTS = {
     "ignore_stop": Fault("the charger no longer obeys a stop", _ignore_stop),
     "bmu_reboot": Fault("the BMU restarts and forgets its settings", _bmu_reboot),
     "port_gone": Fault("the serial adapter is unplugged", _port_gone),
-    "line_taken_over": Fault("another program sets the serial port to 115200 baud", _line_taken_over),
-    "port_locked": Fault("another program locks the serial port as soon as it is free", _port_locked),
-    "says_standby": Fault("the charger says that it stands by with 0.00 A, whatever it does", _says_standby),
+    "line_taken_over": Fault("another program sets the serial port to 115200 baud", hostile.line_taken_over),
+    "port_locked": Fault("another program locks the serial port as soon as it is free", hostile.port_locked),
+    "says_standby": Fault("the charger says that it stands by with 0.00 A, whatever it does", hostile.says_standby),
     "says_standby_now_and_then": Fault(
-        "every second answer of the charger says that it stands by with 0.00 A", _says_standby_now_and_then
+        "every second answer of the charger says that it stands by with 0.00 A", hostile.says_standby_now_and_then
     ),
-    "limit_reverts": Fault("the charger takes each limit and goes back to its highest after 0.25 s", _limit_reverts),
-    "runs_again": Fault("the charger runs again by itself, 3 s after each stop", _runs_again),
-    "obeys_once": Fault("the charger obeys one more stop, and no later one", _obeys_once),
-    "stopped_elsewhere": Fault("somebody else sends the charger to standby", _stopped_elsewhere),
-    "bmu_frozen": Fault("the BMU goes on saying all values of now", _bmu_frozen),
-    "pack_collapsed": Fault("the pack's voltage falls to 31 V at once", _pack_collapsed),
-    "another_pack": Fault("the pack is one of 10 cells in series (36 V), with a BMU like the other's", _another_pack),
+    "limit_reverts": Fault(
+        "the charger takes each limit and goes back to its highest after 0.25 s", hostile.limit_reverts
+    ),
+    "runs_again": Fault("the charger runs again by itself, 3 s after each stop", hostile.runs_again),
+    "obeys_once": Fault("the charger obeys one more stop, and no later one", hostile.obeys_once),
+    "stopped_elsewhere": Fault("somebody else sends the charger to standby", hostile.stopped_elsewhere),
+    "bmu_frozen": Fault("the BMU goes on saying all values of now", hostile.bmu_frozen),
+    "pack_collapsed": Fault("the pack's voltage falls to 31 V at once", hostile.pack_collapsed),
+    "another_pack": Fault(
+        "the pack is one of 10 cells in series (36 V), with a BMU like the other's", hostile.another_pack
+    ),
     "heal": Fault("all faults are gone, the adapter is plugged in again", _heal),
 }

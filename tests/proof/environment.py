@@ -1,4 +1,4 @@
-"""The environment's campaign: whatever else is on the machine, the line, the bus and the disk, over lives of the gateway.
+"""The environment's campaign: whatever else is on machine, line, bus and disk, over lives of the gateway.
 
 python -m tests.proof.environment                    every scene, then 1,000 random scripts, on all processors
 python -m tests.proof.environment --seed 104 -v      one of them again, with what the service said
@@ -10,11 +10,11 @@ import argparse
 import logging
 import multiprocessing
 import os
-import resource
 import sys
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
@@ -26,6 +26,8 @@ from tests.proof.scenes import SCENES
 #: A failure is made smaller with at most this many plays.
 SHRINK_PLAYS = 120
 RUNS = 1000
+#: Of this many kinds of findings one is shown, with its smallest script.
+SHOWN = 8
 
 
 def quiet() -> None:
@@ -36,7 +38,9 @@ def quiet() -> None:
 def play(name: str | int) -> tuple[str, Lived]:
     """A scene by its name, a random script by its seed."""
     quiet()
-    return (f"seed {name}", live(Script.of_seed(name))) if isinstance(name, int) else (f"scene {name}", live(SCENES[name]))
+    return (
+        (f"seed {name}", live(Script.of_seed(name))) if isinstance(name, int) else (f"scene {name}", live(SCENES[name]))
+    )
 
 
 def campaign(names: Iterable[str | int], workers: int, until_s: float) -> Iterator[tuple[str, Lived]]:
@@ -73,18 +77,60 @@ def smallest(script: Script) -> Script:
     return script
 
 
-def show(name: str, lived: Lived, *, shrink: bool) -> None:
-    """What was found, and how to see it again."""
-    say(f"\n{name}: python -m tests.proof.environment --{name.replace(' ', ' ')} -v\n  " + "\n  ".join(lived.wrong))
-    if shrink:
-        small = smallest(lived.script)
-        say("smallest script:\n" + small.to_json() + "\n  " + "\n  ".join(live(small).wrong))
+def show(name: str, lived: Lived) -> None:
+    """What was found, how to see it again, and the smallest script that shows it."""
+    kind, which = name.split(" ", 1)
+    say(f"\n{name}: python -m tests.proof.environment --{kind} {which!r} -v\n  " + "\n  ".join(lived.wrong))
+    small = smallest(lived.script)
+    say("smallest script:\n" + small.to_json() + "\n  " + "\n  ".join(live(small).wrong))
 
 
-def cpu_s() -> float:
-    """What this process and those that it has waited for have used of a core."""
-    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-    return sum(one.ru_utime + one.ru_stime for one in used)
+@dataclass(slots=True)
+class Tally:
+    """What came of many scripts."""
+
+    played: int = 0
+    charged: int = 0
+    virtual_s: float = 0.0
+    kinds: Counter[str] = field(default_factory=Counter)
+    found: list[tuple[str, Lived]] = field(default_factory=list)
+
+    def add(self, name: str, lived: Lived) -> None:
+        self.played += 1
+        self.charged += lived.charged
+        self.virtual_s += lived.script.end_s
+        self.kinds.update(lived.kinds)
+        if lived.wrong:
+            self.found.append((name, lived))
+
+
+def one(script: Script, name: str, *, verbose: bool) -> int:
+    """A single script, with all that was said."""
+    lived = live(script)
+    say("\n".join([script.to_json(), *(lived.said if verbose else ())]))
+    say("\n".join((f"{name}:", *lived.wrong)) if lived.wrong else f"{name}: nothing found")
+    return 1 if lived.wrong else 0
+
+
+def many(names: Iterable[str | int], options: argparse.Namespace) -> int:
+    """All of them; 1 if anything was found."""
+    began_s, tally = time.monotonic(), Tally()
+    for name, lived in campaign(names, options.workers, began_s + options.minutes * 60):
+        tally.add(name, lived)
+        if lived.wrong and options.names:
+            say(f"{name}: {'; '.join(lived.wrong)}")
+        if lived.wrong and options.until_found:
+            return 1
+    say(
+        f"{tally.played} scripts, {tally.virtual_s / 3600:.1f} h of a station of three bays in "
+        f"{time.monotonic() - began_s:.0f} s; {tally.charged} chargers ran; {len(tally.found)} scripts found something"
+    )
+    for kind, times in tally.kinds.most_common():
+        say(f"{times:6} {kind}")
+    firsts = {min(lived.kinds): (name, lived) for name, lived in reversed(tally.found)}
+    for name, lived in list(firsts.values())[: 0 if options.names else SHOWN]:
+        show(name, lived)
+    return 1 if tally.found else 0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -92,47 +138,28 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--runs", type=int, default=RUNS, help="random scripts (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first seed (default: %(default)s)")
-    parser.add_argument("--minutes", type=float, default=60.0, help="no script begins after this (default: %(default)s)")
+    parser.add_argument(
+        "--minutes", type=float, default=60.0, help="no script begins after this (default: %(default)s)"
+    )
     parser.add_argument("--seed", type=int, help="only this one")
-    parser.add_argument("--scene", choices=SCENES, help="only this one")
+    parser.add_argument("--scene", choices=SCENES, help="only this one", metavar="NAME")
     parser.add_argument("--script", type=Path, help="only the script in this file")
-    parser.add_argument("--first-finding", action="store_true", help="end with the first finding, do not shrink it")
+    parser.add_argument("--names", action="store_true", help="a line for each script that finds something, no more")
+    parser.add_argument("--until-found", action="store_true", help="end with the first finding")
+    parser.add_argument("--skip", default="", help="scenes and seeds to leave out, with | between them")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("-v", "--verbose", action="store_true", help="what the service said")
-    arguments = parser.parse_args(argv)
+    options = parser.parse_args(argv)
     quiet()
-    single = next((one for one in (arguments.scene, arguments.seed) if one is not None), None)
-    if arguments.script is not None or single is not None:
-        script = Script.from_json(arguments.script.read_text(encoding="utf-8")) if arguments.script else None
-        name, lived = ("script", live(script)) if script else play(single)  # type: ignore[arg-type]
-        say("\n".join([lived.script.to_json(), *(lived.said if arguments.verbose else ())]))
-        say("\n".join((f"{name}:", *lived.wrong)) if lived.wrong else f"{name}: nothing found")
-        return 1 if lived.wrong else 0
-    began_s, used_s = time.monotonic(), cpu_s()
-    names: list[str | int] = [*SCENES, *range(arguments.first, arguments.first + arguments.runs)]
-    found: list[tuple[str, Lived]] = []
-    kinds: Counter[str] = Counter()
-    played = charged = 0
-    virtual_s = 0.0
-    for name, lived in campaign(names, arguments.workers, began_s + arguments.minutes * 60):
-        played, charged, virtual_s = played + 1, charged + lived.charged, virtual_s + lived.script.end_s
-        kinds.update(lived.kinds)
-        if lived.wrong:
-            found.append((name, lived))
-            if arguments.first_finding:
-                say(f"{name}: {'; '.join(lived.wrong)}")
-                return 1
-    say(
-        f"{played} scripts, {virtual_s / 3600:.1f} h of a station of three bays in {time.monotonic() - began_s:.0f} s; "
-        f"{charged} chargers ran; {len(found)} scripts found something"
-    )
-    for kind, times in kinds.most_common():
-        say(f"{times:6} {kind}")
-    firsts = {min(lived.kinds): (name, lived) for name, lived in reversed(found)}
-    for name, lived in list(firsts.values())[:8]:
-        show(name, lived, shrink=True)
-    say(f"{cpu_s() - used_s:.0f} s of one core")
-    return 1 if found else 0
+    if options.script is not None:
+        return one(Script.from_json(options.script.read_text(encoding="utf-8")), "script", verbose=options.verbose)
+    if options.scene is not None:
+        return one(SCENES[options.scene], options.scene, verbose=options.verbose)
+    if options.seed is not None:
+        return one(Script.of_seed(options.seed), f"seed {options.seed}", verbose=options.verbose)
+    skipped = set(options.skip.split("|"))
+    names = [*SCENES, *range(options.first, options.first + options.runs)]
+    return many([name for name in names if str(name) not in skipped], options)
 
 
 if __name__ == "__main__":

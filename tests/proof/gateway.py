@@ -9,7 +9,7 @@ import json
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import Any
 from durand.scheduler import get_scheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
 
 from orchestrator.config import load as load_module
+from orchestrator.config.shipped import shipped_dir
 from orchestrator.config.station import Station
 from orchestrator.errors import ServiceError
 from orchestrator.link import can as can_module
@@ -31,9 +32,12 @@ from tests.proof.virtual_process import Process, Processes
 from tests.proof.virtual_rig import Nature, VirtualRig
 from tests.proof.virtual_time import Time
 
+SMALL_AH, SMALL_RISE_S = 0.15, 24.0
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10
 JOURNAL, SOCKET = f"{ROOT}journal", f"{ROOT}socket"
+#: What is changed in the shipped policy for a bay whose charges are to be seen to their end.
+SMALL = {"max_ah: 44 ": f"max_ah: {SMALL_AH} ", "within_min: 5 ": f"within_min: {SMALL_RISE_S / 60} "}
 #: What is asked of a control socket is answered within this, or not at all.
 ANSWER_S = 5.0
 
@@ -67,7 +71,9 @@ def document(entries: Sequence[Entry], battery: dict[str, Any]) -> str:
     ]
     can = {"can0": {"interface": "virtual", "bitrate": 250_000}}
     journal = {"directory": JOURNAL, "snapshots": False}
-    return json.dumps({"station": "virtual", "can": can, "bays": bays, "control": {"socket": SOCKET}, "journal": journal})
+    return json.dumps(
+        {"station": "virtual", "can": can, "bays": bays, "control": {"socket": SOCKET}, "journal": journal}
+    )
 
 
 @cache
@@ -132,7 +138,7 @@ class Ended:
 
 
 class Gateway:
-    """The station and its gateway. `boot`, `signal`, `cut_power` and the like are for callbacks, not for its threads."""
+    """The station and its gateway. What changes it is for callbacks and for the main runner, not for its threads."""
 
     def __init__(
         self, natures: Sequence[Nature], entries: Sequence[Entry], *, seed: int, end_s: float, **battery: Any
@@ -187,6 +193,11 @@ class Gateway:
         return Path(_directory().name) / "station.yaml"
 
     def write_station(self) -> None:
+        """The file, and the small policy beside it."""
+        text = (shipped_dir() / "policies" / "li-ion-48v.yaml").read_text(encoding="utf-8")
+        for usual, small in SMALL.items():
+            text = text.replace(usual, small)
+        self.station_file.with_name("small.yaml").write_text(text, encoding="utf-8")
         self.station_file.write_text(document(self.entries, self._battery), encoding="utf-8")
 
     def _load(self, path: Any) -> Station:

@@ -38,6 +38,7 @@ class Bay:
     line: str = "real"
     running: bool = False
     cells: int = 13
+    small: bool = False  #: by a policy of which a charge ends after 0.15 Ah, a precharge without a rise after 24 s
     cross: int = -1  #: its serial cable goes to the charger of that bay, and the other way round
 
 
@@ -70,6 +71,8 @@ class Script:
 
 # --- random ones ------------------------------------------------------------------------------------------------------
 
+#: What others do on the bus, as everybody may.
+TOOLS = ("master", "reads all", "abort", "fd", "heartbeat", "flood")
 Make = Callable[[Random, float, int], Iterator[Hazard]]
 
 #: Calls that may hang: of a port, of what is kept and recorded, of standard error.
@@ -145,8 +148,8 @@ def _bmu_lies(dice: Random, t_s: float, bay: int) -> Iterator[Hazard]:
 
 
 def _on_bus(dice: Random, t_s: float, bay: int) -> Iterator[Hazard]:
-    what = dice.choice(("master", "abort", "forged", "fd", "node", "heartbeat", "flood"))
-    yield Hazard(t_s, "bus", bay, None, what)
+    what = dice.choice((*TOOLS, "forged", "node"))
+    yield Hazard(t_s, "tool" if what in TOOLS else "bus", bay, None, what)
 
 
 def _person(dice: Random, t_s: float, bay: int) -> Iterator[Hazard]:
@@ -186,11 +189,14 @@ def _random(seed: int) -> Script:
             break
         hazards.append(Hazard(round(t_s, 3), dice.choice(ENDS)))
         t_s += BETWEEN_S * dice.uniform(0.3, 2.0)
-        hazards += [Hazard(round(t_s, 3), "edit", dice.randrange(3), None, edit)] if (edit := dice.choice(EDITS)) else []
+        hazards += (
+            [Hazard(round(t_s, 3), "edit", dice.randrange(3), None, edit)] if (edit := dice.choice(EDITS)) else []
+        )
         hazards.append(Hazard(round(t_s + 0.2, 3), "boot"))
         t_s += dice.choice((2.0, 6.0, BEGIN_S)) * dice.uniform(0.7, 1.0)
     hazards.sort(key=lambda one: one.t_s)
-    return Script(seed, bays, tuple(hazards), round(t_s + 14.0, 3), dice.random() < 0.7, dice.random() < 0.2)
+    end_s = max(t_s, hazards[-1].t_s) + 14.0
+    return Script(seed, bays, tuple(hazards), round(end_s, 3), dice.random() < 0.7, dice.random() < 0.2)
 
 
 # --- made smaller -----------------------------------------------------------------------------------------------------

@@ -9,16 +9,18 @@ A lie that both witnesses tell alike cannot be seen by anybody: nothing is deman
 only, the BMU.
 """
 
+import json
 import re
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
-from orchestrator.model import ChargeMode
+from orchestrator.model import ENERGISED, ChargeMode
 from orchestrator.sim.charger_frames import Kind
-from tests.proof.gateway import STEPS_A, Asked, Gateway, port_name
-from tests.proof.hazards import Script
+from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name
+from tests.proof.hazards import Bay, Script
 from tests.proof.virtual_rig import VirtualRig
 
 STOP, OPERATION_0 = bytes.fromhex("AFFA900410900034AFA0"), bytes.fromhex("AFFA90050290010028AFA0")
@@ -34,13 +36,14 @@ LINE_S, VERIFY_S, MARGIN_S = 2.0, 3.0, 1.4
 OPEN_S = 2.0
 #: Within this after an operator's answer, or the end of a process, its stop is understood.
 ASKED_S, KILLED_S, FROZEN_S, TERM_S, ESTOP_S = 0.6, 0.25, 1.2, 0.7, 0.5
+#: The control socket is there this long after the start, and answers within that.
+START_S, ANSWER_S = 1.5, 6.0
 #: Over this the current is held against what was ordered.
 MEAN_S = 12.0
 #: Who runs again without an order this often within that time was not stopped, and is called so.
 RESTARTS, RESTARTS_S = 3, 25.0
 #: What latched this long ago is on the disk.
 KEPT_S = 2.6
-REST = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED", "QUALIFYING", "OFFLINE"})
 VERIFIED = re.compile(r"standby verified|stands? by, verified|verified (?:standby|to stand by)", re.IGNORECASE)
 DENIED = re.compile(r"NOT|not verified|no proof")
 
@@ -51,7 +54,9 @@ class Charger:
 
     number: int
     rig: VirtualRig
-    meant: str = ""  #: the newest that a process of ours has written to its port: "run", "stop"; "" nothing in this life
+    meant: str = (
+        ""  #: the newest that a process of ours has written to its port: "run", "stop"; "" nothing in this life
+    )
     meant_s: float = 0.0
     limit: int = 4  #: the newest current limit that was written
     deaf_s: float = 0.0  #: when it could last not hear, or not be reached
@@ -62,6 +67,9 @@ class Charger:
     asked_stop: bool = False  #: an operator's stop was accepted, and no start since
     flown: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=300))
     stopped_s: float = 0.0  #: when a stop was last understood at its port
+    looked_s: float = 1000.0
+    charged_ah: float = 0.0
+    precharged_s: float = 0.0
     onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
 
     @property
@@ -137,7 +145,7 @@ def _too_much(judge: "Judge", charger: Charger) -> bool:
 
 
 REASONS: tuple[Reason, ...] = (
-    Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run"),
+    Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run" and not judge.wants(c)),
     Reason("operator's stop", ASKED_S, lambda _, c: c.asked_stop),
     Reason("hot", LINE_S, _hot),
     Reason("cold", LINE_S, _cold),
@@ -148,8 +156,21 @@ REASONS: tuple[Reason, ...] = (
     Reason("collapsed", LINE_S, lambda _, c: c.rig.bay.pack.bias_v < -8.0 and c.honest(Kind.VOLTAGE, "voltage_v")),
     Reason("crossed", 9.0, _crossed),
     Reason("BMU frozen", 65.0, _frozen),
+    Reason("apart, most of the time", 20.0, lambda _, c: c.rig.apart_v > 1.2),
     Reason("status word", LINE_S, lambda _, c: "status" in c.rig.bay.falsify and _trips(c)),
 )
+
+
+#: Somebody reads or writes on bus and line as everybody may: no reason to stop.
+HARMLESS = ("boot", "tool")
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
 
 
 def _trips(charger: Charger) -> bool:
@@ -172,8 +193,8 @@ class Judge:
         self.frozen = False
         self._read = 0  # lines that were said
         for charger in self.chargers:
-            charger.rig.tty.on_written = lambda data, charger=charger: self._written(charger, data)
-            charger.rig.wire.on_started = lambda _, charger=charger: self._started(charger)
+            charger.rig.tty.on_written = partial(self._written, charger)
+            charger.rig.wire.on_started = partial(self._started, charger)
 
     def entry(self, charger: Charger) -> Any:
         """The bay of the present life that this charger's port belongs to."""
@@ -185,6 +206,10 @@ class Judge:
         return charger if charger.rig.wire.charger is model else next(
             one for one in self.chargers if one.rig.wire.charger is model
         )  # fmt: skip
+
+    def wants(self, charger: Charger) -> bool:
+        """The service says that it charges here: where the charger runs already, it need not be told to."""
+        return self._shown(charger).get("state") in ENERGISED and self.time.now_s - self.status_s < 1.0
 
     def find(self, charger: int, name: str, text: str) -> None:
         if not any(f" {name}: " in line for line in self.wrong):
@@ -200,7 +225,7 @@ class Judge:
         if limit := LIMIT.search(data):
             charger.limit = limit[1][0]
 
-    def _started(self, charger: Charger) -> None:
+    def _started(self, charger: Charger, _now_s: float) -> None:
         """A frame has switched an output on: of the charger behind this port."""
         if charger.waits:
             self.find(charger.number, "by itself", f"it was started, and waits for a person: {charger.waits}")
@@ -229,6 +254,19 @@ class Judge:
     def _of(self, name: str) -> Charger | None:
         return next((self.chargers[entry.port] for entry in self.life if entry.name == name), None)
 
+    def asked(self, asked: Asked, names: list[str]) -> None:
+        """A person asks: a stop is one whatever is answered, and something is answered."""
+        if self.booted_s is None or self.frozen or self.time.now_s < self.booted_s + START_S:
+            return
+        if asked.request["verb"] == "stop":
+            for charger in filter(None, map(self._of, names)):
+                self._meant(charger, asked.asked_s, ASKED_S, "an operator asked for a stop")
+        self.time.call_later(ANSWER_S, self._unanswered, asked, self.gateway.controller)
+
+    def _unanswered(self, asked: Asked, controller: Any) -> None:
+        if asked.answer is None and not asked.error and self.gateway.alive(controller) and not self.frozen:
+            self.find(-1, "unanswered", f"nobody answers {asked.request}")
+
     def answered(self, asked: Asked) -> None:
         """A person's request was answered: "" is yes."""
         verb, results = asked.request["verb"], (asked.answer or {}).get("results", {})
@@ -239,7 +277,6 @@ class Judge:
             if verb == "stop":
                 charger.asked_stop = True
                 charger.waits["operator"] = "stopped by the operator"
-                self._meant(charger, asked.asked_s, ASKED_S, "an operator's stop was accepted")
             elif verb == "start":
                 charger.asked_stop = False
                 charger.waits.clear()
@@ -248,6 +285,7 @@ class Judge:
 
     def boots(self) -> None:
         self.life, self.booted_s, self.frozen = list(self.gateway.entries), self.time.now_s, False
+        self.status = None
         for charger in self.chargers:
             charger.meant, charger.limit = "", 4
             charger.since_s.clear()
@@ -303,11 +341,39 @@ class Judge:
             self._judge(charger, now_s)
             self._judge_mean(charger, now_s)
         self._judge_words()
+        self._judge_small(now_s)
+
+    def _judge_small(self, now_s: float) -> None:
+        """Limits of a charge hold over restarts."""
+        for charger, bay in zip(self.chargers, self.script.bays, strict=True):
+            dt_s, charger.looked_s = now_s - charger.looked_s, now_s
+            if not bay.small:
+                continue
+            charger.charged_ah += charger.current_a * dt_s / 3600
+            charger.precharged_s += dt_s * (charger.flows and charger.rig.bay.pack.leaky)
+            if charger.charged_ah > SMALL_AH * 1.2:
+                self.find(charger.number, "limits", f"{charger.charged_ah:.3f} Ah went in, {SMALL_AH:g} are allowed")
+            if charger.precharged_s > SMALL_RISE_S * 1.4:
+                self.find(charger.number, "limits", f"{charger.precharged_s:.0f} s of precharge without a rise")
+
+    def ends(self) -> None:
+        """The script is over: what was harmless has stopped nobody, and the record can be read."""
+        if all(one.what in HARMLESS for one in self.script.hazards) and self.script.bays == (Bay(),) * 3:
+            for charger in self.chargers:
+                if not charger.rig.bay.charger.running:
+                    self.find(charger.number, "goes on", f"something harmless has stopped it, {self._state(charger)}")
+        if not any(one.what == "power" for one in self.script.hazards):
+            for path, inode in self.gateway.disk.names.items():
+                lines = bytes(inode.data).split(b"\n")[:-1] if path.endswith(".jsonl") else []
+                if broken := [line for line in lines if not _is_json(line)]:
+                    self.find(-1, "record", f"{path} has a line that cannot be read: {broken[0]!r}")
 
     def _reach(self, charger: Charger, now_s: float) -> None:
         tty, wire = charger.rig.tty, charger.rig.wire
         name = port_name(charger.number)
-        troubled = any(trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles)
+        troubled = any(
+            trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles
+        )
         if not tty.present or tty.stalled or tty.stolen or wire.mute_rx or troubled:
             charger.deaf_s = now_s
 
@@ -324,7 +390,9 @@ class Judge:
             deaf_s = port.deaf_s + OPEN_S if port.deaf_s else 0.0
             reached_s = max(since_s, self.booted_s + OPEN_S, deaf_s, port.rig.tty.changed_s)
             if charger.obeys and now_s - reached_s > reason.within_s:
-                self.find(charger.number, reason.name, f"current flows for {now_s - since_s:.2f} s, {self._state(charger)}")
+                self.find(
+                    charger.number, reason.name, f"current flows for {now_s - since_s:.2f} s, {self._state(charger)}"
+                )
             self._judge_named(charger, reason, since_s, now_s)
         self._judge_restless(charger, now_s)
 
@@ -347,7 +415,9 @@ class Judge:
         unnamed_s = now_s - max(since_s, self.booted_s + OPEN_S, charger.named_s)
         if unnamed_s > reason.within_s + VERIFY_S + MARGIN_S:
             self.find(
-                charger.number, "nobody is told", f"{reason.name}: it runs for {unnamed_s:.2f} s, {self._state(charger)}"
+                charger.number,
+                "nobody is told",
+                f"{reason.name}: it runs for {unnamed_s:.2f} s, {self._state(charger)}",
             )
 
     def _judge_mean(self, charger: Charger, now_s: float) -> None:
@@ -363,14 +433,20 @@ class Judge:
         mean_a, most_a = sum(one[1] for one in flown) / len(flown), max(one[2] for one in flown)
         if mean_a > most_a * 1.1 + 1.5 and charger.seen and charger.obeys and now_s - charger.deaf_s > MEAN_S:
             self.find(
-                charger.number, "more than ordered", f"{mean_a:.1f} A in the mean of {MEAN_S:g} s, {most_a:g} A were ordered"
+                charger.number,
+                "more than ordered",
+                f"{mean_a:.1f} A in the mean of {MEAN_S:g} s, {most_a:g} A were ordered",
             )
 
     def _state(self, charger: Charger) -> str:
+        shown = self._shown(charger)
+        return f"{shown['state']}: {shown['reason']}" if shown else "and no status tells of it"
+
+    def _shown(self, charger: Charger) -> Mapping[str, Any]:
+        """The bay in the newest status."""
         entry = self.entry(charger)
         bays = self.status["bays"] if self.status is not None else []
-        shown = next((bay for bay in bays if entry is not None and bay["name"] == entry.name), None)
-        return f"{shown['state']}: {shown['reason']}" if shown else "and no status tells of it"
+        return next((bay for bay in bays if entry is not None and bay["name"] == entry.name), {})
 
     # --- words --------------------------------------------------------------------------------------------------------
 
@@ -404,4 +480,6 @@ class Judge:
                     continue
                 lies = {*charger.rig.wire.lies, *charger.rig.wire.liars} & {Kind.OPERATION, Kind.CURRENT}
                 if charger.seen if name == "controller" else not lies:
-                    self.find(charger.number, "verified", f"{name} has ended with 0, and {charger.current_a:.1f} A flow")
+                    self.find(
+                        charger.number, "verified", f"{name} has ended with 0, and {charger.current_a:.1f} A flow"
+                    )

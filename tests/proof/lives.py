@@ -5,6 +5,7 @@ import signal
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -53,7 +54,7 @@ class Player:
         battery: dict[str, Any] = {"tpdo_s": 0.1} if script.tpdo else {}
         self.gateway = Gateway(
             [_nature(bay, number) for number, bay in enumerate(script.bays)],
-            [Entry(f"bay-{number + 1}", number, number) for number in range(len(script.bays))],
+            entries(script),
             seed=script.seed, end_s=script.end_s + 30.0, **battery,
         )  # fmt: skip
         self.time = self.gateway.time
@@ -84,6 +85,7 @@ class Player:
             self.judge.find(-1, "exception", f"{error!r} in {where and where.name}, {where and where.filename}")
         finally:
             self.gateway.close()
+        self.judge.ends()
         lived.wrong, lived.charged = self.judge.wrong, len(self._charged)
         lived.said = [f"{one.t_s - self.began_s:8.3f} {one.process}: {one.text}" for one in self.gateway.said]
         return lived
@@ -194,25 +196,25 @@ class Player:
         self.gateway.estop()
 
     def _edit(self, hazard: Hazard) -> None:
-        entries, at = self.gateway.entries, hazard.bay
-        usual = {number: Entry(f"bay-{number + 1}", number, number) for number in range(len(self.script.bays))}
+        now, at, usual = self.gateway.entries, hazard.bay, entries(self.script)
         if hazard.detail == "remove":
-            entries = [entry for entry in entries if entry.port != at]
+            now = [entry for entry in now if entry.port != at]
         elif hazard.detail == "restore":
-            entries = list(usual.values())
+            now = usual
         elif hazard.detail == "rename":
-            entries = [replace(one, name=f"{one.name}b") if one.port == at else one for one in entries]
-        elif hazard.detail == "rewire":  # the port is another one, and that bay's is this one's
-            entries = [replace(one, name=f"bay-{(one.port + 1) % 3 + 1}") for one in entries]
+            now = [replace(one, name=f"{one.name}b") if one.port == at else one for one in now]
+        elif hazard.detail == "rewire":  # every bay has another's name
+            now = [replace(one, name=f"bay-{(one.port + 1) % 3 + 1}") for one in now]
         elif hazard.detail == "swap":
             other = {at: (at + 1) % 3, (at + 1) % 3: at}
-            entries = [replace(one, port=other.get(one.port, one.port)) for one in entries]
-        self.gateway.entries = entries or list(usual.values())
+            now = [replace(one, port=other.get(one.port, one.port)) for one in now]
+        self.gateway.entries = now or usual
         self.gateway.write_station()
 
     def _ask(self, hazard: Hazard) -> None:
         names = [entry.name for entry in self.judge.life if hazard.bay in (-1, entry.port)]
-        self.gateway.ask({"verb": hazard.detail, "bays": names}, self.judge.answered)
+        asked = self.gateway.ask({"verb": hazard.detail, "bays": names}, self.judge.answered)
+        self.judge.asked(asked, names)
 
     # --- lines, devices -----------------------------------------------------------------------------------------------
 
@@ -220,6 +222,21 @@ class Player:
         for rig in self._rigs(hazard):
             rig.inject(lambda rig: FAULTS[hazard.detail].happen(rig, hazard.value))
             rig.frozen = rig.frozen or hazard.detail == "bmu_frozen"
+
+    def _comes(self, hazard: Hazard) -> None:
+        """detail: FIELD; for 2.75 s of every 3 s the BMU says so much more."""
+        for rig in self._rigs(hazard):
+            rig.bay.falsify[hazard.detail] = partial(self._more, hazard.value or 0.0)
+            rig.apart_v = (hazard.value or 0.0) if hazard.detail == "voltage_v" else 0.0
+
+    def _more(self, more: float, true: float) -> float:
+        return true + (more if self.time.now_s % 3.0 < 2.75 else 0.0)
+
+    def _loose(self, hazard: Hazard) -> None:
+        """A plug that has contact for `value` s, and then none for as long."""
+        for rig in self._rigs(hazard):
+            rig.bay.connected = not rig.bay.connected
+        self.time.call_later(hazard.value or 1.0, self._loose, hazard)
 
     def _heal(self, hazard: Hazard) -> None:
         for rig in self._rigs(hazard):
@@ -234,28 +251,20 @@ class Player:
             rig.wire.liars[Kind[name]] = lie
 
     def _bmu(self, hazard: Hazard) -> None:
-        field_, how, every = hazard.detail.split(":")
+        """detail: FIELD:is|frozen|more:EVERY (0: once)."""
+        name, how, every = hazard.detail.split(":")
         for rig in self._rigs(hazard):
             rig.catch_up()
-            frozen = getattr(rig.bay.readout(), field_)
-            value = hazard.value or 0.0
-            told: Callable[[Any], Any] = {
-                "is": lambda _: value,
-                "frozen": lambda _: frozen,
-                "more": lambda true: value if true is None else true + value,
-            }[how]
-            every_n = Lie(0, max(1, int(every)), inf if int(every) else 1)
-            rig.bay.falsify[field_] = lambda true, told=told, lie=every_n: told(true) if lie.is_told() else true
+            lie = Lie(0, max(1, int(every)), inf if int(every) else 1)
+            rig.bay.falsify[name] = _liar(lie, how, getattr(rig.bay.readout(), name), hazard.value or 0.0)
             rig.steady = int(every) == 1
 
     def _slow(self, hazard: Hazard) -> None:
         """detail: CALL:port|diskNAME:LASTS[:ERRNO]; value: seconds, FOR_EVER."""
         call, place, lasts, *error = hazard.detail.split(":")
         delay_s = inf if hazard.value == FOR_EVER else hazard.value or 0.0
-        if place == "port":
-            where = port_name(hazard.bay)
-        else:
-            where = f"{JOURNAL}/{place[4:]}" if place[4:] else JOURNAL
+        on_disk = f"{JOURNAL}/{place[4:]}" if place[4:] else JOURNAL
+        where = port_name(hazard.bay) if place == "port" else on_disk
         until_s = self.time.now_s + float(lasts)
         number = getattr(errno, error[0]) if error else 0
         self.gateway.kernel.calls.troubles.append(Trouble(call, where, until_s, delay_s, number))
@@ -296,17 +305,30 @@ class Player:
 
     # --- the bus ------------------------------------------------------------------------------------------------------
 
-    def _bus(self, hazard: Hazard) -> None:
+    def _tool(self, hazard: Hazard) -> None:
+        """What a CANopen tool or another device does on the bus, as everybody may."""
         node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
         {
-            "master": lambda: self._repeat(20, 0.1, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
-            "abort": lambda: bus.from_driver(0x600 + node, b"\x80\x00\x60\x00\x00\x00\x04\x05"),
-            "forged": lambda: bus.subscribe(0x600 + node, self, self._forge),
-            "fd": lambda: self._repeat(50, 0.02, lambda: bus.raw(_fd(0x580 + node))),
-            "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
+            "master": lambda: self._repeat(400, 0.013, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
+            "reads all": lambda: self._repeat(40, 0.03, lambda: bus.from_driver(0x600 + node, _read(0x1018))),
+            "abort": lambda: self._repeat(99, 0.03, lambda: bus.send(0x580 + node, ABORT)),
+            "fd": lambda: bus.subscribe(0x600 + node, self, self._answer_fd),
             "heartbeat": lambda: bus.from_driver(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
             "flood": lambda: self._repeat(400, 0.002, lambda: bus.send(0x123, bytes(8))),
         }[hazard.detail]()
+
+    def _bus(self, hazard: Hazard) -> None:
+        """What nobody may."""
+        node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
+        {
+            "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
+            "forged": lambda: bus.subscribe(0x600 + node, self, self._forge),
+        }[hazard.detail]()
+
+    def _answer_fd(self, cob_id: int, data: bytes) -> None:
+        """A frame of another kind of bus, which looks like an answer: 60.0 °C."""
+        if data[:3] == b"\x40\x04\x60":
+            self.gateway.bus.raw(_fd(cob_id - 0x80))
 
     def _forge(self, cob_id: int, data: bytes) -> None:
         """Somebody answers in the BMU's name, and is quicker: 20.0 °C."""
@@ -319,13 +341,36 @@ class Player:
             self.time.call_later(every_s, self._repeat, times - 1, every_s, act)
 
 
+def _liar(lie: Lie, how: str, frozen: Any, value: float) -> Callable[[Any], Any]:
+    """What the BMU says of a value: another one, the one of now, or so much more; None is said as it is."""
+
+    def told(true: Any) -> Any:
+        if not lie.is_told():
+            return true
+        if how == "more":
+            return true if true is None else true + value
+        return frozen if how == "frozen" else value
+
+    return told
+
+
 def _read(index: int) -> bytes:
     return b"\x40" + index.to_bytes(2, "little") + bytes(5)
 
 
 def _fd(cob_id: int) -> can.Message:
-    data = b"\x43\x04\x60\x00\xc8\x00\x00\x00" + bytes(56)
+    data = b"\x43\x04\x60\x00\x58\x02\x00\x00" + bytes(56)  # looks like 60.0 °C
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_fd=True)
+
+
+#: Somebody has tried to write the heartbeat's time as it may not be written.
+ABORT = b"\x80\x17\x10\x00\x02\x00\x01\x06"
+
+
+def entries(script: Script) -> list[Entry]:
+    """The station file as it is meant."""
+    policies = ["small.yaml" if bay.small else "li-ion-48v" for bay in script.bays]
+    return [Entry(f"bay-{number + 1}", number, number, policy=policy) for number, policy in enumerate(policies)]
 
 
 def _nature(bay: Any, number: int) -> Nature:

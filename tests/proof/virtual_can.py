@@ -12,9 +12,9 @@ import can
 from orchestrator.sim.can_noise import Bus, BusNoise
 from orchestrator.sim.can_wire import PERFECT
 from orchestrator.sim.timers import Handler
+from tests.proof.virtual_kernel import Calls
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
-from tests.proof.virtual_kernel import Calls
 
 #: One frame of 8 bytes at 250 kbit/s, stuff bits and pause included.
 FRAME_S = 0.0005
@@ -50,8 +50,12 @@ class BusWire:
         self._put(self._to_all, can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
 
     def raw(self, message: can.Message) -> None:
-        """Somebody sends a frame of another kind."""
-        self._time.call_at(self._slot(), self._to_all, message)
+        """Somebody sends a frame of a kind that the emulated nodes do not hear."""
+        self._time.call_at(self._slot(), self._to_drivers, message)
+
+    def _to_drivers(self, message: can.Message) -> None:
+        for driver in () if self.down or self.lost else self.drivers:
+            driver.deliver(message)
 
     def send_remote(self, cob_id: int) -> None:
         self._put(self._to_all, can.Message(arbitration_id=cob_id, is_remote_frame=True, is_extended_id=False))
@@ -74,7 +78,9 @@ class BusWire:
         if not (self.down or self.lost):
             if self.drivers and not message.is_error_frame and not message.is_remote_frame:
                 self.on_frame(message.arbitration_id, bytes(message.data))
-            self.drivers = [driver for driver in self.drivers if driver.process is None or driver.process.status is None]
+            self.drivers = [
+                driver for driver in self.drivers if driver.process is None or driver.process.status is None
+            ]
             self._to_nodes(message, None)
 
     def _to_nodes(self, message: can.Message, sender: "Driver | None") -> None:

@@ -7,8 +7,8 @@ nothing, everything, the first part, or any selection in any order, writes torn 
 
 import errno
 import os
+import posixpath
 import stat
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from random import Random
 from types import SimpleNamespace
@@ -90,7 +90,7 @@ class Disk:
         """fsync of a directory: the names in it."""
         left = []
         for change in self._pending:
-            if change.names and any(os.path.dirname(name) == path for name, _ in change.names):
+            if change.names and any(posixpath.dirname(name) == path for name, _ in change.names):
                 self._apply(change)
             else:
                 left.append(change)
@@ -119,7 +119,7 @@ class Disk:
         if path not in self.directories:
             raise fails(errno.ENOENT, path)
         below = (*self.names, *self.directories)
-        return sorted(os.path.basename(name) for name in below if os.path.dirname(name) == path)
+        return sorted(posixpath.basename(name) for name in below if posixpath.dirname(name) == path)
 
     def stat(self, path: str) -> SimpleNamespace:
         if path in self.directories:
@@ -133,7 +133,7 @@ class Disk:
         return _stat(stat.S_IFREG | 0o600, len(inode.data), inode.number)
 
     def _parent(self, path: str) -> None:
-        if os.path.dirname(path) not in self.directories:
+        if posixpath.dirname(path) not in self.directories:
             raise fails(errno.ENOENT, path)
 
     def _name(self, *names: tuple[str, Inode | None]) -> None:
@@ -147,14 +147,14 @@ class Disk:
         """The power fails; in a word what the file system had written by then (by chance, if not said)."""
         how = how or dice.choice(("nothing more", "everything", "the first part", "some of it", "some of it, torn"))
         pending = self._pending
-        chosen: Iterator[Change] = {
-            "nothing more": lambda: iter(()),
-            "everything": lambda: iter(pending),
-            "the first part": lambda: iter(pending[: dice.randint(0, len(pending))]),
-            "some of it": lambda: (change for change in pending if dice.random() < 0.5),
-            "some of it, torn": lambda: (_torn(change, dice) for change in pending if dice.random() < 0.7),
-        }[how]()
-        for change in list(chosen):
+        chosen: dict[str, list[Change]] = {
+            "nothing more": [],
+            "everything": pending,
+            "the first part": pending[: dice.randint(0, len(pending))],
+            "some of it": [change for change in pending if dice.random() < 0.5],
+            "some of it, torn": [_torn(change, dice) for change in pending if dice.random() < 0.7],
+        }
+        for change in chosen[how]:
             self._apply(change)
         self._pending = []
         self.names = {}

@@ -8,6 +8,7 @@ of what they do, its descriptors and its locks.
 import errno
 import fcntl
 import os
+import posixpath
 import select
 import termios
 from collections import deque
@@ -47,6 +48,11 @@ class Trouble:
 
     def meets(self, call: str, place: str, now_s: float) -> bool:
         return call == self.call and self.place in place and now_s < self.until_s and self.times > 0
+
+
+def real(name: str) -> Callable[..., Any]:
+    """The real kernel's, for what is none of ours."""
+    return getattr(os, name)  # type: ignore[no-any-return]
 
 
 class Calls:
@@ -223,8 +229,8 @@ class Kernel:
         self.calls("open", name)
         tty = self.ttys.get(name)
         if tty is None:
-            if name.count("/") == 2 and name not in self.disk.directories:
-                raise fails(errno.ENOENT, name)
+            if name.removeprefix(ROOT).isdigit():
+                raise fails(errno.ENOENT, name)  # an adapter that is not there
             return self._new(File(name, self.disk.open(name, flags), flags))
         if not tty.present:
             raise fails(errno.ENOENT, name)
@@ -320,35 +326,35 @@ class Kernel:
 
     def rename(self, old: Any, new: Any) -> None:
         if not self.is_ours(os.fspath(old)):
-            os.replace(old, new)
+            real("replace")(old, new)
             return
         self.calls("rename", os.fspath(new))
         self.disk.rename(os.fspath(old), os.fspath(new))
 
     def unlink(self, path: Any) -> None:
         if not self.is_ours(os.fspath(path)):
-            os.unlink(path)
+            real("unlink")(path)
             return
         self.calls("unlink", os.fspath(path))
         self.disk.unlink(os.fspath(path))
 
     def mkdir(self, path: Any, mode: int = 0o777) -> None:
         if not self.is_ours(os.fspath(path)):
-            os.mkdir(path, mode)
+            real("mkdir")(path, mode)
             return
         self.calls("mkdir", os.fspath(path))
         self.disk.mkdir(os.fspath(path))
 
-    def makedirs(self, path: Any, mode: int = 0o777, exist_ok: bool = False) -> None:  # noqa: FBT001, FBT002
+    def makedirs(self, path: Any, mode: int = 0o777, exist_ok: bool = False) -> None:
         name = os.fspath(path)
         if not self.is_ours(name):
-            os.makedirs(path, mode, exist_ok)
+            real("makedirs")(path, mode, exist_ok)
             return
         self.calls("mkdir", name)
         missing = []
         while name not in self.disk.directories:
             missing.append(name)
-            name = os.path.dirname(name)
+            name = posixpath.dirname(name)
         if not missing and not exist_ok:
             raise fails(errno.EEXIST, name)
         for directory in reversed(missing):
@@ -357,7 +363,7 @@ class Kernel:
     def listdir(self, path: Any = ".") -> list[str]:
         name = os.fspath(path)
         if not self.is_ours(name):
-            return os.listdir(path)
+            return list(real("listdir")(path))
         self.calls("open", name)
         return self.disk.listdir(name)
 

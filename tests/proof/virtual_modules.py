@@ -43,9 +43,8 @@ WALL_S = 1_700_000_000.0
 def modules() -> tuple[ModuleType, ...]:
     """All of them, imported."""
     found = [serial.serialposix]
-    for info in pkgutil.walk_packages(orchestrator.__path__, "orchestrator."):
-        if info.name.startswith(PARTS):
-            found.append(importlib.import_module(info.name))
+    names = (info.name for info in pkgutil.walk_packages(orchestrator.__path__, "orchestrator."))
+    found += [importlib.import_module(name) for name in names if name.startswith(PARTS)]
     return tuple(found)
 
 
@@ -102,24 +101,24 @@ def open_file(kernel: Kernel, path: Any, mode: str = "r", buffering: int = -1, e
     if buffering == 0:
         return raw
     buffered = io.BufferedReader(raw) if mode.startswith("r") else io.BufferedWriter(raw)
-    return buffered if "b" in mode else io.TextIOWrapper(buffered, encoding=encoding or "utf-8")  # type: ignore[type-var]
+    return buffered if "b" in mode else io.TextIOWrapper(buffered, encoding=encoding or "utf-8")
 
 
 def path_class(kernel: Kernel) -> type[pathlib.PosixPath]:
     """`pathlib.Path` on the virtual disk, for what is below its root."""
 
     class DiskPath(pathlib.PosixPath):
-        def open(self, mode: str = "r", buffering: int = -1, encoding: str | None = None, *_: Any, **__: Any) -> Any:  # type: ignore[override]
+        def open(self, mode: str = "r", buffering: int = -1, encoding: str | None = None, *_: Any, **__: Any) -> Any:
             return open_file(kernel, str(self), mode, buffering, encoding)
 
         def stat(self, *, follow_symlinks: bool = True) -> Any:
             return kernel.stat(str(self), follow_symlinks=follow_symlinks)
 
-        def mkdir(self, mode: int = 0o777, parents: bool = False, exist_ok: bool = False) -> None:  # noqa: FBT001, FBT002
+        def mkdir(self, mode: int = 0o777, parents: bool = False, exist_ok: bool = False) -> None:
             make = partial(kernel.makedirs, exist_ok=exist_ok) if parents or exist_ok else kernel.mkdir
             make(str(self), mode)
 
-        def unlink(self, missing_ok: bool = False) -> None:  # noqa: FBT001, FBT002
+        def unlink(self, missing_ok: bool = False) -> None:
             if not missing_ok or kernel.exists(str(self)):
                 kernel.unlink(str(self))
 
@@ -129,14 +128,14 @@ def path_class(kernel: Kernel) -> type[pathlib.PosixPath]:
 
         rename = replace
 
-        def iterdir(self) -> Iterator[Any]:
+        def iterdir(self) -> Any:
             return (self / name for name in kernel.listdir(str(self)))
 
         def glob(self, pattern: str) -> Iterator[Any]:  # type: ignore[override]
             if kernel.exists(str(self)):
                 yield from (path for path in self.iterdir() if path.match(pattern))
 
-        def resolve(self, strict: bool = False) -> Any:  # noqa: ARG002, FBT001, FBT002
+        def resolve(self, strict: bool = False) -> Any:
             return self
 
     return DiskPath
@@ -226,6 +225,6 @@ def exchange(stack: ExitStack, replaced: dict[Any, Any], also: dict[Any, Any]) -
 
 def _printer(fake_sys: Any) -> Callable[..., None]:
     def printer(*values: object, file: Any = None, **options: Any) -> None:
-        print(*values, file=fake_sys.stdout if file is None else file, **options)  # noqa: T201
+        print(*values, file=fake_sys.stdout if file is None else file, **options)
 
     return printer

@@ -14,7 +14,7 @@ from functools import partial
 from itertools import count
 from math import inf
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Self
 
 from tests.proof.virtual_kernel import BACKLOG, Death, File, Kernel, Poll, Socket
 from tests.proof.virtual_time import Runner, StuckError
@@ -23,7 +23,7 @@ PIDS = count(5000)
 KILLS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
-class Exit(BaseException):  # noqa: N818 - as SystemExit
+class Exit(BaseException):
     """`os._exit` and the like."""
 
 
@@ -216,13 +216,13 @@ class Link:
     def fileno(self) -> int:
         return self._fd
 
-    def set_inheritable(self, _flag: bool) -> None:  # noqa: FBT001 - its own
+    def set_inheritable(self, _flag: bool) -> None:
         """Only what is named on a command line is inherited here."""
 
     def settimeout(self, timeout_s: float | None) -> None:
         self._timeout_s = timeout_s
 
-    def setblocking(self, flag: bool) -> None:  # noqa: FBT001 - its own
+    def setblocking(self, flag: bool) -> None:
         self._timeout_s = None if flag else 0.0
 
     def close(self) -> None:
@@ -231,7 +231,7 @@ class Link:
     def detach(self) -> int:
         return self._fd
 
-    def __enter__(self) -> "Link":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -285,4 +285,3 @@ class Link:
         for fd in fds:
             self._kernel.close(fd)
         return data
-

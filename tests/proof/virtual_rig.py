@@ -105,6 +105,7 @@ class VirtualRig(Rig):
 
     wire: MemoryWire
     frozen = False  #: its BMU says what it once said, in all its words
+    apart_v = 0.0  #: so much more than the truth it says most of the time
     steady = False  #: its BMU tells the same lie in every answer
 
     def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:

@@ -49,10 +49,10 @@ from orchestrator.service.supervisor import Supervisor
 from orchestrator.sim.can_noise import Bus
 from orchestrator.sim.can_wire import PERFECT
 from tests.proof.virtual_can import BusWire, Driver
+from tests.proof.virtual_kernel import Kernel
 from tests.proof.virtual_rig import Nature, VirtualRig
 from tests.proof.virtual_threads import Event, SimpleQueue, Thread
 from tests.proof.virtual_time import Time
-from tests.proof.virtual_kernel import Kernel
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10

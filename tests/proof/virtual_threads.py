@@ -41,7 +41,7 @@ class Lock:
         self._depth = 0
         self._waiting = Waiting(time)
 
-    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as the real one
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
         me = self._time.me()
         end_s = inf if timeout < 0 else self._time.now_s + timeout
         while self._holder is not None and not (self._again and self._holder is me):
