@@ -5,7 +5,7 @@ with one ioctl, whatever library requested it. The guardian has duplicates of th
 when nobody may be left, requests the lines anew. Values are logical: the kernel knows which lines are active low.
 
 First the stop, then the contactor. A contactor that breaks a load wears out, and may weld when it is needed next; a
-charger that obeys is without current within the first round of stops (`laststop.ROUND_S`, half a second). So contactors
+charger that obeys is without current within the first round of stops (`lastline.ROUND_S`, half a second). So contactors
 open when that round is over: without load where the stop was obeyed, under load where nothing else is left. To wait for
 longer would only make the time longer in which a charger that nobody controls goes on.
 

@@ -43,7 +43,7 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("C25", "port gone, stolen or wrong", "reopened every second, and then stopped first"),
     Entry("C26", "line taken over: another program changed its settings",
           "checked each second, after a missed poll and before every stop, and set up again at once"),
-    Entry("C27", "port locked by a stranger", "`service/holder.py`: stopped past the lock; an alarm while it lasts"),
+    Entry("C27", "port locked by a stranger", "`link/holder.py`: stopped past the lock; an alarm while it lasts"),
     Entry("C28", "setting goes back by itself", "three returns in a minute, or 2 s of more than the commanded step"),
     Entry("C29", "current without an order", "in every state: standby counts only where the BMU sees none either"),
     Entry("C30", "runs again after it was verified",
