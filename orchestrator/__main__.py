@@ -6,8 +6,15 @@ import sys
 
 def main() -> int:
     """Run the verb of the command line and return the exit status."""
+    _import_from_no_working_directory()
     _fill_standard_streams()
-    arguments = sys.argv[1:]
+    try:
+        return _run(sys.argv[1:])
+    finally:
+        _flush()
+
+
+def _run(arguments: list[str]) -> int:
     if arguments[:1] == ["estop"]:
         from orchestrator.service.estop import main as estop
 
@@ -21,11 +28,46 @@ def main() -> int:
     return command_line(arguments)
 
 
+def _import_from_no_working_directory() -> None:
+    """A file there that is called as one of our libraries, say `serial.py`, must not be run, by no process of ours.
+
+    Python looks there first under `-m`, and for each empty name in PYTHONPATH. A checkout may be imported from.
+    """
+    home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - pathlib is a file, too
+    try:
+        here = os.getcwd()  # noqa: PTH109 - as above
+    except OSError:  # it was deleted: nothing can be there
+        here = ""
+    if here in (home, os.path.dirname(os.__file__)):  # noqa: PTH120 - as above; the latter is Python's own
+        return
+    sys.path[:] = [name for name in sys.path if name not in ("", ".", here)]
+    os.environ["PYTHONSAFEPATH"] = "1"
+    if names := os.environ.get("PYTHONPATH"):
+        os.environ["PYTHONPATH"] = os.pathsep.join(name for name in names.split(os.pathsep) if name not in ("", "."))
+
+
 def _fill_standard_streams() -> None:
-    """Give descriptors 0 to 2 to nothing where they are free: a serial port with one of them would get what we say."""
+    """Let nothing that we say be an error.
+
+    Descriptors 0 to 2 are given to nothing where they are free: a serial port with one of them would get what we say.
+    A terminal that has no °, → or Korean shows them escaped.
+    """
     while (fd := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(fd, True)  # noqa: FBT003 - it takes it no other way
     os.close(fd)
+    sys.stdout = sys.stdout or open(1, "w", closefd=False)  # noqa: SIM115 - None where it was closed
+    sys.stderr = sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115 - as above
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # they are text streams
+
+
+def _flush() -> None:
+    """What nobody takes any more, a pipe whose reader has left or a full disk, is dropped: no traceback at the end."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 if __name__ == "__main__":

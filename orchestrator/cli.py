@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from orchestrator import __version__
-from orchestrator.errors import ConfigError, HexError, OrchestratorError, UsageError
+from orchestrator.errors import ConfigError, HexError, NoServiceError, OrchestratorError, ServiceError, UsageError
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
 if TYPE_CHECKING:
@@ -26,6 +26,12 @@ REQUESTS = {
     "stop": "stop charging; only `start` begins again",
     "reset": "clear latched faults whose cause is gone; `start` then begins again",
 }
+
+
+#: Those that are done only when the charger was seen to stand by, and how long that is waited for: a charger that does
+#: not obey is uncontrollable after 3 s.
+STOPS = ("stop", "pause")
+STANDBY_S, LOOK_S = 4.0, 0.1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -43,6 +49,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 130
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:  # a full disk behind our output, as a rule
+        print(f"orchestrator: {error}", file=sys.stderr)
         return 1
 
 
@@ -118,20 +127,17 @@ NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
 def _add_socket(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--socket", help="the service's control socket (default: $ORCHESTRATOR_SOCKET)")
+    parser.add_argument(
+        "--socket",
+        help="the service's control socket (default: $ORCHESTRATOR_SOCKET, else that of station.yaml here, else of the "
+        "installed service)",
+    )
 
 
 def _kinds(text: str) -> tuple[int, int]:
     """Two masks in hexadecimal, as a status request has them; argparse makes a message of a ValueError."""
     first, second = bytes.fromhex(text.replace("0x", "").replace(",", " "))
     return first, second
-
-
-def _socket(arguments: argparse.Namespace) -> Path:
-    name = arguments.socket or os.environ.get("ORCHESTRATOR_SOCKET")
-    if not name:
-        raise UsageError("name the service's control socket with --socket PATH or $ORCHESTRATOR_SOCKET")
-    return Path(name)
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -142,8 +148,9 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def _status(arguments: argparse.Namespace) -> int:
     from orchestrator.service.control import ask
+    from orchestrator.service.where import find_socket
 
-    path = _socket(arguments)
+    path = find_socket(arguments.socket)
     while True:
         answer = ask(path, {"verb": "status", "bay": arguments.bay})
         answer.pop("ok")
@@ -154,29 +161,60 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
-    from orchestrator.show import table
+    from orchestrator.show import page
 
     if as_json:
         print(json.dumps(document, ensure_ascii=False), flush=True)
         return
-    journal = cast("dict[str, str]", document["journal"])
-    text = table(cast("list[dict[str, object]]", document["bays"]))
-    if journal["problem"]:
-        text += f"\nWARNING: {journal['problem']}"
+    text = page(document)
     print(f"\x1b[H\x1b[2J{document['station']}\n{text}" if clear else text, flush=True)
 
 
 def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.service.control import ask
+    from orchestrator.service.where import find_socket
 
     if bool(arguments.bay) == arguments.all:
         raise UsageError(f"{arguments.verb}: name bays, or --all")
-    bays = None if arguments.all else arguments.bay
-    answer = ask(_socket(arguments), {"verb": arguments.verb, "bays": bays})
-    results = cast("dict[str, str]", answer["results"])
-    for bay, refusal in results.items():
-        print(f"{bay}: {refusal or f'{arguments.verb} accepted'}", file=sys.stderr if refusal else sys.stdout)
-    return 1 if any(results.values()) else 0
+    bays, path = None if arguments.all else arguments.bay, find_socket(arguments.socket)
+    try:
+        results = cast("dict[str, str]", ask(path, {"verb": arguments.verb, "bays": bays})["results"])
+    except NoServiceError as error:
+        without = "; to stop chargers without a service: orchestrator estop" if arguments.verb in STOPS else ""
+        raise ServiceError(f"{error}{without}") from None
+    accepted = [bay for bay, refusal in results.items() if not refusal]
+    unverified, then = {}, ""
+    if arguments.verb in STOPS:
+        # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
+        looked_at = list(results) if arguments.verb == "stop" else accepted
+        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), "; stands by, verified"
+    for line in (*unverified.values(), *(f"{bay}: {refusal}" for bay, refusal in results.items() if refusal)):
+        print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
+    for bay in accepted:
+        print(f"{bay}: {arguments.verb} accepted{'' if bay in unverified else then}")
+    return 1 if unverified or any(results.values()) else 0
+
+
+def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[str, str]:
+    """Look at these bays until their chargers stand by; what to do about each that was not seen to in time.
+
+    `every`: and at chargers that are no bay's any more.
+    """
+    from orchestrator.service.control import ask
+    from orchestrator.show import is_alarming, stands_by, strays, what_to_do
+
+    end_s = time.monotonic() + STANDBY_S
+    while True:
+        try:
+            document = ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S))
+        except ServiceError as error:
+            return {name: f"{name}: NOT verified, run `orchestrator estop`: {error}" for name in names}
+        found = cast("list[dict[str, object]]", document["bays"])
+        bays = [bay for bay in found if bay["name"] in names and not stands_by(bay)]
+        others = strays(document) if every else []
+        if time.monotonic() >= end_s or (all(map(is_alarming, bays)) and not others):
+            return {str(bay["name"]): what_to_do(bay) for bay in bays} | {text: text for text in others}
+        time.sleep(LOOK_S)
 
 
 def _check(arguments: argparse.Namespace) -> int:

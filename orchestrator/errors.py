@@ -55,3 +55,7 @@ class RefusedError(OrchestratorError):
 
 class ServiceError(OrchestratorError):
     """The service cannot be reached or answered with an error."""
+
+
+class NoServiceError(ServiceError):
+    """The service cannot be reached: whatever is to be done must be done without it."""

@@ -1,48 +1,154 @@
-"""The status document as text for a terminal: one line a bay, and why."""
+"""The status document as text for a terminal: what to do first, then one line a bay, and why."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import cast
 
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
+#: The battery's values in the table, with their names for people.
+BATTERY = {"soc_pct": "SOC", "voltage_v": "pack voltage", "temperature_c": "temperature"}
+#: States in which a charger stands by, if it obeys.
+RESTING = frozenset({"IDLE", "FULL", "SUSPENDED", "TRIPPED"})
+#: Standby may show so much at the charger, and so much at the BMU.
+STANDBY_A, BMU_A = 0.5, 1.0
+
+Bay = Mapping[str, object]
 
 
-def table(bays: Sequence[Mapping[str, object]]) -> str:
-    """All bays, aligned; below each one its faults beyond the one that is the reason."""
+def page(document: Mapping[str, object]) -> str:
+    """The whole status: what to do, the bays, and what is wrong with the station itself."""
+    lines = [f"ALARM: {text}" for text in strays(document)]
+    lines.append(table(cast("Sequence[Bay]", document["bays"])))
+    problems = (
+        cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
+    )
+    return "\n".join([*lines, *(f"WARNING: {problem}" for problem in problems if problem)])
+
+
+def strays(document: Mapping[str, object]) -> list[str]:
+    """What to do about chargers that no bay has any more, and that nobody has seen to stand by."""
+    found = cast("Sequence[Mapping[str, object]]", document.get("strays", ()))
+    return [
+        f"CUT THE MAINS of the charger on {one['port']}, which was {one['bay']}'s: it may be running, nobody has "
+        f"seen that it stands by: {one['problem'] or one['state']}"
+        for one in found
+        if not one["verified"]
+    ]
+
+
+def table(bays: Sequence[Bay]) -> str:
+    """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
+    bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", not bay.get("alarm")))
     rows = [HEAD, *(_row(bay) for bay in bays)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
-    lines = []
+    lines = [f"ALARM: {what_to_do(bay)}" for bay in bays if is_alarming(bay)]
     for row, bay in zip(rows, [None, *bays], strict=True):
         cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
         lines.append("  ".join([*cells, row[-1]]).rstrip())
         if bay is not None:
-            lines.extend(f"  {fault['effect']}: {fault['text']}" for fault in other_faults(bay))
-            if cast("Mapping[str, object]", bay.get("policy", {})).get("waiting_sha256"):
-                lines.append("  POLICY: a changed one comes into force when this bay stands by")
+            lines.extend(f"  {line}" for line in _below(bay))
     return "\n".join(lines)
 
 
-def other_faults(bay: Mapping[str, object]) -> list[Mapping[str, object]]:
+def other_faults(bay: Bay) -> list[Mapping[str, object]]:
     """The faults that the reason does not tell already."""
     faults = cast("list[Mapping[str, object]]", bay["faults"])
     return [fault for fault in faults if str(fault["text"]) not in str(bay["reason"])]
 
 
-def _row(bay: Mapping[str, object]) -> tuple[str, ...]:
-    battery = cast("Mapping[str, object]", bay["battery"])
-    charger = cast("Mapping[str, object]", bay["charger"])
-    step, amps = bay["step"], bay.get("step_current_a")
+def is_alarming(bay: Bay) -> bool:
+    """Whether a charger may be running that nobody controls."""
+    return bool(bay.get("alarm")) or bay["state"] == "UNCONTROLLABLE"
+
+
+def stands_by(bay: Bay) -> bool:
+    """Whether the charger was verified to be stopped: by its own fresh word, and the BMU's where there is one."""
+    charger, battery = _part(bay, "charger"), _part(bay, "battery")
+    command = cast("Mapping[str, Mapping[str, object]]", bay["command"])
+    amps, pack_a = charger["current_a"], battery["current_a"]
+    sees = isinstance(pack_a, int | float) and "current_a" not in _old(bay)
+    return (
+        bay["state"] in RESTING
+        and not is_alarming(bay)
+        and command["order"]["action"] is None
+        and charger["online"] is True
+        and not charger.get("old")
+        and charger["operation"] == 0
+        and isinstance(amps, int | float)
+        and amps <= STANDBY_A
+        and not (sees and cast("float", pack_a) > BMU_A)
+    )
+
+
+def what_to_do(bay: Bay) -> str:
+    """About a charger that was not verified to stand by: first what to do, then why."""
+    why = f"{bay['state']}: {bay['reason']}"
+    if str(bay["reason"]).startswith("CUT THE MAINS"):
+        return f"{bay['name']}: {bay['reason']}"
+    whose = f"{bay['name']}'s charger ({bay.get('port', 'its port is not known')})"
+    if is_alarming(bay) or bay["state"] not in RESTING | {"OFFLINE"}:
+        return f"CUT THE MAINS of {whose}: {why}"
+    return f"LOOK at {whose}, nobody has seen that it stands by: {why}"
+
+
+def _below(bay: Bay) -> Iterator[str]:
+    yield from (f"{fault['effect']}: {fault['text']}" for fault in other_faults(bay))
+    if old := "; ".join(_old_values(bay)):
+        yield f"OLD: {old}"
+    if cast("Mapping[str, object]", bay.get("policy", {})).get("waiting_sha256"):
+        yield "POLICY: a changed one comes into force when this bay stands by"
+
+
+def _old_values(bay: Bay) -> Iterator[str]:
+    """What is shown although it may not be true any more, and since when; what else is known instead."""
+    charger, battery = _part(bay, "charger"), _part(bay, "battery")
+    if charger.get("old"):
+        text = f"the charger's {figure(charger['current_a'], '{:.2f} A')}, last heard {_age(charger['age_s'])} ago"
+        fresh = battery.get("current_a") is not None and "current_a" not in _old(bay)
+        yield f"{text}; the BMU sees {figure(battery['current_a'], '{:.1f} A')}" if fresh else text
+    by_age: dict[str, list[str]] = {}
+    ages_s = cast("Mapping[str, object]", battery.get("age_s", {}))
+    for name in (name for name in BATTERY if name in _old(bay)):
+        by_age.setdefault(_age(ages_s.get(name)), []).append(BATTERY[name])
+    yield from (f"{', '.join(names)}: last heard {age} ago" for age, names in by_age.items())
+
+
+def _old(bay: Bay) -> Sequence[str]:
+    return cast("Sequence[str]", _part(bay, "battery").get("old", ()))
+
+
+def _part(bay: Bay, name: str) -> Mapping[str, object]:
+    return cast("Mapping[str, object]", bay[name])
+
+
+def _row(bay: Bay) -> tuple[str, ...]:
+    battery, charger = _part(bay, "battery"), _part(bay, "charger")
+    old, step = _old(bay), bay["step"]
     return (
         str(bay["name"]),
         str(bay["state"]),
-        figure(battery["soc_pct"], "{:.0f} %"),
-        figure(battery["voltage_v"], "{:.2f} V"),
-        figure(charger["current_a"], "{:.2f} A"),
-        figure(battery["temperature_c"], "{:.1f} °C"),
-        "–" if step is None else f"{step} ({figure(amps, '{:g} A')})",
+        _marked(figure(battery["soc_pct"], "{:.0f} %"), old="soc_pct" in old),
+        _marked(figure(battery["voltage_v"], "{:.2f} V"), old="voltage_v" in old),
+        _marked(figure(charger["current_a"], "{:.2f} A"), old=bool(charger.get("old"))),
+        _marked(figure(battery["temperature_c"], "{:.1f} °C"), old="temperature_c" in old),
+        "–" if step is None else f"{step} ({figure(bay.get('step_current_a'), '{:g} A')})",
         str(bay["reason"]),
     )
+
+
+def _marked(text: str, *, old: bool) -> str:
+    return f"{text} (old)" if old else text
 
 
 def figure(value: object, form: str) -> str:
     """A number with its unit, a dash where there is none."""
     return form.format(value) if isinstance(value, int | float) else "–"
+
+
+def _age(age_s: object) -> str:
+    """In the unit that a person would use."""
+    if not isinstance(age_s, int | float):
+        return "long"
+    for unit, seconds in (("h", 3600), ("min", 60)):
+        if age_s >= 2 * seconds:
+            return f"{age_s / seconds:.0f} {unit}"
+    return f"{age_s:.0f} s"

@@ -68,11 +68,12 @@ def _value(hint: Any, key: Key) -> Schema:  # noqa: ANN401 - any type expression
         return _reference(REFERENCES[hint])
     if isinstance(hint, type) and issubclass(hint, Enum):
         return {"enum": [member.name.lower() for member in hint]}
-    return _scalar(hint, key) or _record(hint)
+    scalar = _scalar(hint, key)
+    return _record(hint) if scalar is None else scalar
 
 
-def _scalar(hint: object, key: Key) -> Schema:
-    """A number, a text …; empty for anything else."""
+def _scalar(hint: object, key: Key) -> Schema | None:
+    """A number, a text …; None for anything else."""
     bounds = {_BOUNDS[name]: bound for name in _BOUNDS if (bound := getattr(key, name)) is not None}
     scalars: dict[object, Schema] = {
         float: {"type": "number", **bounds},
@@ -80,9 +81,9 @@ def _scalar(hint: object, key: Key) -> Schema:
         bool: {"type": "boolean"},
         str: {"type": "string", "minLength": 1, **({"pattern": "/"} if key.is_path else {})},
         Path: {"type": "string", "minLength": 1},
-        object: {"type": ["string", "number", "boolean", "null"]},
+        object: {},  # anything, for a library that is handed it as it is
     }
-    return scalars.get(hint, {})
+    return scalars.get(hint)
 
 
 def _reference(kind: Kind) -> Schema:

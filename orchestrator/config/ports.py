@@ -1,4 +1,4 @@
-"""Ports, contactors and socket of a station, even of one whose file has mistakes: what an emergency stop needs."""
+"""Ports, contactors, socket and journal of a station, even of one whose file has mistakes: for an emergency stop."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -10,6 +10,7 @@ from orchestrator.config.yamltree import MAX_BYTES, Entries, Items, Node, Scalar
 _COMMENT = re.compile(rb"(?:^|(?<=\s))#.*", re.MULTILINE)
 _PORT = re.compile(rb"""(?:^|[\s{,])port:\s+["']?(/[^\s"',}#]+)""", re.MULTILINE)
 _SOCKET = re.compile(rb"""(?:^|[\s{,])socket:\s+["']?([^\s"',}#]+)""", re.MULTILINE)
+_DIRECTORY = re.compile(rb"""(?:^|[\s{,])directory:\s+["']?([^\s"',}#]+)""", re.MULTILINE)
 
 
 _LINE = re.compile(r"0x[0-9a-fA-F]{1,3}|[0-9]{1,4}")
@@ -19,7 +20,7 @@ _BOOLS = {"false": False, "true": True}
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """Every charger's port, in the file's order, with its bay's name; and the socket. "" is what cannot be told.
+    """Every charger's port, in the file's order, with its bay's name; socket and journal. "" is what cannot be told.
 
     Contactors are (chip, line, active low), only those whose keys leave no doubt: a guess might close one.
     """
@@ -27,6 +28,7 @@ class Wiring:
     ports: Mapping[str, str]
     socket: str
     contactors: tuple[tuple[str, int, bool], ...] = ()
+    journal: str = ""  #: the journal's directory
 
 
 def wiring(path: Path) -> Wiring:
@@ -42,14 +44,19 @@ def wiring(path: Path) -> Wiring:
     bare = _COMMENT.sub(b"", data)
     for match in _PORT.findall(bare):
         ports.setdefault(match.decode(errors="surrogateescape"), "")
-    socket = _text(_get(_get(node, "control"), "socket"))
-    if not socket and (found := _SOCKET.search(bare)):
-        socket = found[1].decode(errors="surrogateescape")
+    socket = _text(_get(_get(node, "control"), "socket")) or _found(_SOCKET, bare)
+    journal = _text(_get(_get(node, "journal"), "directory")) or _found(_DIRECTORY, bare)
     return Wiring(
         {_shown(path.parent / port): name for port, name in ports.items()},
         _shown(path.parent / socket) if socket else "",
         tuple((_shown(path.parent / chip), line, active_low) for chip, line, active_low in _contactors(node)),
+        _shown(path.parent / journal) if journal else "",
     )
+
+
+def _found(pattern: re.Pattern[bytes], data: bytes) -> str:
+    found = pattern.search(data)
+    return found[1].decode(errors="surrogateescape") if found else ""
 
 
 def _shown(path: Path) -> str:

@@ -75,6 +75,8 @@ class Reader:
                 value = self._value(node, hint, path, key)
         elif isinstance(node, Refused):
             value = INVALID
+        elif hint is object and not isinstance(node, Scalar):
+            value = self._as_it_is(node, path, key)
         elif hint is Range:
             value = self._range(node, path, key)
         elif isinstance(hint, type) and is_dataclass(hint) and hint not in self._references:
@@ -132,6 +134,16 @@ class Reader:
             return INVALID
         values = tuple(self._element(item, hint, f"{path}[{i}]", key) for i, item in enumerate(node.items))
         return INVALID if INVALID in values else values
+
+    def _as_it_is(self, node: Items | Entries, path: str, key: Key) -> object:
+        """A list or a mapping for a library that is handed it as it is, whatever is in it."""
+        if isinstance(node, Items):
+            items = [self._element(item, object, f"{path}[{i}]", key) for i, item in enumerate(node.items)]
+            return INVALID if INVALID in items else items
+        values = {
+            name.text: self._entry(name, value, object, f"{path}.{name.text}", key) for name, value in node.entries
+        }
+        return INVALID if INVALID in values.values() else values
 
     def _element(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
         self.marks[path] = node.mark

@@ -45,6 +45,8 @@ INTERFACES = (
     "virtual",
 )
 
+_SDO_ANSWERS = 0x580  #: + the node id
+
 Values = Mapping[str, object]
 
 
@@ -63,6 +65,7 @@ def station_problems(values: Values) -> Problems:
         for path, bay in bays.items():
             if (bus := bay.get("battery.can")) is not None and bus not in buses:
                 yield f"{path}.battery.can", f"the station has no CAN bus {bus!r}; {did_you_mean(str(bus), buses)}"
+        yield from _filters(buses, bays)
 
 
 def _bays(values: Values) -> dict[str, dict[str, object]]:
@@ -129,7 +132,7 @@ def _buses(buses: Mapping[str, Mapping[str, object]]) -> Problems:
     seen: dict[object, str] = {}
     for name, bus in buses.items():
         yield from ((f"can.{name}{at}", text) for at, text in _bus(bus))
-        first = seen.setdefault((bus.get("interface"), bus.get("channel")), name)
+        first = seen.setdefault(repr((bus.get("interface"), bus.get("channel"))), name)
         if first != name:
             yield f"can.{name}", f"is the same interface and channel as {first}: name each bus once"
 
@@ -145,6 +148,37 @@ def _bus(bus: Mapping[str, object]) -> Problems:
             yield "", "the key 'bitrate' is missing: the bus's bit/s (the BMU's document does not say it), e.g. 250000"
     elif not isinstance(bitrate, int) or not BITRATES[0] <= bitrate <= BITRATES[1]:
         yield ".bitrate", f"{bitrate!r} is no bit rate; in bit/s, {BITRATES[0]} … {BITRATES[1]}, e.g. 250000"
+
+
+def _filters(buses: Mapping[str, Mapping[str, object]], bays: Mapping[str, Values]) -> Problems:
+    """A filter of the station's own must let through what its BMUs say."""
+    for name, bus in buses.items():
+        if "can_filters" not in bus:
+            continue
+        at, passed = f"can.{name}.can_filters", _passed(bus["can_filters"])
+        if passed is None:
+            yield at, "needs a list of {can_id: 0x590, can_mask: 0x7FF}: the ids that are let through"
+            continue
+        for bay in bays.values():
+            node_id = bay.get("battery.node_id")
+            if bay.get("battery.can") == name and isinstance(node_id, int) and not passed(_SDO_ANSWERS + node_id):
+                yield at, f"keeps back 0x{_SDO_ANSWERS + node_id:X}, the answers of the BMU with node id {node_id}"
+
+
+def _passed(filters: object) -> Callable[[int], bool] | None:
+    """Which standard ids python-can's filters let through; None if they are not as it wants them."""
+    if not isinstance(filters, list) or not filters:
+        return None
+    pairs: list[tuple[int, int]] = []
+    for one in filters:
+        if not isinstance(one, Mapping) or set(one) - {"extended"} != {"can_id", "can_mask"}:
+            return None
+        can_id, mask = one["can_id"], one["can_mask"]
+        if not (isinstance(can_id, int) and isinstance(mask, int)):
+            return None
+        if one.get("extended") is not True:
+            pairs.append((can_id, mask))
+    return lambda cob_id: any((cob_id ^ can_id) & mask == 0 for can_id, mask in pairs)
 
 
 def _socket(socket: Path) -> Problems:

@@ -49,7 +49,7 @@ def follow_stop(f: Facts, before: State) -> None:
 def proved_to_last(f: Facts) -> bool:
     """The charger, which did not obey before, has stood by for long enough to be believed."""
     proof = f.memory.witnessed.proof
-    return f.stopped and f.now_s - proof[0] >= LASTS_S
+    return f.stopped and f.charger.online and f.now_s - proof[0] >= LASTS_S
 
 
 def gives_up(f: Facts) -> bool:

@@ -1,6 +1,6 @@
 """What the demo runs on: a directory, an emulated station in one process and the service in another."""
 
-import random
+import json
 import subprocess
 import sys
 import tempfile
@@ -16,7 +16,7 @@ from orchestrator.sim.client import PlantProcess
 STATION = """\
 station: demo
 can:
-  can0: {{interface: udp_multicast, channel: 239.74.163.2, port: {port}, hop_limit: 0}}   # nothing leaves this machine
+  can0: {{interface: serial, channel: {directory}/can0, bitrate: 250000, timeout: 0.01}}  # a pty: no network
 bays:
   - name: bay-1
     charger: {{port: {directory}/bay-1, control: manual, steps_a: [2.0, 5.0, 8.0, 11.0, 14.0]}}
@@ -38,20 +38,19 @@ class Stage:
 
     def __init__(self, *plant: str) -> None:
         self.directory = Path(tempfile.mkdtemp(prefix="orchestrator-demo-"))
-        port = random.randint(43200, 60000)  # noqa: S311 - so that two demos do not meet
         self.station = self.directory / "station.yaml"
-        self.station.write_text(STATION.format(port=port, directory=self.directory), encoding="utf-8")
+        self.station.write_text(STATION.format(directory=self.directory), encoding="utf-8")
         policy = (shipped_dir() / "configs" / "demo" / "policy.yaml").read_text(encoding="utf-8")
         (self.directory / "policy.yaml").write_text(policy, encoding="utf-8")
         self.log = self.directory / "service.log"
-        can = f'{{"interface": "udp_multicast", "channel": "239.74.163.2", "port": {port}, "hop_limit": 0}}'
+        can = json.dumps({"interface": "pty", "channel": str(self.directory / "can0")})
         self.plant = PlantProcess(self.directory, "--pack", "demo", "--soc", "-100", "--can", can, *plant)
         self.service = self._start()
 
     def _start(self) -> "subprocess.Popen[bytes]":
         with self.log.open("ab") as log:
             return subprocess.Popen(  # noqa: S603 - our own program, by our own interpreter
-                [sys.executable, "-m", "orchestrator", "run", self.station.name], stderr=log, cwd=self.directory
+                [sys.executable, "-P", "-m", "orchestrator", "run", self.station.name], stderr=log, cwd=self.directory
             )
 
     def restart(self) -> None:

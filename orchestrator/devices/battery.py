@@ -13,10 +13,12 @@ from orchestrator.devices.battery_view import BatteryView
 from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup, TimerWrite
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.emergency import emergency_cob_id, emergency_text
-from orchestrator.devices.node_health import NodeHealth
+from orchestrator.devices.node_health import NOT_OURS, NodeHealth
+from orchestrator.devices.other_masters import OtherMasters
 from orchestrator.devices.polled import Polled
 from orchestrator.devices.read_plan import ReadPlan
-from orchestrator.devices.sdo_client import SdoClient, Verdict
+from orchestrator.devices.sdo_client import Key, SdoClient, Verdict
+from orchestrator.devices.whose_answer import whose_answer
 from orchestrator.model import BatteryLink, BatteryReading
 from orchestrator.protocol.objects import TpdoEntry
 from orchestrator.protocol.sdo import (
@@ -35,10 +37,12 @@ from orchestrator.protocol.sdo import (
     request_cob_id,
     tpdo_cob_id,
 )
+from orchestrator.protocol.sdo_others import Ask
 
 Send = Callable[[int, bytes], None]
 
 ANSWER_LIMIT_S = 1.5  #: without a valid answer for so long the node is not online (DESIGN §6)
+TOGGLE = 0x80  #: bit of a node-guarding answer that alternates; a heartbeat has none
 SILENT_S = 0.5  #: pause between requests to a node that is not online: it shall not cost the others' time
 
 
@@ -59,6 +63,7 @@ class BatteryNode:
         self._client = SdoClient(config.sdo_timeout_s)
         self._setup = BmuSetup(config)
         self._health = NodeHealth()
+        self._others = OtherMasters()
         self._answer_s = -inf  # when the newest valid answer came
         self._not_before_s = -inf  # when a silent node may be asked again
         self._slot_s: float | None = None  # when the bus's budget lets the next request go out, if that is reserved
@@ -68,6 +73,7 @@ class BatteryNode:
     def _frame_handlers(self) -> dict[int, Callable[[bytes, float], None]]:
         handlers: dict[int, Callable[[bytes, float], None]] = {
             reply_cob_id(self.node_id): self._on_sdo,
+            request_cob_id(self.node_id): self._on_request,
             heartbeat_cob_id(self.node_id): self._on_heartbeat,
             emergency_cob_id(self.node_id): self._on_emergency,
         }
@@ -89,10 +95,17 @@ class BatteryNode:
     # --- what the bus calls -------------------------------------------------------------------------------------------
 
     def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
-        """A frame with one of `cob_ids` came."""
+        """A frame with one of `cob_ids` came, which is none that we sent."""
         self._health.frame(now_s)
         self._handlers[cob_id](data, now_s)
         self._publish()
+
+    def on_nmt(self, data: bytes, now_s: float) -> None:
+        """An NMT command came, which is none that we gave."""
+        if len(data) == 2 and data[1] in (0, self.node_id):
+            self._others.commanded(data[0], now_s, everybody=data[1] == 0)
+            self._say_others()
+            self._publish()
 
     def turn(self, now_s: float, send: Send) -> None:
         """Do what is due: give up what took too long, notice silence, send the next request by `send(cob_id, data)`."""
@@ -148,22 +161,28 @@ class BatteryNode:
         write = self._setup.next_write(now_s) if self._view.link.online else None
         if write is not None and self._client.may_ask(write.key):
             return self._request(write, now_s, send)
+        if self._setup.check_due and self._view.link.online and self._client.may_ask(HEARTBEAT):
+            return self._request(HEARTBEAT, now_s, send)
         chosen = self._plan.choose(now_s, self._client)
         return self._request(chosen, now_s, send) if isinstance(chosen, Polled) else chosen
 
-    def _request(self, what: TimerWrite | Polled, now_s: float, send: Send) -> float:
+    def _request(self, what: TimerWrite | Polled | Key, now_s: float, send: Send) -> float:
         if self._slot_s is None:
             self._slot_s = self._budget.reserve(now_s)
-        if now_s < self._slot_s:
-            return self._slot_s
+        begin_s = max(self._slot_s, self._others.wait_until_s(now_s))
+        if now_s < begin_s:
+            return begin_s
         self._slot_s = None
         if isinstance(what, Polled):
-            frame = read_request(*what.key)
+            key, frame = what.key, read_request(*what.key)
             self._plan.asked(what, now_s)
-        else:
-            frame = what.frame()
+        elif isinstance(what, TimerWrite):
+            key, frame = what.key, what.frame()
             self._setup.sent(now_s)
-        self._client.ask(what.key, now_s, write=isinstance(what, TimerWrite))
+        else:
+            key, frame = what, read_request(*what)
+            self._setup.checking(now_s)
+        self._client.ask(key, now_s, write=isinstance(what, TimerWrite))
         if not self._view.link.online:
             self._not_before_s = now_s + SILENT_S
         send(request_cob_id(self.node_id), frame)
@@ -171,28 +190,53 @@ class BatteryNode:
 
     # --- what frames say ----------------------------------------------------------------------------------------------
 
+    def _on_request(self, data: bytes, now_s: float) -> None:
+        """Somebody else asks the node."""
+        self._health.excuse()
+        request = self._others.asked(data, now_s)
+        if request is not None and request.ask in (Ask.WRITE, Ask.BLOCK_WRITE):
+            self._setup.touched((request.index, request.sub), request.timer_ms, now_s)
+        self._say_others()
+
+    def _say_others(self) -> None:
+        said, said_s = self._others.said, self._others.said_s
+        if said and said_s != self._view.link.other_master_t_s:
+            self._view.set(other_master=said)
+            self._view.set(other_master_t_s=said_s, news=False)
+
     def _on_sdo(self, data: bytes, now_s: float) -> None:
         self.next_due_s = now_s
-        reply = parse_reply(data)
-        verdict = self._client.take(reply, now_s)
+        asked, reply = self._client.pending, parse_reply(data)
+        verdict = whose_answer(reply, data, self._client, self._others, now_s)
         self._health.answer(verdict, reply.reason if isinstance(reply, SdoMalformed) else "")
         if verdict is Verdict.ACCEPTED and not isinstance(reply, SdoMalformed):
             self._accept(reply, now_s)
-        else:
+            return
+        if verdict not in NOT_OURS:
             self._view.dropped()
+        if verdict is Verdict.UNCLEAR and asked is not None:
+            self._plan.unanswered(asked, now_s)
+        if not isinstance(reply, SdoMalformed) and (polled := self._plan.get((reply.index, reply.sub))):
+            self._view.doubted(polled.answers.other(verdict, self._client.first, reply, now_s))
 
     def _accept(self, reply: SdoValue | SdoWritten | SdoAbort, now_s: float) -> None:
         self._answer_s = now_s
         self._not_before_s = -inf
         self._view.set(online=True, problem="")
+        if self._others.active:
+            self._others.ours_answered(self._client.asked_s)
         if self._client.writing:
             self._configured(now_s, written=isinstance(reply, SdoWritten))
+            return
+        if (reply.index, reply.sub) == HEARTBEAT:  # its period was read back
+            if isinstance(reply, SdoValue) and (found := self._setup.checked(reply.value)):
+                self._view.set(heartbeat_set=found, heartbeat_set_t_s=now_s)
             return
         polled = self._plan[reply.index, reply.sub]
         if isinstance(reply, SdoAbort):
             polled.abort = reply
         elif isinstance(reply, SdoValue):
-            self._view.measured(polled.from_sdo(reply.value, reply.size, self._client.asked_s))
+            self._view.measured(polled.from_sdo(reply, self._client.asked_s))
         if self._view.link.abort or polled.abort:
             abort = next((polled.abort for polled in self._plan.objects if polled.abort), None)
             self._view.set(abort=str(abort or ""), abort_code=abort.code if abort else 0)
@@ -203,26 +247,31 @@ class BatteryNode:
             return
         if not written:  # not every BMU allows it: then there is nothing to watch
             self._view.set(heartbeat_s=None, heartbeat_t_s=None)
-        elif self._view.link.heartbeat_s is None:  # else asking again would make a lost one look alive
+        elif self._view.link.heartbeat_s is None or self._setup.rearms():
             self._view.set(heartbeat_s=write.period_s, heartbeat_t_s=now_s)
 
     def _on_heartbeat(self, data: bytes, now_s: float) -> None:
-        if len(data) != 1:
+        if len(data) != 1 or data[0] == TOGGLE:
             self._view.dropped()
         elif data[0] == NmtState.BOOT_UP:
             self._booted(now_s)
         else:
-            self._setup.heard(data[0])
-            if self._setup.start_due:
+            state = data[0] & ~TOGGLE
+            self._setup.heard(state)
+            self._view.set(nmt_state=state)
+            if state == data[0]:  # else the answer to a master that guards the node, which is no heartbeat
+                if (before_s := self._view.link.heartbeat_t_s) is not None:
+                    self._setup.interval(now_s - before_s, now_s)
+                self._view.set(heartbeat_t_s=now_s, news=False)
+            if self._setup.start_due or self._setup.check_due:
                 self.next_due_s = now_s
-            self._view.set(nmt_state=data[0])
-            self._view.set(heartbeat_t_s=now_s, news=False)
 
     def _booted(self, now_s: float) -> None:
         """Nothing holds any more that was known, asked or configured before."""
         self._view.booted(now_s)
         self._client.clear()
-        self._setup.restart()
+        self._others.clear()
+        self._setup.booted()
         self._plan.restart(now_s)
         self._not_before_s = -inf
         self.next_due_s = now_s
@@ -236,7 +285,7 @@ class BatteryNode:
 
     def _on_tpdo(self, tpdo: TpdoEntry, data: bytes, now_s: float) -> None:
         objects = [self._plan[index, 0] for index in tpdo.objects]
-        if len(data) != sum(polled.entry.size for polled in objects):
+        if self._setup.tpdos_changed or len(data) != sum(polled.entry.size for polled in objects):
             self._view.dropped()
             return
         begin = 0

@@ -1,6 +1,6 @@
 """What is known of a BMU: replaced as a whole with every change, so that another thread can take it at any time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from orchestrator.devices.polled import Fields
@@ -39,6 +39,11 @@ class BatteryView:
             self.reading = replace(self.reading, **values)
         self.set(implausible=implausible)
 
+    def doubted(self, why: Mapping[str, str]) -> None:
+        """Values that were taken before are not to be believed any more, by field."""
+        if why:
+            self.set(implausible={**self.link.implausible, **why})
+
     def booted(self, now_s: float) -> None:
         """Nothing holds any more of what was known before."""
         old = self.link
@@ -50,6 +55,10 @@ class BatteryView:
             boot_t_s=now_s,
             nmt_state=int(NmtState.BOOT_UP),
             bad_frames=old.bad_frames,
+            other_master=old.other_master,  # who it was that restarted the node must not be forgotten with it
+            other_master_t_s=old.other_master_t_s,
+            heartbeat_set=old.heartbeat_set,
+            heartbeat_set_t_s=old.heartbeat_set_t_s,
         )
         self._news = True
 

@@ -14,7 +14,14 @@ HEARTBEAT: Key = (0x1017, 0)
 _TPDO_TIMER = 0x17FF  #: + the TPDO's number: 0x1800, 0x1801, 0x1802 (§2.5 has a misprint: 0x1082)
 _TPDO_TIMER_SUB = 5
 
-RETRY_S = 1.0  #: a write that was not answered is tried again after this
+CHECK_PERIODS = 3  #: so many missed: read back which period it has now, well before it counts as lost (core: 4.5)
+ODD = (0.6, 1.5)  #: times its period, an interval between two heartbeats is as it should be …
+MOST_ODD = 3  #: … and after so many in a row that are not, the period is read back, too
+
+#: What TPDO 1 … 4 carry, when and as which frame; only the timer's value does not change what a frame means.
+TPDO_SETTINGS = (*range(0x1800, 0x1804), *range(0x1A00, 0x1A04))
+
+RETRY_S = 1.0  #: a write that was not answered is tried again after this, and a period read back again
 LOST_PERIODS = 5  #: so many heartbeats missed by a node that still answers: it booted and we did not hear it
 
 
@@ -44,19 +51,33 @@ def timer_writes(config: BatteryConfig) -> tuple[TimerWrite, ...]:
 class BmuSetup:
     """What of it is still to be done."""
 
-    __slots__ = ("_all", "_any_tpdo", "_left", "_lost_s", "_retry_s", "start_due")
+    __slots__ = (
+        "_all", "_any_tpdo", "_check_s", "_heard", "_heartbeat_s", "_left", "_lost_s", "_odd", "_rearm", "_retry_s",
+        "check_due", "start_due", "tpdos_changed",
+    )  # fmt: skip
 
     def __init__(self, config: BatteryConfig) -> None:
         self._all = timer_writes(config)
-        self._lost_s = inf if config.heartbeat_s is None else LOST_PERIODS * config.heartbeat_s
+        self._heartbeat_s = inf if config.heartbeat_s is None else config.heartbeat_s
+        self._lost_s = LOST_PERIODS * self._heartbeat_s
+        self.booted()
+
+    def booted(self) -> None:
+        """The node booted, and has forgotten what others had set."""
+        #: Another master changed what the TPDOs carry, or where: they are not to be used until the node boots.
+        self.tpdos_changed = False
         self.restart()
 
     def restart(self) -> None:
-        """The node booted: everything again."""
+        """Write everything again."""
         self._left = list(self._all)
         self._retry_s = -inf
         self._any_tpdo = False
         self.start_due = False  #: an NMT start is to be sent, so that the TPDOs begin
+        self.check_due = False  #: the heartbeat's period is to be read back
+        self._check_s = -inf  # when that may be done again
+        self._odd = 0
+        self._heard = self._rearm = False
 
     def next_write(self, now_s: float) -> TimerWrite | None:
         """What to write next; None if nothing is left or it is too early to try again."""
@@ -79,8 +100,76 @@ class BmuSetup:
         lost, or somebody else's NMT command has stopped it."""
         self.start_due |= self._any_tpdo and not self._left and nmt_state != NmtState.OPERATIONAL
 
+    def interval(self, seconds: float, now_s: float) -> None:
+        """A heartbeat came, so long after the one before it."""
+        self._heard = True
+        low, high = ODD
+        self._odd = 0 if low <= seconds / self._heartbeat_s <= high else self._odd + 1
+        if self._odd >= MOST_ODD:
+            self._odd = 0
+            self._check(now_s)
+
     def watch(self, now_s: float, heartbeat_t_s: float) -> None:
-        """The node answers: if its heartbeats do not come, write everything again."""
-        if not self._left and now_s - heartbeat_t_s > self._lost_s and now_s >= self._retry_s:
+        """The node answers: if its heartbeats do not come, look which period it has, and at last write all again."""
+        age_s = now_s - heartbeat_t_s
+        if age_s >= CHECK_PERIODS * self._heartbeat_s:
+            self._check(now_s)
+        if not self._left and age_s > self._lost_s and now_s >= self._retry_s:
             self.restart()
             self._retry_s = now_s + RETRY_S
+
+    def touched(self, key: Key, period_ms: int | None, now_s: float) -> None:
+        """Somebody else writes an object, which may be a timer of ours or change what the TPDOs carry."""
+        index, sub = key
+        if index in TPDO_SETTINGS and sub != _TPDO_TIMER_SUB:
+            self.tpdos_changed = True
+        mine = next((write for write in self._all if write.key == key), None)
+        if mine is None or period_ms == round(mine.period_s * 1000) or mine in self._left:
+            return
+        if key == HEARTBEAT:
+            self._check_s = -inf
+            self._check(now_s)
+        else:
+            self._left.append(mine)
+            self._retry_s = max(self._retry_s, now_s + RETRY_S)
+
+    def checking(self, now_s: float) -> None:
+        """The heartbeat's period is asked for."""
+        self.check_due, self._check_s = False, now_s + RETRY_S
+
+    def checked(self, period_ms: int) -> str:
+        """What it is. "" if it is ours; else in words what was found, and ours will be written again.
+
+        None at all may also come from a restart that nobody heard: then everything is written again.
+        """
+        if period_ms == round(self._heartbeat_s * 1000):
+            return ""
+        heard = self._heard
+        if period_ms == 0:
+            self.restart()
+            self._rearm = heard
+            return (
+                f"the BMU's heartbeat was off: another master did that, or a restart that nobody heard; {self._again}"
+            )
+        if HEARTBEAT not in [write.key for write in self._left]:
+            self._left.insert(0, self._all[0])
+        self._retry_s, self._rearm = -inf, heard
+        return f"another master had set the BMU's heartbeat to {period_ms / 1000:g} s; {self._again}"
+
+    def rearms(self) -> bool:
+        """Whether a heartbeat that was just written is waited for from now on, as from the first time.
+
+        Only when another period was found, and once until a heartbeat comes: else asking again for one that is lost
+        would make it look alive.
+        """
+        rearm, self._rearm = self._rearm, False
+        self._heard = self._heard and not rearm
+        return rearm
+
+    @property
+    def _again(self) -> str:
+        return f"it is set to {self._heartbeat_s:g} s again"
+
+    def _check(self, now_s: float) -> None:
+        if now_s >= self._check_s and not self._left:
+            self.check_due = True

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.errors import LinkError
-from orchestrator.protocol.sdo import NmtCommand
+from orchestrator.protocol.sdo import NMT_COB_ID, NmtCommand
 
 REOPEN_S = 1.0  #: pause before a bus that failed is opened again
 TICK_S = 0.1  #: longest wait for a frame: so soon an NMT command goes out and `close()` is noticed
@@ -23,7 +23,7 @@ class CanPort(Protocol):
     trouble: str
 
     def subscribe(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
-        """Have the frames with this id handed on."""
+        """Have the frames with this id handed on, but those that we sent ourselves."""
 
     def open(self) -> None:
         """LinkError if it does not work."""
@@ -56,6 +56,7 @@ class BatteryBus:
         for node in self._nodes:
             for cob_id in node.cob_ids:
                 port.subscribe(cob_id, partial(self._on_frame, node))
+        port.subscribe(NMT_COB_ID, self._on_nmt)
 
     def start(self) -> None:
         """Begin to read. Failing to open the bus is shown in every node's link, not raised."""
@@ -118,6 +119,13 @@ class BatteryBus:
             node.on_frame(cob_id, data, self._clock())
         except Exception as error:  # noqa: BLE001 - as above
             self._node_failed(node, error)
+
+    def _on_nmt(self, _cob_id: int, data: bytes) -> None:
+        for node in self._nodes:
+            try:
+                node.on_nmt(data, self._clock())
+            except Exception as error:  # noqa: BLE001 - as above
+                self._node_failed(node, error)
 
     def _node_failed(self, node: BatteryNode, error: Exception) -> None:
         self._show(node, f"BMU 0x{node.node_id:02X} on {self._port.name}: internal error: {error!r}")

@@ -4,6 +4,7 @@ Theory of operation. One thread owns the port. The control loop leaves it a stan
 grant); the thread repeats the order until the control loop, seeing the read-back, leaves another. `Schedule` says whose
 turn it is, `Dialogue` what an answer is, the interlock what may go out. A stop wakes the thread at once. Whatever
 breaks, the thread lives on: it reopens the port, then once a second, and begins with a stop, without being told.
+What another program has set the port to is set right before a stop needs it.
 """
 
 from collections.abc import Callable
@@ -36,6 +37,8 @@ REOPEN_S = 1.0
 LET_GO_S = 0.1
 #: Longer than a whole stop takes: operation 0 follows one slot behind rest 0.
 CLOSE_S = 1.0
+#: The line's settings and its lock are looked at this often, and besides before each stop and after each miss.
+LOOK_S = 1.0
 #: More reads than this find no end of old input: then somebody is sending without a pause.
 MAX_STALE_READS = 16
 
@@ -48,6 +51,12 @@ class Line(Protocol):
 
     def read(self, timeout_s: float, expected: int = 0) -> bytes:
         """What came in, as soon as `expected` bytes had their time on the wire; b"" after the time-out."""
+
+    def restore(self) -> str:
+        """Set the port up again if another program has changed it; what was found, "" where all was well."""
+
+    def locked_by(self) -> str:
+        """Which program holds the port's lock instead of us, "" where it is ours."""
 
     def close(self) -> None:
         """Give the port back."""
@@ -79,6 +88,7 @@ class ChargerPort:
         self._quality = LineQuality()
         self._open_at_s = 0.0
         self._turn_s = 0.0
+        self._look_s = 0.0
         self._view: tuple[ChargerReading | None, ChargerLink] = (
             None,
             ChargerLink(problem=f"{config.port}: not opened yet"),
@@ -172,13 +182,33 @@ class ChargerPort:
 
     def _write(self, line: Line, frame: bytes, order: Command, turn: Turn, *, whole_stop: bool = False) -> None:
         start_s = self._clock()
+        found = self._restored(line) if order == STOP else ""
         line.write(frame)
         end_s = self._clock()
         self._took(turn, start_s, end_s)
+        self._found(found)
         stop_sent_s = end_s if whole_stop else self._view[1].stop_sent_s
         self._publish(sent=Sent(order, end_s), stop_sent_s=stop_sent_s, refused="")
 
+    def _restored(self, line: Line) -> str:
+        """What had to be set right. That this fails must not keep a stop from the line."""
+        with suppress(LinkError):
+            return line.restore()
+        return ""
+
+    def _found(self, taken_over: str) -> None:
+        if taken_over:
+            self._publish(taken_over=taken_over, taken_over_t_s=self._clock())
+
+    def _look(self, line: Line) -> None:
+        """What others do to the port shows here, once a second."""
+        self._look_s = self._clock() + LOOK_S
+        self._found(self._restored(line))
+        self._publish(locked_by=line.locked_by())
+
     def _poll(self, line: Line, refused: str = "") -> None:
+        if self._clock() >= self._look_s:
+            self._look(line)
         dialogue = self._dialogue
         for _ in range(MAX_STALE_READS):
             stale = line.read(0.0)
@@ -195,6 +225,8 @@ class ChargerPort:
             reading = dialogue.hear(data, now_s)
         if reading is None:
             reading = dialogue.give_up(now_s)
+        if reading is None:
+            self._found(self._restored(line))
         self._took(Turn.POLL, asked_s, now_s)
         self._polled(reading, refused)
 
@@ -236,7 +268,7 @@ class ChargerPort:
     def _open(self, now_s: float) -> None:
         self._open_at_s = now_s + REOPEN_S
         self._line = self._open_line()
-        self._dialogue = Dialogue()
+        self._dialogue, self._look_s = Dialogue(), now_s
         self._restart()
         self._publish(misses=0, problem=f"{self._config.port}: open, no answer yet", bad_frames=0)
 
@@ -246,14 +278,15 @@ class ChargerPort:
 
     def _broken(self, error: Exception) -> None:
         """A port that failed is closed and opened again. After anything else the charger is stopped and polled on."""
+        locked_by = self._view[1].locked_by
         if isinstance(error, LinkError):
-            problem = str(error)
+            problem, locked_by = str(error), ""
             self._drop_line()
         else:
             problem = f"internal: {type(error).__name__}: {error}"
             self._restart()
         with suppress(Exception):  # it may be `on_change` itself that fails
-            self._publish(online=False, problem=problem)
+            self._publish(online=False, problem=problem, locked_by=locked_by)
 
     def _drop_line(self) -> None:
         line, self._line = self._line, None

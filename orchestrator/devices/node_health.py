@@ -8,6 +8,10 @@ BABBLE_HZ = 500  #: frames a second; a node that is read as fast as allowed send
 _STRAY, _CLEAN, _DOUBLED, _MOST = 2, 1, 6, 8
 
 
+#: Answers that another master explains.
+NOT_OURS = (Verdict.THEIRS, Verdict.FRAGMENT, Verdict.UNCLEAR)
+
+
 class NodeHealth:
     """Counts what is odd about a node."""
 
@@ -30,10 +34,17 @@ class NodeHealth:
             self._babbling = self._frames > BABBLE_HZ * elapsed_s
             self._frames, self._window_s = 0, now_s
 
+    def excuse(self) -> None:
+        """That frame was another master's, or an answer to it: as many as that one likes are no babble."""
+        self._frames -= 1
+
     def answer(self, verdict: Verdict, reason: str = "") -> None:
         """An SDO answer came; `reason` says what is wrong with a malformed one."""
+        if verdict in NOT_OURS:
+            self.excuse()
+            return
         self._last, self._reason = verdict, reason
-        if verdict is Verdict.STRAY:
+        if verdict in (Verdict.STRAY, Verdict.SECOND):
             self._strays = min(_MOST, self._strays + _STRAY)
         elif verdict is Verdict.ACCEPTED:
             self._strays = max(0, self._strays - _CLEAN)
@@ -43,7 +54,7 @@ class NodeHealth:
     def problem(self) -> str:
         """Why its answers must not be relied upon, although it answers; "" if nothing is odd."""
         if self._doubled:
-            return "requests are answered twice: two BMUs have this node id, or another master reads it, too"
+            return "requests are answered twice: two BMUs have this node id, or something else answers for this one"
         if self._babbling:
             return f"it sends more than {BABBLE_HZ} frames a second"
         return ""

@@ -4,23 +4,26 @@ from collections.abc import Mapping
 from math import inf
 
 from orchestrator.devices.sdo_client import Key
+from orchestrator.devices.two_answers import TwoAnswers
 from orchestrator.model import Measurement
 from orchestrator.protocol.objects import ObjectEntry
-from orchestrator.protocol.sdo import SdoAbort
+from orchestrator.protocol.sdo import SdoAbort, SdoValue
 from orchestrator.protocol.words import Decoded, decode_word
 
 Fields = Mapping[str, Decoded]
 
 #: SDO and TPDO are two samples of one quantity, up to a second apart: they may differ by this share of its range …
 TOLERANCE = 0.05
-#: … and have to differ more in so many SDO reads in a row, a second apart, before neither is believed.
+#: … and have to differ more in so many SDO reads, a second apart, before neither is believed …
 CONFLICTS = 2
+#: … of which each that agrees takes this much away: a sender that lies every other time is found out as well.
+AGREED = 0.25
 
 
 class Polled:
     """An object's schedule and its newest word."""
 
-    __slots__ = ("_differed", "_tpdo_fields", "abort", "conflict", "due_s", "entry", "key", "tpdo_t_s")
+    __slots__ = ("_differed", "_tpdo_fields", "abort", "answers", "conflict", "due_s", "entry", "key", "tpdo_t_s")
 
     def __init__(self, entry: ObjectEntry) -> None:
         self.entry = entry
@@ -33,25 +36,32 @@ class Polled:
         self.abort: SdoAbort | None = None  #: set while the node refuses to have it read
         self.tpdo_t_s = -inf  #: when a TPDO brought it last
         self.conflict: dict[str, Decoded] = {}  #: fields of which SDO and TPDO tell different stories
+        self.answers = TwoAnswers(self.entry)
         self._tpdo_fields: Fields = {}
-        self._differed = 0
+        self._differed = 0.0
 
     def from_tpdo(self, word: int, now_s: float) -> Fields:
         """The fields, from the object's word in a TPDO that came at `now_s`."""
         fields = decode_word(self.entry, word, self.entry.size, now_s)
         self.tpdo_t_s, self._tpdo_fields = now_s, fields
-        return fields | self.conflict
+        return self._doubted(fields, now_s)
 
-    def from_sdo(self, word: int, size: int, asked_s: float) -> Fields:
+    def from_sdo(self, reply: SdoValue, asked_s: float) -> Fields:
         """The fields, from an SDO answer to the request of `asked_s`. Where TPDOs bring them, too, both must agree."""
         self.abort = None
-        fields = decode_word(self.entry, word, size, asked_s)
+        self.answers.took(reply, asked_s)
+        fields = decode_word(self.entry, reply.value, reply.size, asked_s)
         if self._tpdo_fields:
             different = self._different(fields)
-            self._differed = self._differed + 1 if different else 0
+            self._differed = min(CONFLICTS, self._differed + 1) if different else max(0.0, self._differed - AGREED)
             self.conflict = different if self._differed >= CONFLICTS else {}
             self._tpdo_fields = {}
-        return fields | self.conflict
+        return self._doubted(fields, asked_s)
+
+    def _doubted(self, fields: Fields, now_s: float) -> Fields:
+        """The fields, with the reasons not to believe some of them."""
+        doubts = self.answers.doubts(now_s)
+        return {**fields, **self.conflict, **doubts} if self.conflict or doubts else fields
 
     def _different(self, fields: Fields) -> dict[str, Decoded]:
         different: dict[str, Decoded] = {}

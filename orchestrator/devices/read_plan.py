@@ -26,6 +26,10 @@ class ReadPlan:
     def __getitem__(self, key: Key) -> Polled:
         return self._by_key[key]
 
+    def get(self, key: Key) -> Polled | None:
+        """The object with this key, if it is one that is read."""
+        return self._by_key.get(key)
+
     def restart(self, now_s: float) -> None:
         """The node booted: everything is due, nothing that it said before counts."""
         for polled in self.objects:

@@ -15,9 +15,9 @@ from socket import socket
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import LinkError, RefusedError
-from orchestrator.link import can_text
+from orchestrator.link import can_filter, can_text
 from orchestrator.link.can_gate import refusal
-from orchestrator.protocol.sdo import NMT_COB_ID, NmtCommand, nmt_frame
+from orchestrator.protocol.sdo import FRAME_BYTES, NMT_COB_ID, NmtCommand, nmt_frame
 
 if TYPE_CHECKING:
     import can
@@ -31,6 +31,10 @@ DEFAULT_BITRATE = 1_000_000
 SEND_TIMEOUT_S = 0.02
 #: So many unreadable frames in a row are no noise any more: build the bus anew.
 MAX_GARBAGE = 16
+#: Our own frames that an interface may still have to bring back.
+MAX_ECHO = 256
+#: Interfaces that always bring back what we send ourselves, and do not mark it; others do where they are told to.
+ECHOING = frozenset({"udp_multicast"})
 
 #: What we add where the station file is silent, by interface.
 PROTECTIVE: Mapping[str, Mapping[str, object]] = {
@@ -46,19 +50,30 @@ class CanBus:
 
     `settings` go to python-can as they are, nothing is taken from the environment or from python-can's own
     configuration files. `nodes` are the node ids that may be written to at all (`link/can_gate.py`); `pages`: their
-    older protocol may be asked, too.
+    older protocol may be asked, too. `filtered`: nothing is wanted but what is subscribed to; without, `nodes_seen`
+    tells of all.
     """
 
     def __init__(
-        self, name: str, settings: Mapping[str, object], nodes: Collection[int], *, pages: bool = False
+        self,
+        name: str,
+        settings: Mapping[str, object],
+        nodes: Collection[int],
+        *,
+        pages: bool = False,
+        filtered: bool = True,
     ) -> None:
         self.name = name
         self.trouble = ""  #: error-passive, bus-off, nobody acknowledges: in words; "" once a frame comes again
-        self.foreign = 0  #: frames that are none of ours
+        self.foreign = 0  #: frames that are none of ours, or not CANopen's: remote, extended, CAN FD
         self.garbage = 0  #: what the driver could not read
         self._settings = {**PROTECTIVE.get(str(settings.get("interface")), {}), **settings}
         self._nodes = frozenset(nodes)
         self._pages = pages
+        self._scans = not filtered
+        self._filtered = filtered and "can_filters" not in settings
+        self._echoes = settings.get("interface") in ECHOING or bool(settings.get("receive_own_messages"))
+        self._echo: deque[tuple[int, bytes]] = deque(maxlen=MAX_ECHO)  # what we sent and did not hear yet
         self._callbacks: dict[int, FrameCallback] = {}
         self._orders: deque[tuple[int, NmtCommand]] = deque()
         self._garbage_run = 0
@@ -73,7 +88,7 @@ class CanBus:
 
     @property
     def nodes_seen(self) -> tuple[int, ...]:
-        """The node ids of all that was heard since the bus was opened, ours or not."""
+        """The node ids of all that was heard since the bus was opened, ours or not; of a filtered bus only ours."""
         return () if self._network is None else tuple(self._network.scanner.nodes)
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
@@ -85,12 +100,15 @@ class CanBus:
         try:
             self._bus = _open_bus(self._settings)
             self._network = _new_network(self._bus, self.send)
+            if self._filtered and self._callbacks and self._settings.get("interface") == "socketcan":
+                self._bus.set_filters(can_filter.filters(self._callbacks))
         except Exception as error:
             self.close()
             raise self._failed(error) from error
         for cob_id, callback in self._callbacks.items():
             self._network.subscribe(cob_id, _without_time(callback))
         self._garbage_run = 0
+        self._echo.clear()
 
     def close(self) -> None:
         """Shut the bus down. Never raises: a bus that broke cannot be closed in any better way."""
@@ -118,6 +136,8 @@ class CanBus:
             raise LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
         try:
             self._bus.send(_new_message(cob_id, data), SEND_TIMEOUT_S)
+            if self._echoes:
+                self._echo.append((cob_id, data))
         except Exception as error:
             if not _is_queue_full(error):
                 raise self._failed(error) from error
@@ -147,10 +167,29 @@ class CanBus:
             self._error_frame(message)
             return
         self.trouble = ""
-        if message.arbitration_id not in self._callbacks:
+        wanted = message.arbitration_id in self._callbacks
+        odd = message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES
+        if odd or not wanted:
             self.foreign += 1
-        if not (message.is_extended_id or message.is_remote_frame):
+            if odd or not self._scans:
+                return
+        if not self._is_own(message):
             network.notify(message.arbitration_id, message.data, message.timestamp)
+
+    def _is_own(self, message: "can.Message") -> bool:
+        """Our own frame has come back. Echoes come in the order of sending: those before it are lost.
+
+        A frame just like it by somebody else is told from it by their number only, unless the driver marks echoes.
+        """
+        if not message.is_rx:
+            self._echoes = False
+            self._echo.clear()
+            return True
+        if not self._echo or (frame := (message.arbitration_id, bytes(message.data))) not in self._echo:
+            return False
+        while self._echo.popleft() != frame:
+            pass
+        return True
 
     def _error_frame(self, message: "can.Message") -> None:
         said = can_text.error_frame(message.arbitration_id, bytes(message.data))
@@ -191,6 +230,10 @@ def _open_bus(settings: Mapping[str, Any]) -> "can.BusABC":
 
     # What they would log, we say in a LinkError, once.
     logging.getLogger("can").setLevel(logging.CRITICAL)
+    timing = settings.get("timing")
+    if isinstance(timing, Mapping):
+        kind = can.BitTimingFd if "nom_brp" in timing else can.BitTiming
+        settings = {**settings, "timing": kind(**timing)}
     return can.Bus(ignore_config=True, **settings)
 
 

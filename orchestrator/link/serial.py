@@ -2,9 +2,13 @@
 
 pyserial is used for what it does well: opening, locking and setting up the port. Around it stand the answers to its
 traps: waiting is done with poll(), since its own write spins on a full line and its timeouts reconfigure the port.
+
+The port is not ours alone. Whoever has it open may set it to something else (`settings.py`), or have locked it before
+us: a lock of another orchestrator is respected, any other one must not keep a stop from the charger.
 """
 
 import errno
+import fcntl
 import os
 import select
 import termios
@@ -15,6 +19,8 @@ import serial
 from serial.rs485 import RS485Settings
 
 from orchestrator.errors import LinkError
+from orchestrator.link import settings
+from orchestrator.link.holder import holder
 
 BAUD = 19200  #: 8 data bits, no parity, 1 stop bit, no flow control (protocol 2/2, §2.2.2)
 BYTE_S = 10 / BAUD  #: start bit, 8 data bits, stop bit: 0.52 ms
@@ -29,7 +35,13 @@ _GONE = "the adapter was unplugged or lost its power, or another program reads t
 _BUSY = "in use: another program holds it, or two bays name the same port; close the other one (lsof shows it)"
 _FORBIDDEN = "permission denied: add the user that runs this to the group dialout, then log in again"
 _NO_PORT = "it is no serial port: check the name in the station file (ls -l /dev/serial/by-path)"
+_STUBBORN = f"its driver does not take the charger's settings, {BAUD} baud 8N1; use another adapter"
+_ESSENTIAL = ("baud", "data bits", "parity")  #: else no charger understands a word
 _STALLED = f"stalled, it took nothing for {WRITE_TIMEOUT_S:g} s; unplug the adapter and plug it in again"
+_TAKEN = (
+    "another program has opened it for itself alone (TIOCEXCL), so that nobody else can stop this charger: end that "
+    "program{who}, or cut the charger's mains"
+)
 _FULL = "too many open files: raise the limit of the service (LimitNOFILE)"
 
 #: What a person has to know and do, by what the kernel says.
@@ -38,7 +50,7 @@ _SENTENCES = {
     errno.EACCES: _FORBIDDEN,
     errno.EPERM: _FORBIDDEN,
     errno.EAGAIN: _BUSY,  # its lock (flock) is taken
-    errno.EBUSY: _BUSY,
+    errno.EBUSY: _TAKEN,
     errno.EIO: _GONE,
     errno.ENXIO: _GONE,
     errno.ENODEV: _GONE,
@@ -53,28 +65,35 @@ _SENTENCES = {
 class SerialLine:
     """One open serial port, used by one thread. Every method but `close` raises LinkError once the port fails."""
 
-    def __init__(self, port: serial.Serial) -> None:
-        self._port = port
+    def __init__(self, port: serial.Serial, *, locked: bool = True) -> None:
+        self._port, self._path = port, str(port.port)
         self._fd: int = port.fileno()
+        self._locked = locked
         self._readable = select.poll()
         self._readable.register(self._fd, select.POLLIN)
         self._writable = select.poll()
         self._writable.register(self._fd, select.POLLOUT)
+        self._tolerated = ""
+        self.restore()  # pyserial does not set all of it; output may be suspended, say
+        self._tolerated = self.restore()  # what the driver does not take is nobody else's doing
+        if any(word in self._tolerated for word in _ESSENTIAL):
+            raise LinkError(f"{self._path}: {_STUBBORN} ({self._tolerated})")
 
     @classmethod
     def open(cls, path: str, *, kernel_rs485: bool = False) -> Self:
         """Open `path` for us alone, and forget what came in before.
 
-        `kernel_rs485`: let the serial driver switch the line's direction (RTS high while sending). Not needed for
-        adapters that switch by themselves. LinkError says what is wrong and what to do.
+        Where a stranger has locked it, it is opened all the same: `locked_by` says so. `kernel_rs485`: let the serial
+        driver switch the line's direction (RTS high while sending). Not needed for adapters that switch by themselves.
+        LinkError says what is wrong and what to do.
         """
-        port = serial.Serial(None, baudrate=BAUD, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
-        # exclusive is a flock: it keeps a second service out, yet not a stop tool. TIOCEXCL would, so it is not set.
-        port.port = path
+        locked = True
         try:
-            port.open()
-        except _FAILURES as error:
-            raise LinkError(f"{path}: {_sentence(error, otherwise='cannot be opened')}") from error
+            port = _open(path, exclusive=True)
+        except LinkError as error:
+            if error.__cause__ is None or _number(error.__cause__) != errno.EAGAIN or holder(path).ours:
+                raise
+            locked, port = False, _open(path, exclusive=None)
         if kernel_rs485:
             try:
                 port.rs485_mode = RS485Settings()
@@ -84,7 +103,32 @@ class SerialLine:
                     f"{path}: its driver cannot switch the direction of an RS-485 line (rs485: kernel); "
                     "use an adapter that switches by itself, with rs485: off"
                 ) from error
-        return cls(port)
+        try:
+            return cls(port, locked=locked)
+        except LinkError:
+            port.close()
+            raise
+
+    def restore(self) -> str:
+        """Set the port up again if another program has changed it; what was found, in words, "" where all was well."""
+        try:
+            return settings.restore(self._port.fileno(), self._tolerated)
+        except _FAILURES as error:
+            raise self._failed(error) from error
+
+    def locked_by(self) -> str:
+        """Which program holds the port's lock instead of us, "" once it is ours: it is asked for again each time."""
+        try:
+            fd = self._port.fileno()
+            settings.share(fd)
+            if not self._locked:
+                fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._locked = True
+        except BlockingIOError:
+            return str(holder(self._path, (os.getpid(), os.getppid())))
+        except _FAILURES as error:
+            raise self._failed(error) from error
+        return ""
 
     def write(self, data: bytes) -> None:
         """Hand `data` to the port; it is on the wire `BYTE_S` a byte later. LinkError if the line takes nothing."""
@@ -95,7 +139,7 @@ class SerialLine:
                 raise serial.SerialTimeoutException
         except (serial.SerialTimeoutException, BlockingIOError) as error:
             self._forget_output()
-            raise LinkError(f"{self._port.port}: {_STALLED}") from error
+            raise LinkError(f"{self._path}: {_STALLED}") from error
         except _FAILURES as error:
             raise self._failed(error) from error
 
@@ -141,15 +185,44 @@ class SerialLine:
             return  # then there is no port left that could send it
 
     def _failed(self, error: Exception) -> LinkError:
-        return LinkError(f"{self._port.port}: {_sentence(error, otherwise=_GONE)}")
+        return LinkError(f"{self._path}: {_sentence(error, self._path, otherwise=_GONE)}")
 
 
-def _sentence(error: BaseException, *, otherwise: str) -> str:
-    """The words for an error, by its errno: often pyserial keeps that only in the error's cause or first argument."""
+def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
+    """`exclusive`: with a flock, taken before anything else: it keeps a second service out, yet not a stop tool.
+
+    TIOCEXCL would, so it is not set. None: without a lock.
+    """
+    port = serial.Serial(None, baudrate=BAUD, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=exclusive)
+    port.port = path
+    try:
+        port.open()
+    except _FAILURES as error:
+        raise LinkError(f"{path}: {_sentence(error, path, otherwise='cannot be opened')}") from error
+    return port
+
+
+def _sentence(error: BaseException, path: str, *, otherwise: str) -> str:
+    """The words for an error, by its errno."""
+    number = _number(error)
+    if number is None:
+        return f"{otherwise} ({error})"
+    sentence = _SENTENCES.get(number) or f"{otherwise} ({os.strerror(number)})"
+    return sentence.format(who=_who(path)) if "{who}" in sentence else sentence
+
+
+def _who(path: str) -> str:
+    """ " gpsd (pid 812)", "" where that cannot be told."""
+    found = holder(path, (os.getpid(),))
+    return f" {found}" if found.pid else ""
+
+
+def _number(error: BaseException) -> int | None:
+    """An error's errno: often pyserial keeps that only in the error's cause or first argument."""
     cause: BaseException | None = error
     while cause is not None:
         number = getattr(cause, "errno", None) or (cause.args[0] if cause.args else None)
         if isinstance(number, int):
-            return _SENTENCES.get(number) or f"{otherwise} ({os.strerror(number)})"
+            return number
         cause = cause.__context__
-    return f"{otherwise} ({error})"
+    return None

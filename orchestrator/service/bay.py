@@ -1,14 +1,18 @@
 """One bay in the running service: its devices' newest views in, one decision out, carried out and written down."""
 
 import traceback
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from threading import Event
-from time import time
+from itertools import takewhile
+from math import inf
+from threading import Lock
+from time import monotonic, time
 from typing import Protocol
 
 from orchestrator.config.station import Bay
+from orchestrator.core.failed import carry_on
 from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.interlock import Grant, grant
@@ -25,11 +29,14 @@ from orchestrator.model import (
     Snapshot,
     State,
 )
+from orchestrator.service.asked import Answers, Asked
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
-from orchestrator.service.kept import Kept
+from orchestrator.service.past import Place
 from orchestrator.service.records import SnapshotRecorder, decision_lines
+from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status
+from orchestrator.service.store import Store
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
@@ -56,15 +63,6 @@ class Battery(Protocol):
         """The newest values and how the bus is doing."""
 
 
-class Asked:
-    """An operator's request on its way through the control loop; `answer` is set when `done` is."""
-
-    def __init__(self, request: Request) -> None:
-        self.request = request
-        self.answer = ""
-        self.done = Event()
-
-
 class BayRunner:
     """Runs `step()` for one bay. Used by the control loop's thread only, but for `ask` and `status`."""
 
@@ -74,27 +72,32 @@ class BayRunner:
         charger: Charger,
         battery: Battery,
         journal: Journal,
-        memory: Memory,
+        store: Store,
+        say: Callable[[str], None],
         *,
         contactor: Contactor | None = None,
+        starts: Starts | None = None,
         snapshots: bool = True,
     ) -> None:
-        self.name = bay.name
+        self.name, self.place = bay.name, Place.of(bay)
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
         self._rules = Rules.of(bay)
-        self._memory = memory
-        self._kept: Kept | None = None
+        self._store, self._say, self._answers = store, say, Answers(store)
+        self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
+        self._revision = 0  # the one that keeps this bay's memory
         self._ending = ""
         self._waits = ""  # why the next run has to wait for an operator
         self._offered: Bay | None = None  # with a policy that is not in force yet
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
+        self._starts = starts or Starts(0.0, "")  # nobody to wait for
         self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
         self._snapshot = Snapshot()
         self._recorder = SnapshotRecorder(bay) if snapshots else None
         self._asked: list[Asked] = []
+        self._asking = Lock()
         self._internal = ""
 
     @property
@@ -102,6 +105,15 @@ class BayRunner:
         """The charger stands by, by its own word, and nothing is ordered."""
         decision = self.decision
         return decision is not None and decision.state in VERIFIED and decision.command is None
+
+    @property
+    def owes(self) -> bool:
+        """Somebody waits for an answer."""
+        return bool(self._asked or self._answers.waiting)
+
+    def answer(self) -> None:
+        """At the end of the service: nobody can wait any longer for an answer."""
+        self._answers.look(inf)
 
     def end(self, why: str, *, orderly: bool = True) -> None:
         """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it.
@@ -133,43 +145,66 @@ class BayRunner:
             self._write_down_contactor(self._contactor)
 
     def ask(self, asked: Asked) -> None:
-        """Hand in an operator's request; it is answered by the next step."""
-        self._asked.append(asked)
+        """Hand in an operator's request; it is answered by the next step.
+
+        A stop waits for nothing: what was asked before it and is not done yet is refused.
+        """
+        with self._asking:
+            if asked.request is Request.STOP:
+                for early in (one for one in self._asked if one.request is not Request.STOP):
+                    early.answer = "a stop came meanwhile: ask again if it is still wanted"
+                    early.done.set()
+                self._asked = [one for one in self._asked if one.request is Request.STOP]
+            self._asked.append(asked)
+
+    def _take_asked(self) -> list[Asked]:
+        """The request whose turn it is, as often as it was made in a row: one step answers all of them."""
+        with self._asking:
+            taken = list(takewhile(lambda one: one.request is self._asked[0].request, self._asked))
+            del self._asked[: len(taken)]
+            return taken
 
     def run(self, now_s: float, asleep_s: float = 0.0) -> None:
         """Take one step. An exception of our own code stops the bay and is told to the next step.
 
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
-        asked = self._asked.pop(0) if self._asked else None
+        asked = self._take_asked()
         try:
-            self._step(now_s, asleep_s, asked.request if asked else None)
+            self._step(now_s, asleep_s, asked[0].request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
             self._charger.order(STOP)
-            self._drive(now_s, closed=False)
-            self._failed(error, now_s)
-            if asked:
-                asked.answer = f"internal error: {self._internal}"
-        if asked:
-            asked.answer = asked.answer or (self.decision.answer if self.decision else "")
-            asked.done.set()
+            self._failed(error, now_s, asked[0].request if asked else None)
+            self._drive(now_s, closed=self.decision is not None and self.decision.closed)
+        for one in asked:
+            self._answers.give(one, self.decision.answer if self.decision else "", self._revision, now_s)
+        self._answers.look(now_s)
 
-    def _failed(self, error: Exception, now_s: float) -> None:
+    def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:
+        """Go on from a memory that knows since when the bay is being stopped; where even that fails, from none."""
         where = traceback.extract_tb(error.__traceback__)[-1]
         internal = f"{error!r} in {where.name}, line {where.lineno}"
         if internal != self._internal:
-            self._journal.say(f"{self.name}: internal error, stopping: {internal}")
+            self._say(f"{self.name}: internal error, stopping: {internal}")
         self._internal, self.last_s = internal, now_s
-        self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
+        try:
+            snapshot, memory = replace(self._snapshot, request=request), self._memory
+            memory = memory or self._store.past(self.place).memory(now_s)
+            self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)
+            self._keep(self._memory, now_s)
+        except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
+            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         self._take_over()
-        snapshot = self._look(now_s, asleep_s, request)
-        before, memory = self.decision, self._memory
+        snapshot = self._snapshot = self._look(now_s, asleep_s, request)
+        before = self.decision
+        memory = self._memory or self._store.past(self.place).memory(now_s)
         decision, self._memory = step(now_s, snapshot, memory, self._rules)
         self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
         self._drive(now_s, closed=decision.closed)
-        self.decision, self._snapshot, self._internal, self.last_s = decision, snapshot, "", now_s
+        self._starts.follow(self.name, now_s, self._memory, snapshot)
+        self.decision, self._internal, self.last_s = decision, "", now_s
         lines = list(decision_lines(before, decision)) if before is None or decision != before else []
         if self._recorder is not None:
             recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
@@ -178,8 +213,8 @@ class BayRunner:
             self._journal.put(self.name, line)
         if before is None or before.state is not decision.state:
             came_from = f"{before.state} → " if before else ""
-            self._journal.say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
-        self._keep()
+            self._say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
+        self._keep(self._memory, now_s)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """All that is known of the bay now."""
@@ -197,8 +232,11 @@ class BayRunner:
             self._internal,
             late_s=late_s if late_s > TICK_S else 0.0,  # less is how such a machine lives
             slept_s=slept_s if slept_s > TICK_S else 0.0,
-            unkept=self._journal.unkept,
+            unkept=self._store.unkept(now_s),
             ending=self._ending,
+            waits=self._starts.waits(self.name, now_s),
+            moves=self._starts.moves(self.name),
+            running_kept=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
         )
         if self._contactor is not None:
             connected, problem = self._contactor.connects(reading), self._contactor.problem
@@ -224,27 +262,25 @@ class BayRunner:
         self._offered, self._rules = None, Rules.of(bay)
         if self._recorder is not None:
             self._recorder.begin(bay)
-        self._journal.say(f"{self.name}: {_shown(bay)} is in force")
+        self._say(f"{self.name}: {_shown(bay)} is in force")
 
-    def _keep(self) -> None:
-        kept = Kept.of(self._memory)
-        if self._ending and self._kept is not None:  # as it was before
-            kept = replace(kept, hold=self._waits or self._kept.hold)
-        if kept != self._kept:
-            self._kept = kept
-            self._journal.keep(self.name, kept)
+    def _keep(self, memory: Memory, now_s: float) -> None:
+        persisted = Persisted.of(memory, now_s)
+        if self._waits and not persisted.hold:
+            persisted = replace(persisted, hold=self._waits)
+        self._revision = self._store.put(self.place, persisted)
 
     def status(self) -> dict[str, object]:
         """The bay's part of the status document."""
         decision = self.decision
         if decision is None:
             decision = Decision(State.STARTING, "the service has just started")
-        status = bay_status(self.name, self._snapshot, decision, self.last_s, time())
+        status = bay_status(self.name, self._snapshot, decision, monotonic(), time())
         bay, offered, contactor = self._rules.bay, self._offered, self._contactor
         return {
             **status,
             "contactor": contactor and {"closed": contactor.closed_s is not None, "problem": contactor.problem},
-            "port": str(Path(bay.charger.port).absolute()),
+            "port": self.place.port,
             "policy": {
                 "name": bay.policy.policy,
                 "file": bay.policy.source.file,

@@ -1,12 +1,15 @@
-"""The control socket: who may ask, how, and what is answered. One JSON object a line, in and out.
+"""The control socket: who may ask, and how. One JSON object a line, in and out.
 
-Only the owner of the service (and root) can open the socket, a request is bounded in size and time, and clients are
-served one after another, so that no number of them can hold the bays up: the control loop never waits for a client.
+Only the owner of the service (and root) can open the socket. One thread serves all clients at once and waits for none:
+each has its time, its bytes and its place, and whoever is slow is slow alone. Stops go first (`reception.py`). After
+each turn the thread rests, so that no number of clients takes more of the processor than its share; the control loop
+never waits for a client.
 """
 
 import errno
 import json
 import os
+import selectors
 import socket
 import struct
 import threading
@@ -14,39 +17,49 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import inf
 from pathlib import Path
-from time import sleep
+from time import monotonic, sleep, thread_time
 
-from orchestrator.errors import OrchestratorError, ServiceError
+from orchestrator.errors import NoServiceError, OrchestratorError, ServiceError
+from orchestrator.service.client import Client, parse_request
+from orchestrator.service.reception import Handler, Reception, encode, refusal
+from orchestrator.service.socketfile import identity, listen, owner, remove
 
-#: The longest request, and how long a client may take to send one, and then to take its answer.
-MAX_REQUEST = 4096
-CLIENT_S = 1.0
-#: So many clients may wait for their turn; one more is turned away by the kernel.
-WAITING = 128
-#: Reading, asking every bay and answering take at most this; longer means that the thread hangs.
+#: So many clients are served at once; for one more the longest idle one goes.
+MAX_CLIENTS = 256
+#: So many are taken in in one turn.
+TURN_CLIENTS = 64
+#: After each turn the thread rests for so many times the processor time that the turn took, up to this.
+REST, REST_S = 4.0, 0.05
+#: How often the bays' answers, the clients' time, and the socket's name are looked at.
+POLL_S, TICK_S, NAME_S = 0.002, 0.1, 2.0
+#: A turn that takes longer than this hangs.
 STALL_S = 30.0
 #: What accept() says of a listener that was closed; after anything else it is worth another try, a little later.
 CLOSED = (errno.EINVAL, errno.EBADF)
 RETRY_S = 0.1
-#: After each client, so that no number of them takes more of the processor than fifty a second can.
-PAUSE_S = 0.02
-#: Strangers are counted, and said this often at most.
+#: Strangers are counted, and troubles said, this often at most.
 SAY_S = 60.0
-
-Answer = Mapping[str, object]
-Handler = Callable[[Mapping[str, object]], Answer]
+#: More than any service says.
+MAX_ANSWER = 32 * 1024 * 1024
 
 
 class ControlSocket:
-    """Listens on a Unix socket and answers each request with `handler`; its OrchestratorErrors become answers, too."""
+    """Listens on a Unix socket and answers each request by `handler` (`Reception`)."""
 
     def __init__(
         self, path: Path, handler: Handler, clock: Callable[[], float], say: Callable[[str], None] = lambda _: None
     ) -> None:
-        self._path, self._handler, self._clock, self._say = path, handler, clock, say
+        self._path, self._clock, self._say = path, clock, say
         self._strangers, self._said_s = 0, -inf  # turned away since that was said last
-        self._client_s: float | None = None  # since when a client is being served
-        self._listener = _listen(path)
+        self._turn_s: float | None = None  # since when a turn lasts
+        self._closing = False
+        self._clients: set[Client] = set()
+        self._handler = handler
+        self._reception = Reception(handler, self._reply)
+        self._accept_s = -inf  # nobody is taken in before
+        self._selector = selectors.DefaultSelector()
+        self._listener = listen(path)
+        self._identity, self._name_s, self._lost = identity(path), clock(), ""
         self._thread = threading.Thread(target=self._run, name="control", daemon=True)
 
     def start(self) -> None:
@@ -54,148 +67,225 @@ class ControlSocket:
         self._thread.start()
 
     def stalled(self, now_s: float) -> bool:
-        """True when nobody answers any more, or one client has been served for far too long."""
-        began_s = self._client_s
+        """True when nobody answers any more, or one turn has taken far too long."""
+        began_s = self._turn_s
         return not self._thread.is_alive() or (began_s is not None and now_s - began_s > STALL_S)
 
     def close(self) -> None:
         """Stop listening and take the socket's name away."""
+        self._closing = True
+        remove(self._path, self._identity)
         with suppress(OSError):
-            self._listener.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
-        self._path.unlink(missing_ok=True)
+            self._listener.shutdown(socket.SHUT_RDWR)  # which wakes the thread; it closes the rest
+        if not self._thread.is_alive():
+            self._listener.close()
 
     def _run(self) -> None:
-        while True:
-            try:
-                client, _ = self._listener.accept()
-            except OSError as error:
-                if error.errno in CLOSED:
-                    return
-                sleep(RETRY_S)  # this client has left already, or there are too many open files
-                continue
-            self._client_s = self._clock()
-            with client, suppress(OSError):
-                answer = _line(self._answer(client))
-                client.settimeout(CLIENT_S)
-                client.sendall(answer)
-            self._client_s = None
-            sleep(PAUSE_S)
-
-    def _answer(self, client: socket.socket) -> Answer:
         try:
-            self._check_peer(client)
-            line = _read_line(client, self._clock)
-            return {"ok": True, **self._handler(parse_request(line))}
-        except OrchestratorError as error:
-            return {"ok": False, "error": str(error)}
-        except Exception as error:  # noqa: BLE001 - a request must never end the thread that answers them
-            return {"ok": False, "error": f"internal: {error!r}"}
+            while not self._closing:
+                self._listen_again(self._clock())
+                ready = self._selector.select(self._patience_s)
+                self._turn_s, began_s = self._clock(), thread_time()
+                try:
+                    self._turn([key.fileobj for key, _ in ready], self._turn_s)
+                except Exception as error:  # noqa: BLE001 - a defect here must not keep the next one from stopping a bay
+                    self._begin_anew(error)
+                self._turn_s = None
+                sleep(min(REST * (thread_time() - began_s), REST_S))
+        finally:
+            for client in tuple(self._clients):
+                self._drop(client)
+            self._listener.close()
+            self._selector.close()
 
-    def _check_peer(self, client: socket.socket) -> None:
-        pid, uid, _ = peer(client)
+    def _begin_anew(self, error: Exception) -> None:
+        """Without those who were here when it happened."""
+        self._complain(f"internal error, its clients are sent away: {error!r}")
+        for client in tuple(self._clients):
+            self._drop(client)
+        self._reception = Reception(self._handler, self._reply)
+
+    @property
+    def _patience_s(self) -> float:
+        """How long nothing may happen until the next turn."""
+        if self._reception.busy:
+            return POLL_S
+        return TICK_S if self._clients or self._accept_s > -inf else NAME_S
+
+    def _turn(self, ready: list[object], now_s: float) -> None:
+        """Hear everybody, then act."""
+        if self._listener in ready:
+            self._accept(now_s)
+        for client in ready:
+            if isinstance(client, Client) and client in self._clients:
+                self._serve(client, now_s)
+        self._reception.work(now_s)
+        for client in [client for client in self._clients if now_s > client.end_s]:
+            self._drop(client)
+        if now_s - self._name_s >= NAME_S:
+            self._name_s = now_s
+            self._look_for_name()
+
+    # --- clients come and go ---
+
+    def _listen_again(self, now_s: float) -> None:
+        if now_s >= self._accept_s and self._listener not in self._selector.get_map():
+            self._accept_s = -inf
+            self._selector.register(self._listener, selectors.EVENT_READ)
+
+    def _accept(self, now_s: float) -> None:
+        for _ in range(TURN_CLIENTS):
+            if len(self._clients) >= MAX_CLIENTS and not self._make_room():
+                self._pause_accepting(now_s)  # all of them have asked for a stop, and are being answered
+                return
+            try:
+                connection, _ = self._listener.accept()
+            except BlockingIOError:
+                return
+            except OSError as error:  # this client has left already, or there are too many open files
+                if error.errno not in CLOSED:
+                    self._pause_accepting(now_s)
+                return
+            try:
+                self._take_in(Client(connection, now_s), now_s)
+            except OSError:
+                connection.close()
+
+    def _take_in(self, client: Client, now_s: float) -> None:
+        """Turn strangers away; who has something to say has mostly said it already."""
+        pid, uid, _ = client.peer()
+        self._selector.register(client, selectors.EVENT_READ)
+        self._clients.add(client)
         if uid in (0, os.getuid()):
+            self._serve(client, now_s)
             return
         self._strangers += 1
-        now_s = self._clock()
         if now_s - self._said_s >= SAY_S:
             self._say(f"control socket: turned user {uid} away (process {pid}; {self._strangers} since last said)")
             self._strangers, self._said_s = 0, now_s
-        raise ServiceError("only the owner of the service may use this socket")
+        self._reply(client, refusal("only the owner of the service may use this socket"), now_s)
 
+    def _pause_accepting(self, now_s: float) -> None:
+        self._accept_s = now_s + RETRY_S
+        self._selector.unregister(self._listener)
 
-def peer(client: socket.socket) -> tuple[int, int, int]:
-    """Process, user and group at the other end."""
-    pid, uid, gid = struct.unpack("3i", client.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
-    return pid, uid, gid
+    def _make_room(self) -> bool:
+        """Let the longest idle client go; where all have asked something, one whose request is not being done."""
+        others = self._clients - self._reception.stopping
+        if others:
+            self._drop(min(others, key=lambda client: (bool(client.line), client.heard_s)))
+        return bool(others)
 
+    def _drop(self, client: Client) -> None:
+        self._clients.discard(client)
+        self._reception.forget(client)
+        with suppress(KeyError, ValueError):
+            self._selector.unregister(client)
+        client.close()
 
-def parse_request(line: bytes) -> Mapping[str, object]:
-    """A request's object; ServiceError for anything else."""
-    try:
-        request = json.loads(line)
-    except (ValueError, RecursionError):
-        raise ServiceError("a request is one JSON object on one line") from None
-    if not isinstance(request, dict):
-        raise ServiceError("a request is one JSON object on one line")
-    return request
+    # --- what they say, and are told ---
 
-
-def _read_line(client: socket.socket, clock: Callable[[], float]) -> bytes:
-    """One line; its time is up for the whole of it, so that nobody holds the others up by sending byte for byte."""
-    data, end_s = b"", clock() + CLIENT_S
-    while b"\n" not in data:
-        client.settimeout(max(end_s - clock(), 0.001))
-        part = client.recv(MAX_REQUEST)
-        data += part
-        if len(data) > MAX_REQUEST or not part:
-            raise ServiceError(f"a request is one line of at most {MAX_REQUEST} bytes")
-    return data
-
-
-def _listen(path: Path) -> socket.socket:
-    """The listening socket, owner-only from the first moment on; a dead one in its place is removed."""
-    if path.exists() and not path.is_socket():
-        raise ServiceError(f"{path} is there already and is no socket: give this station another control.socket")
-    if is_alive(path):
-        raise ServiceError(
-            f"another service answers on {path}: stop it first, or give this station another control.socket"
-        )
-    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        _bind(listener, path)
-    except OSError as error:
-        listener.close()
-        raise ServiceError(f"the control socket {path} cannot be opened: {error.strerror or error}") from None
-    listener.listen(WAITING)
-    return listener
-
-
-def _bind(listener: socket.socket, path: Path) -> None:
-    mask = os.umask(0o177)
-    try:
-        path.unlink(missing_ok=True)
-        listener.bind(str(path))
-    finally:
-        os.umask(mask)
-
-
-def is_alive(path: Path) -> bool:
-    """Whether somebody answers on a socket of this name."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+    def _serve(self, client: Client, now_s: float) -> None:
+        """Go on with one client that has something to say, or takes more of its answer."""
         try:
-            probe.settimeout(CLIENT_S)
-            probe.connect(str(path))
-        except (BlockingIOError, TimeoutError):
-            return True  # there are more clients than it has answered yet
+            if client.answering:
+                self._write(client)
+            elif client.hear(now_s):
+                self._selector.unregister(client)
+                client.request = parse_request(client.line)
+                self._reception.take(client, now_s)
+        except OrchestratorError as error:
+            self._reply(client, refusal(str(error)), now_s)
         except OSError:
-            return False
-    return True
+            self._drop(client)
 
+    def _reply(self, client: Client, text: bytes, now_s: float) -> None:
+        if client not in self._clients:
+            return
+        with suppress(KeyError):
+            self._selector.unregister(client)
+        client.answer(text, now_s)
+        try:
+            self._write(client)
+        except OSError:
+            self._drop(client)
 
-def _line(answer: Answer) -> bytes:
-    return json.dumps(answer, ensure_ascii=False).encode() + b"\n"
+    def _write(self, client: Client) -> None:
+        if client.write():
+            self._drop(client)
+        elif client not in self._selector.get_map():
+            self._selector.register(client, selectors.EVENT_WRITE)
+
+    # --- the name that they find it by ---
+
+    def _look_for_name(self) -> None:
+        """Somebody may tidy up, or bind a socket of his own to our name: nobody could stop a bay here any more."""
+        found = identity(self._path)
+        if self._closing or found == self._identity:
+            return
+        if found is not None:
+            self._complain(f"{self._path} is another program's by now: end that, or restart this service")
+            return
+        try:
+            listener = listen(self._path)
+        except ServiceError as error:
+            self._complain(f"{self._path} was removed by somebody: {error}")
+            return
+        with suppress(KeyError):
+            self._selector.unregister(self._listener)
+        self._listener.close()
+        self._listener, self._identity, self._lost = listener, identity(self._path), ""
+        self._say(f"control socket: {self._path} was removed by somebody; it is there again")
+
+    def _complain(self, trouble: str) -> None:
+        if trouble != self._lost:
+            self._lost = trouble
+            self._say(f"control socket: {trouble}")
 
 
 def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> dict[str, object]:
-    """Send one request to a running service and return its answer.
+    """Send one request to a running service and return its answer, all within `timeout_s`.
 
-    Raises ServiceError where no service answers, or where the answer is no.
+    Raises NoServiceError where no service answers, ServiceError where the answer is no.
     """
+    end_s = monotonic() + timeout_s
     try:
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-            client.settimeout(timeout_s)
-            client.connect(str(path))
-            client.sendall(_line(request))
-            with client.makefile("rb") as stream:
-                answer = json.loads(stream.readline())
+            _connect(client, path, timeout_s)
+            client.settimeout(max(end_s - monotonic(), 0.001))
+            client.sendall(encode(request))
+            answer = json.loads(_read_line(client, end_s))
+    except PermissionError:
+        raise NoServiceError(f"{path}: permission denied: only {owner(path)} and root may use it (sudo)") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or "no answer"
-        raise ServiceError(
+        raise NoServiceError(
             f"no service answers on {path} ({reason}): is it running, and is this its control.socket? "
             "Name it with --socket or $ORCHESTRATOR_SOCKET"
         ) from None
-    if not answer.get("ok"):
-        raise ServiceError(str(answer.get("error", "the service refused")))
-    return dict(answer)
+    if not isinstance(answer, dict) or not answer.get("ok"):
+        why = answer.get("error") if isinstance(answer, dict) else f"what answers on {path} is no service of this kind"
+        raise ServiceError(str(why or "the service refused"))
+    return answer
+
+
+def _connect(client: socket.socket, path: Path, timeout_s: float) -> None:
+    """Connect; where too many clients wait already, wait in the kernel's own queue, where nobody is passed over."""
+    whole_s, part_s = divmod(timeout_s, 1.0)
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", int(whole_s), max(int(part_s * 1e6), 1)))
+    try:
+        client.connect(str(path))
+    except BlockingIOError:
+        raise TimeoutError("timed out") from None
+
+
+def _read_line(client: socket.socket, end_s: float) -> bytes:
+    """One line; its time is up for the whole of it, also against one who answers byte for byte."""
+    data = bytearray()
+    while not data.endswith(b"\n"):
+        client.settimeout(max(end_s - monotonic(), 0.001))
+        part = client.recv(1 << 16)
+        data += part
+        if not part or len(data) > MAX_ANSWER or monotonic() > end_s:
+            raise TimeoutError("timed out" if part else "no answer")
+    return bytes(data)

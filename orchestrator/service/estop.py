@@ -1,19 +1,24 @@
 """`orchestrator estop`: stop chargers with no service, with one that hangs and with one that runs.
 
-Ports are opened without the lock that a service holds on them, and the first stop goes out before anything else is
-looked at. Standard library only, and PyYAML where a station file has to be read.
+Ports are opened without the lock that a service holds on them, each by a thread of its own, and the first stops go out
+before anything else is looked at. Standard library only, and PyYAML where a station file has to be read.
 """
 
 import os
 import sys
+import threading
+import time
 from collections.abc import Mapping
 
-from orchestrator.service.laststop import first_stop, stop_all
+from orchestrator.service.lastline import HELD
+from orchestrator.service.laststop import LOOK_S, LastStop
 
 USAGE = """\
 usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held]
 
-Stop the charger on every port of the station file (default: station.yaml), or on the given ports, and verify it.
+Stop the charger on every port of the station file, or on the given ports, and verify it. Without arguments the file is
+station.yaml in this folder, else that of the installed service, else that of a service that runs. Ports whose chargers
+may be running by what the service has written down are stopped, too, whether the file still names them or not.
 Needs no running service. One that runs is told to hold these bays until an operator starts them.
 Then the station file's contactors are opened. Those that a service holds are left to it: it opens them by itself
 where a charger does not obey.
@@ -24,13 +29,20 @@ where a charger does not obey.
 
 Exit status 0: every charger was verified to stand by; 1: not every one; 2: used wrongly.
 """
-DEFAULT_STATION = "station.yaml"
-Contactors = tuple[tuple[str, int, bool], ...]  #: chip, line, active low
+Contactor = tuple[str, int, bool]  #: chip, line, active low
+#: A contactor's driver that has not answered by the end, and a moment more, hangs.
+OPENING, OPEN_S = "its driver hangs", 0.5
 #: What systemd says to ExecStopPost= (systemd.exec, $SERVICE_RESULT) when its watchdog has killed the guardian: who
 #: still holds the ports is its controller, frozen as well, and is killed only afterwards.
 FROZEN = "watchdog"
-#: How long the proof of standby is waited for.
+#: How long the proof of standby is waited for, and a service's answer.
 VERIFY_S = 3.0
+#: A charger that stands by is watched for this long: one that runs again was not stopped.
+WATCH_S = 1.0
+#: Who reads what is told may keep it waiting for this long.
+READER_S = 2.0
+#: What the service has written down is waited for no longer than this: its disk may hang.
+READ_S = 1.0
 
 
 class Options:
@@ -67,63 +79,149 @@ class Options:
 def main(words: list[str]) -> int:
     """Stop, verify, tell; the exit status."""
     if "-h" in words or "--help" in words:
-        print(USAGE, end="")  # noqa: T201 - what people read
+        _say(1, USAGE.rstrip())
         return 0
     options = Options(words)
     if options.wrong:
-        print(f"orchestrator estop: {options.wrong}\n{USAGE}", end="", file=sys.stderr)  # noqa: T201
+        _say(2, f"orchestrator estop: {options.wrong}\n{USAGE.rstrip()}")
         return 2
-    bays: Mapping[str, str] = dict.fromkeys(options.ports, "")
-    socket = options.socket
-    contactors: Contactors = ()
-    if not bays:
-        bays, written, contactors = _wiring((options.stations or [DEFAULT_STATION])[0])
-        socket = socket or written
-    if not bays:
-        print("no port to stop: name a station file or --port PATH", file=sys.stderr)  # noqa: T201
-        return 1
-    return _stop(bays, socket, contactors, options)
-
-
-def _stop(bays: Mapping[str, str], socket: str, contactors: Contactors, options: Options) -> int:
-    """Stop all of them, with whatever help there is, and tell what became of each."""
-    opened = {port: first_stop(port, leave_held=options.leave_held) for port in bays}
-    from orchestrator.service.lastopen import open_contactors  # noqa: PLC0415 - the first stops are out now
-
-    cut: dict[str, str] = {}
-
-    def isolate() -> None:
-        cut.update(open_contactors(contactors))
-
-    if options.leave_held:
-        whys, said = stop_all(opened, VERIFY_S, on_round=isolate), ""
+    stop = EmergencyStop(options)
+    if options.ports:
+        stop.stop(dict.fromkeys(options.ports, ""))
     else:
-        from orchestrator.service.witness import Service  # noqa: PLC0415 - the first stops are out now
-
-        service = Service(bays, socket, every_bay=not options.ports)
-        whys = stop_all(
-            opened, VERIFY_S, leave_held=False, on_stop=service.hold, on_round=isolate, witness=service.sees
-        )
-        said = service.said
-    for port, why in whys.items():
-        name = f"{bays[port]} ({port})" if bays[port] else port
-        print(f"{name}: {why or 'standby verified'}")  # noqa: T201
-    for line, became in cut.items():
-        print(f"contactor on {line}: {became}")  # noqa: T201
-    if said:
-        print(said, file=sys.stderr)  # noqa: T201
-    return 1 if any(whys.values()) else 0
+        stop.by_station()
+    return stop.finish()
 
 
-def _wiring(station: str) -> tuple[Mapping[str, str], str, Contactors]:
-    """Ports with their bays' names, the socket and the contactors of a station file, even of one with mistakes."""
-    from pathlib import Path  # noqa: PLC0415 - only where it is needed
+class EmergencyStop:
+    """One emergency stop, from the first port to the last word."""
 
-    from orchestrator.config.ports import wiring  # noqa: PLC0415 - PyYAML
+    def __init__(self, options: Options) -> None:
+        self._options, self._socket = options, options.socket
+        self._began_s = time.monotonic()
+        self._stopping = LastStop(leave_held=options.leave_held, watch_s=WATCH_S)
+        self._bays: dict[str, str] = {}  # of each port's bay the name, where it has one
+        self._real: set[str] = set()
+        self._contactors: tuple[Contactor, ...] = ()
+        self._opening: set[Contactor] = set()
+        self._cut: dict[Contactor, str] = {}  # what became of them
+        self._notes: list[str] = []
 
-    try:
-        found = wiring(Path(station))
-    except OSError as error:
-        print(f"{station}: {error.strerror}", file=sys.stderr)  # noqa: T201
-        return {}, "", ()
-    return found.ports, found.socket, found.contactors
+    def stop(self, bays: Mapping[str, str]) -> None:
+        """Stop the chargers on these ports; one that has two names once."""
+        new = {}
+        for port, bay in bays.items():
+            real = os.path.realpath(port)
+            if real not in self._real:
+                self._real.add(real)
+                new[port] = bay
+        self._bays.update(new)
+        self._stopping.stop(dict.fromkeys(new))
+
+    def by_station(self) -> None:
+        """Stop what a station file names, and what is in hand besides."""
+        journals = self._take_any() if not self._options.stations else [self._take(self._options.stations[0])]
+        readings = [threading.Thread(target=self._take_in_hand, args=(name,), daemon=True) for name in journals if name]
+        end_s = time.monotonic() + READ_S
+        for reading in readings:
+            reading.start()
+        for reading in readings:
+            reading.join(max(0.0, end_s - time.monotonic()))
+        if any(reading.is_alive() for reading in readings):
+            self._notes.append("the journal cannot be read in time: ports that it may name besides were not stopped")
+
+    def _take_any(self) -> list[str]:
+        """The station file that is meant where none is named; of several that run, all of them."""
+        from orchestrator.service.inhand import stations  # noqa: PLC0415 - only where it is needed
+
+        for together in stations():
+            journals = []
+            for station in together:
+                journals.append(self._take(station))
+                self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has no such
+            if self._bays or any(journals):
+                return journals
+        return []
+
+    def _take(self, station: str) -> str:
+        """Stop what this file names; the journal's directory. A file with mistakes gives what it can."""
+        from pathlib import Path  # noqa: PLC0415 - only where it is needed
+
+        from orchestrator.config.ports import wiring  # noqa: PLC0415 - PyYAML
+
+        try:
+            found = wiring(Path(station))
+        except OSError as error:
+            self._notes.append(f"{station}: {error.strerror}")
+            return ""
+        self.stop(found.ports)
+        self._socket, self._contactors = self._socket or found.socket, found.contactors
+        return found.journal
+
+    def _take_in_hand(self, journal: str) -> None:
+        from orchestrator.service.inhand import ports_in_hand  # noqa: PLC0415 - the first stops are out now
+
+        self.stop(ports_in_hand(journal))
+
+    def finish(self) -> int:
+        """Verify all of them, with whatever help there is, and tell what became of each; the exit status."""
+        import signal  # noqa: PLC0415 - the first stops are out now
+
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
+        if not self._bays:
+            for note in self._notes:
+                _say(2, note)
+            _say(2, "no port to stop: name a station file or --port PATH")
+            return 1
+        if self._options.leave_held:
+            whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
+        else:
+            from orchestrator.service.witness import Service  # noqa: PLC0415 - the first stops are out now
+
+            service = Service(self._bays, self._socket, every_bay=not self._options.ports)
+            self._stopping.witness = service.sees
+            service.start()
+            whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
+            service.told.wait(max(0.0, self._began_s + VERIFY_S - time.monotonic()))
+            self._notes.append(service.said)
+        end_s = time.monotonic() + OPEN_S
+        while OPENING in self._cut.values() and time.monotonic() < end_s:
+            time.sleep(LOOK_S)
+        return self._tell(whys)
+
+    def _isolate(self) -> None:
+        """Open the contactors, each in its own time."""
+        for line in set(self._contactors) - self._opening:
+            self._opening.add(line)
+            self._cut.setdefault(line, OPENING)
+            threading.Thread(target=self._open, args=(line,), daemon=True).start()
+
+    def _open(self, line: Contactor) -> None:
+        from orchestrator.service.lastopen import request  # noqa: PLC0415 - the first stops are out now
+
+        chip, number, active_low = line
+        self._cut[line] = request(chip, number, active_low=active_low)
+        self._opening.discard(line)
+
+    def _tell(self, whys: Mapping[str, str]) -> int:
+        """First what to do."""
+        names = {port: f"{bay} ({port})" if (bay := self._bays[port]) else port for port in whys}
+        running = [names[port] for port, why in whys.items() if why not in ("", HELD)]
+        lines = [f"CUT THE MAINS of {', '.join(running)}: nothing proves that they stand by"] if running else []
+        lines += [f"{names[port]}: {why or 'standby verified'}" for port, why in whys.items()]
+        lines += [f"contactor on {chip} line {line}: {became}" for (chip, line, _), became in self._cut.items()]
+        if not any(whys.values()):
+            lines.append("every charger stands by, verified")
+        _say(1, "\n".join(lines))
+        for note in self._notes:
+            _say(2, note)
+        return 1 if any(whys.values()) else 0
+
+
+def _say(fd: int, text: str) -> None:
+    """A terminal that cannot show a character, stands still or is gone must not change how this ends."""
+    from orchestrator.service.say import put  # noqa: PLC0415 - the first stops are out now
+
+    stream = sys.stdout if fd == 1 else sys.stderr
+    encoding = getattr(stream, "encoding", None) or "ascii"
+    put(fd, f"{text}\n".encode(encoding, errors="backslashreplace"), READER_S)

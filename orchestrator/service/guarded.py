@@ -84,6 +84,7 @@ class GuardedLine:
         self._line = open_line()
         guardian.hold(port, self._line.fileno())
         self.write, self.read = self._line.write, self._line.read
+        self.restore, self.locked_by = self._line.restore, self._line.locked_by
 
     def close(self) -> None:
         """Give the port back; the guardian does, too."""

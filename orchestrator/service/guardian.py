@@ -4,11 +4,12 @@ Theory of operation. `orchestrator run` is this process; it starts the controlle
 hands it a duplicate of every serial port and contactor line it opens (SCM_RIGHTS) and sends a heartbeat when *all* its
 loops have turned. No heartbeat for SILENCE_S, or the end of the connection, means that nobody is at the wheel: the
 guardian kills what is left, stops the charger on every port that it was ever told of, verifies it, and ends with an
-error, so that systemd starts anew. Contactors open after the first round of stops; `lastopen.py` says why not before.
+error, so that systemd starts anew. A charger that runs again meanwhile was not verified, and is stopped again.
+Contactors open after the first round of stops; `lastopen.py` says why not before.
 It answers each heartbeat; a controller without answers knows that its guardian is gone, stops, and ends.
 
 Standard library and `protocol/standby.py` only: what is not imported cannot fail. Nothing here ever waits for anybody
-but the controller: not for systemd, not for who reads the log, not for a line that takes nothing.
+but the controller: not for systemd, not for who reads the log, not for a driver that takes its time over a port.
 """
 
 import contextlib
@@ -17,13 +18,15 @@ import select
 import signal
 import socket
 import sys
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from types import FrameType
 
+from orchestrator.service.lastline import HELD, drop_port
 from orchestrator.service.lastopen import open_contactor
-from orchestrator.service.laststop import drop_port, stop_all
+from orchestrator.service.laststop import LOOK_S, stop_all
 from orchestrator.service.say import Systemd, say
 
 #: Messages from the controller: one letter, then a name. PORT carries a port's descriptor, CONTACTOR that of a GPIO
@@ -39,8 +42,12 @@ LATE_S = 0.1
 STARTUP_S = 20.0
 #: A controller that has verified its chargers closes everything and is gone within this.
 END_S = 10.0
-#: How long the chargers' standby is waited for. Whoever starts the service anew goes on with it.
+#: How long the chargers' standby is waited for, and watched. Whoever starts the service anew goes on with it.
 VERIFY_S = 5.0
+#: Without a charger to stop, contactors are given this long to open.
+OPEN_S = 0.5
+#: What is said of one whose driver has not answered.
+OPENING = "its driver hangs"
 #: A process that was killed is gone within this, if anything can make it go.
 KILLED_S = 1.0
 #: systemd is told that we live this often; the unit allows a multiple of it.
@@ -48,7 +55,8 @@ WATCHDOG_S = 0.5
 #: Exit status when the guardian had to act.
 ACTED = 70
 MESSAGE = 4096
-CONTROLLER = ("-m", "orchestrator.service.controller")
+#: -P: a file of the working directory that is called as a library is must not be imported in its place.
+CONTROLLER = ("-P", "-m", "orchestrator.service.controller")
 
 #: Whoever wants us to end: systemd or `kill`, Ctrl-C, the terminal that is closed (if there is one), Ctrl-\.
 ENDS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
@@ -63,6 +71,8 @@ class Guardian:
         self._child, self._link = os.pidfd_open(child), link
         self._ports: dict[str, int | None] = {}  # None: the controller has closed it, for now
         self._contactors: dict[str, int] = {}
+        self._opening: set[str] = set()
+        self._opened: dict[str, str] = {}  # contactor → what became of it
         self._done = self._ending = self._ready = False
         self._excused = False  # since the last heartbeat
         self._deadline_s = time.monotonic() + STARTUP_S
@@ -79,16 +89,20 @@ class Guardian:
             signal.signal(signal.SIGHUP, self._pass_on_reload)
         reason = self._watch()
         if self._done or not self._ports:
-            self._open()
+            self._open(OPEN_S)
             return self._status(END_S)
         self._signal(signal.SIGKILL)
         # Without waiting for a gap: what the dying controller has written goes out first, the kernel keeps the order.
         # Was that half a frame, or was it just then in a write, the second stop comes 20 ms later.
         on_stop = partial(self._stopping, reason)
-        for name, why in stop_all(self._ports, VERIFY_S, on_stop=on_stop, on_round=self._open).items():
+        whys = stop_all(self._ports, VERIFY_S, watch_s=VERIFY_S, on_stop=on_stop, on_round=self._open)
+        running = [name for name, why in whys.items() if why not in ("", HELD)]
+        if running:
+            say(f"guardian: CUT THE MAINS of the chargers on {', '.join(running)}")
+        for name, why in whys.items():
             say(f"guardian: {name}: {why or 'standby verified'}")
-        for name, fd in self._contactors.items():
-            say(f"guardian: contactor {name}: {open_contactor(fd)}")
+        for name in self._contactors:
+            say(f"guardian: contactor {name}: {self._opened.get(name, OPENING)}")
         return self._status(KILLED_S) or ACTED
 
     def _pass_on(self, _number: int, _frame: FrameType | None) -> None:
@@ -165,20 +179,29 @@ class Guardian:
         old = self._ports.get(name)
         self._ports[name] = fd
         if old is not None:
-            drop_port(old)
+            aside(partial(drop_port, old))
 
     def _hold_contactor(self, name: str, fd: int | None) -> None:
         """Keep this descriptor of the line, or none: then the line is free again."""
         old = self._contactors.pop(name, None)
         if old is not None:
-            os.close(old)
+            aside(partial(os.close, old))
         if fd is not None:
             self._contactors[name] = fd
 
-    def _open(self) -> None:
-        """Open every contactor: whoever obeys has stopped by now."""
-        for fd in self._contactors.values():
-            open_contactor(fd)
+    def _open(self, within_s: float = 0.0) -> None:
+        """Open every contactor, each in its own time: whoever obeys has stopped by now."""
+        end_s = time.monotonic() + within_s
+        for name in self._contactors.keys() - self._opening:
+            self._opening.add(name)
+            self._opened.setdefault(name, OPENING)
+            aside(partial(self._open_one, name))
+        while OPENING in self._opened.values() and time.monotonic() < end_s:
+            time.sleep(LOOK_S)
+
+    def _open_one(self, name: str) -> None:
+        self._opened[name] = open_contactor(self._contactors[name])
+        self._opening.discard(name)
 
     def _stopping(self, reason: str) -> None:
         """The stops of a round are out; after the first one there is time to tell."""
@@ -207,6 +230,14 @@ class Guardian:
             return end.si_status, f"has ended with status {end.si_status}"
         early = self._ending and not self._ports  # before it could take SIGTERM for anything but its end
         return 0 if early else ACTED, f"was ended by {signal.Signals(end.si_status).name}"
+
+
+def aside(work: Callable[[], object]) -> None:
+    """Do it in a thread: what a driver takes its time over must keep nobody from watching. Without one, do it here."""
+    try:
+        threading.Thread(target=work, daemon=True).start()
+    except RuntimeError:
+        work()
 
 
 def has_terminal() -> bool:

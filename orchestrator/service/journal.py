@@ -1,24 +1,25 @@
 """The journal: JSON Lines on disk, rotated and bounded. A disk that is full or gone never stops a charge, nor a stop.
 
 Two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and `snapshots`, far more
-of it, for a replay; each has its own share of the space, so that snapshots never push the reasons out. Beside them lies
-what the next run must know (`kept.py`).
+of it, for a replay; each has its own share of the space, so that snapshots never push the reasons out. Both begin each
+run of the service with a line `run`: monotonic times of two runs, or two boots, have nothing to do with each other.
 """
 
 import json
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from orchestrator.service.kept import FILE, Kept, write_kept
 from orchestrator.service.records import Line
 from orchestrator.service.rotating import RotatingFile
 
+#: Of these lines; the first had no `run`.
+VERSION = 2
 #: Of the allowed space, what the events may take.
 EVENTS_SHARE = 0.25
 #: Lines that wait for a disk that does not take them; beyond it the oldest are dropped and counted.
@@ -33,30 +34,69 @@ T = TypeVar("T")
 Entry = tuple[float, float, str, Line]  #: monotonic s, wall s, bay, line
 
 
+class Stream:
+    """The lines of one file that wait for the disk. A gap in them is a line of its own: what follows lacks its base."""
+
+    def __init__(self, file: RotatingFile, begin: Callable[[], bytes]) -> None:
+        self._file, self._begin = file, begin
+        self._lines: deque[bytes] = deque()
+        self._ahead: deque[bytes] = deque()  # our own lines, which come before them
+        self._begun = False
+        self.gap = False  #: lines are missing before the first one that waits
+
+    def add(self, line: bytes) -> int:
+        """One line more; how many are lost by it."""
+        if not self._begun:
+            self._begun = True
+            self._ahead.append(self._begin())
+        self._lines.append(line)
+        if len(self._lines) <= BACKLOG:
+            return 0
+        self._lines.popleft()
+        self.gap = True
+        return 1
+
+    def write(self, lost: bytes) -> None:
+        """Bring them to the disk, or raise OSError; `lost` is the line that stands for a gap."""
+        if self.gap and self._lines:
+            self._ahead.append(lost)
+            self.gap = False
+        self._file.take(self._ahead)
+        self._file.take(self._lines)
+
+
 class Journal:
-    """Takes lines from any thread without ever waiting; one thread of its own writes them, and what people read.
+    """Takes lines from any thread without ever waiting; one thread of its own writes them.
 
     Lines that the disk does not take wait for it; `lost` counts those that were dropped because there were too many.
     """
 
-    def __init__(self, directory: Path, max_mb: float, clock: Callable[[], float], wall: Callable[[], float]) -> None:
-        self._clock, self._wall = clock, wall
+    def __init__(
+        self,
+        directory: Path,
+        max_mb: float,
+        clock: Callable[[], float],
+        wall: Callable[[], float],
+        *,
+        boot: str = "",
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._clock, self._wall, self._say = clock, wall, say
         self._directory = directory
-        self._kept: dict[str, Kept] = {}
-        self._kept_changed = False
-        self._unkept = ""
         total = int(max_mb * 1_000_000)
-        self._streams: dict[bool, tuple[RotatingFile, deque[bytes]]] = {
-            False: (RotatingFile(directory, "events", int(total * EVENTS_SHARE)), deque()),
-            True: (RotatingFile(directory, "snapshots", int(total * (1 - EVENTS_SHARE))), deque()),
+        events, snapshots = int(total * EVENTS_SHARE), int(total * (1 - EVENTS_SHARE))
+        begun = ("run", {"version": VERSION, "boot": boot, "run": f"{boot}/{clock():.6f}"})
+        self._streams: dict[bool, Stream] = {
+            False: Stream(RotatingFile(directory, "events", events, durable=True), partial(self._own_line, *begun)),
+            True: Stream(RotatingFile(directory, "snapshots", snapshots), partial(self._own_line, *begun)),
         }
         self._waiting: deque[Entry] = deque(maxlen=BACKLOG)
-        self._said: deque[str] = deque(maxlen=1000)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._turn_s = clock()
         self._problem = ""
         self.lost = 0
+        self._lost_before = 0  # as it was when the lines that wait were last taken
 
     def start(self) -> None:
         """Begin to write."""
@@ -68,28 +108,12 @@ class Journal:
             self.lost += 1
         self._waiting.append((self._clock(), self._wall(), bay, line))
 
-    def keep(self, bay: str, kept: Kept) -> None:
-        """What the next run must know of a bay, from now on."""
-        self._kept = {**self._kept, bay: kept}
-        self._kept_changed = True
-
-    def say(self, text: str) -> None:
-        """A line for people, on standard error."""
-        self._said.append(text)
-
-    @property
-    def unkept(self) -> str:
-        """Why what is kept now would be lost with a restart, for a person; "" while it would not be."""
-        return self._unkept
-
     def problem(self, now_s: float) -> str:
         """Why nothing is being written, for a person; "" while all is well."""
         if not self._thread.is_alive():
             return "the journal is not being written"
         if now_s - self._turn_s > STALL_S:
-            return (
-                f"the journal has not been written for {now_s - self._turn_s:.0f} s: the disk, or standard error, hangs"
-            )
+            return f"the journal has not been written for {now_s - self._turn_s:.0f} s: its disk hangs"
         return self._problem
 
     def stalled(self, _now_s: float) -> bool:
@@ -109,43 +133,26 @@ class Journal:
         self._write()
 
     def _write(self) -> None:
-        for text in _drained(self._said):
-            _tell(text)
+        if self.lost > self._lost_before:
+            for stream in self._streams.values():
+                stream.gap = True
         for entry in _drained(self._waiting):
-            lines = self._streams[entry[3][0] == "snapshot"][1]
-            lines.append(_line(entry))
-            if len(lines) > BACKLOG:
-                lines.popleft()
-                self.lost += 1
+            self.lost += self._streams[entry[3][0] == "snapshot"].add(_line(entry))
+        self._lost_before = self.lost
         try:
-            self._write_kept()
-            for file, lines in self._streams.values():
-                file.take(lines)
+            for stream in self._streams.values():
+                stream.write(self._own_line("lost", {"lines": self.lost}))
             self._settle("")
         except OSError as error:
             self._settle(f"the journal cannot be written: {error.strerror}: {error.filename or self._directory}")
 
-    def _write_kept(self) -> None:
-        if self._kept_changed:
-            self._kept_changed = False  # before it is read: a change from now on is written the next time
-            try:
-                write_kept(self._directory, self._kept)
-            except OSError as error:
-                self._kept_changed = True
-                self._unkept = f"a restart would forget latched faults, {self._directory / FILE}: {error.strerror}"
-                raise
-            self._unkept = ""
+    def _own_line(self, kind: str, fields: dict[str, object]) -> bytes:
+        return _line((self._clock(), self._wall(), "", (kind, fields)))
 
     def _settle(self, problem: str) -> None:
         if problem != self._problem:
             self._problem = problem
-            _tell(problem or "the journal is being written again")
-
-
-def _tell(text: str) -> None:
-    """To whom it may concern; nobody has to listen."""
-    with suppress(OSError):
-        print(text, file=sys.stderr, flush=True)  # noqa: T201 - what people read
+            self._say(problem or "the journal is being written again")
 
 
 def _drained(waiting: "deque[T]") -> Iterator[T]:

@@ -5,7 +5,7 @@ with one ioctl, whatever library requested it. The guardian has duplicates of th
 when nobody may be left, requests the lines anew. Values are logical: the kernel knows which lines are active low.
 
 First the stop, then the contactor. A contactor that breaks a load wears out, and may weld when it is needed next; a
-charger that obeys is without current within the first round of stops (`laststop.ROUND_S`, half a second). So contactors
+charger that obeys is without current within the first round of stops (`lastline.ROUND_S`, half a second). So contactors
 open when that round is over: without load where the stop was obeyed, under load where nothing else is left. To wait for
 longer would only make the time longer in which a charger that nobody controls goes on.
 
@@ -17,7 +17,6 @@ import errno
 import fcntl
 import os
 import struct
-from collections.abc import Iterable
 
 #: _IOWR(0xB4, 0x07, struct gpio_v2_line_request) and _IOWR(0xB4, 0x0F, struct gpio_v2_line_values).
 GET_LINE = 0xC250B407
@@ -34,8 +33,6 @@ CONSUMER = b"orchestrator estop"
 HELD = "left to who holds it"
 OPENED = "open"
 
-Line = tuple[str, int, bool]  #: chip, line, active low
-
 
 def open_contactor(fd: int) -> str:
     """Open the contactor on a requested line; OPENED, or why not."""
@@ -46,25 +43,21 @@ def open_contactor(fd: int) -> str:
     return OPENED
 
 
-def open_contactors(lines: Iterable[Line]) -> dict[str, str]:
-    """Open contactors whose lines nobody holds; what became of each. Lines that are held are left alone.
+def request(chip: str, line: int, *, active_low: bool) -> str:
+    """Open a contactor whose line nobody holds; what became of it. A line that is held is left alone.
 
     What was requested is given back at once: from then on it is the driver's again, as in a gateway without power.
     """
-    return {f"{chip} line {line}": _request(chip, line, active_low=active_low) for chip, line, active_low in lines}
-
-
-def _request(chip: str, line: int, *, active_low: bool) -> str:
     flags = OUTPUT | (ACTIVE_LOW if active_low else 0)
     # An output without a value is requested inactive.
-    request = bytearray(REQUEST.pack(line, CONSUMER, flags, 0, 1, 0, 0))
+    asked = bytearray(REQUEST.pack(line, CONSUMER, flags, 0, 1, 0, 0))
     try:
         fd = os.open(chip, os.O_RDWR | os.O_CLOEXEC)
         try:
-            fcntl.ioctl(fd, GET_LINE, request)
+            fcntl.ioctl(fd, GET_LINE, asked)
         finally:
             os.close(fd)
     except OSError as error:
         return HELD if error.errno == errno.EBUSY else error.strerror or str(error)
-    os.close(REQUEST.unpack(request)[-1])
+    os.close(REQUEST.unpack(asked)[-1])
     return OPENED

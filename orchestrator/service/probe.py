@@ -18,8 +18,8 @@ from orchestrator.model import ChargerReading
 from orchestrator.protocol.explain import explain
 from orchestrator.protocol.hextext import hex_of
 from orchestrator.protocol.sdo import NmtCommand
-from orchestrator.service.control import is_alive
 from orchestrator.service.probe_bmu import BmuProbe
+from orchestrator.service.socketfile import is_alive
 
 #: As the service waits for a reply.
 REPLY_S = 0.12
@@ -126,7 +126,7 @@ def _contactor(config: ContactorConfig, show: Show) -> bool:
 
 def _bmu(station: Station, bay: Bay, nmt: NmtCommand | None, *, old_protocol: bool, show: Show) -> bool:
     name = bay.battery.can
-    bus = CanBus(name, station.can[name], [bay.battery.node_id], pages=old_protocol)
+    bus = CanBus(name, station.can[name], [bay.battery.node_id], pages=old_protocol, filtered=False)
     bmu = BmuProbe(bus, bay.battery, show)
     try:
         bus.open()

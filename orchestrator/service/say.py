@@ -4,16 +4,24 @@ import os
 import select
 import socket
 
+#: A pipe that has room for anything has room for this at once (PIPE_BUF).
+_PIECE = 4096
+
 
 def say(text: str) -> None:
     """A line on standard error. One that nobody takes now is lost: it must not keep a stop from being sent."""
+    put(2, f"{text}\n".encode(errors="backslashreplace"))
+
+
+def put(fd: int, data: bytes, patience_s: float = 0.0) -> None:
+    """Write to whoever reads there. What is not taken within `patience_s` is lost: a terminal may stand still."""
     try:
         taker = select.poll()
-        taker.register(2, select.POLLOUT)
-        if any(event & select.POLLOUT for _, event in taker.poll(0)):
-            os.write(2, f"{text}\n".encode(errors="backslashreplace"))
+        taker.register(fd, select.POLLOUT)
+        while data and any(event & select.POLLOUT for _, event in taker.poll(patience_s * 1000)):
+            data = data[os.write(fd, data[:_PIECE]) :]
     except OSError:
-        return  # standard error is gone
+        return  # it is gone
 
 
 class Systemd:

@@ -1,15 +1,24 @@
-"""The status document: what `status --json` prints and everything north of the service reads. Its names are fixed."""
+"""The status document: what `status --json` prints and everything north of the service reads. Its names are fixed.
+
+Values are the newest that were heard, however old: `age_s` says how old, and what the core does not rely on any more is
+`old`.
+"""
+
+from collections.abc import Mapping, Sequence
 
 from orchestrator.config.station import Station
+from orchestrator.core.facts import CHARGER_STALE_S, FAST_STALE_S, SLOW_STALE_S
 from orchestrator.model import BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
 from orchestrator.service.records import command_fields, session_fields
 
 #: What of a charger's reading the status shows; `t_s` is when it was asked for, in monotonic seconds of this machine.
 SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
+#: Of the battery's values those that are read several times a second; the others come once a second.
+FAST = ("voltage_v", "current_a", "status", "temperature_c")
 
 
 def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, wall_s: float) -> dict[str, object]:
-    """One bay. Values are None where nothing valid is known; `since` is Unix time."""
+    """One bay as it is now. Values are None where nothing valid is known; `since` is Unix time, as `wall_s`."""
     return {
         "name": name,
         "state": decision.state,
@@ -21,12 +30,12 @@ def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, 
         "charger": {
             "online": snapshot.charger_link.online,
             "problem": snapshot.charger_link.problem,
-            **_charger(snapshot.charger),
+            **_charger(snapshot.charger, now_s),
         },
         "battery": {
             "online": snapshot.battery_link.online,
             "problem": snapshot.battery_link.problem,
-            **_battery(snapshot.battery),
+            **_battery(snapshot.battery, now_s),
         },
         "faults": [
             {
@@ -42,9 +51,21 @@ def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, 
     }
 
 
-def station_status(station: Station, bays: list[dict[str, object]], journal_problem: str) -> dict[str, object]:
-    """The whole station."""
-    return {"station": station.station, "bays": bays, "journal": {"problem": journal_problem}}
+def station_status(
+    station: Station,
+    bays: list[dict[str, object]],
+    journal_problem: str,
+    unkept: str = "",
+    strays: Sequence[Mapping[str, object]] = (),
+) -> dict[str, object]:
+    """The whole station. `strays` are chargers of bays that the station file has not any more."""
+    return {
+        "station": station.station,
+        "bays": bays,
+        "strays": list(strays),
+        "journal": {"problem": journal_problem},
+        "persisted": {"problem": unkept},
+    }
 
 
 def _setpoint(setpoint: Setpoint) -> dict[str, object]:
@@ -56,10 +77,25 @@ def _setpoint(setpoint: Setpoint) -> dict[str, object]:
     }
 
 
-def _charger(reading: ChargerReading | None) -> dict[str, object]:
-    return {name: getattr(reading, name) if reading else None for name in SHOWN}
+def _charger(reading: ChargerReading | None, now_s: float) -> dict[str, object]:
+    age_s = _age_s(reading, now_s)
+    return {
+        **{name: getattr(reading, name) if reading else None for name in SHOWN},
+        "age_s": age_s,
+        "old": age_s is not None and age_s > CHARGER_STALE_S,
+    }
 
 
-def _battery(reading: BatteryReading) -> dict[str, object]:
+def _battery(reading: BatteryReading, now_s: float) -> dict[str, object]:
     values: dict[str, Measurement | None] = {name: getattr(reading, name) for name in BatteryReading.__slots__}
-    return {name: value.value if value else None for name, value in values.items()}
+    ages_s = {name: _age_s(value, now_s) for name, value in values.items()}
+    stale_s = {name: FAST_STALE_S if name in FAST else SLOW_STALE_S for name in values}
+    return {
+        **{name: value.value if value else None for name, value in values.items()},
+        "age_s": ages_s,
+        "old": [name for name, age_s in ages_s.items() if age_s is not None and age_s > stale_s[name]],
+    }
+
+
+def _age_s(heard: ChargerReading | Measurement | None, now_s: float) -> float | None:
+    return round(now_s - heard.t_s, 3) if heard else None

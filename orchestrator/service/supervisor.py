@@ -6,37 +6,51 @@ only thing that the loop waits for. Signals only put into it. At the end every b
 """
 
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from queue import Empty, SimpleQueue
 from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
 from types import FrameType
 
-from orchestrator.config.station import Bay, Rs485, Station
+from orchestrator.config.station import Station
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
 from orchestrator.link.can import CanBus, load
-from orchestrator.link.gpio import OutputLine, need_gpiod
-from orchestrator.link.serial import SerialLine
 from orchestrator.model import Request
-from orchestrator.service.bay import TICK_S, Asked, BayRunner
-from orchestrator.service.contactor import Contactor
+from orchestrator.service.asked import Asked
+from orchestrator.service.bay import TICK_S, BayRunner
+from orchestrator.service.boot import boot_id
+from orchestrator.service.closing import close_all
+from orchestrator.service.console import Console
 from orchestrator.service.control import ControlSocket
-from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLink
+from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
-from orchestrator.service.kept import read_kept
+from orchestrator.service.past import Place
+from orchestrator.service.reception import Answer, Later
 from orchestrator.service.reload import Reload
+from orchestrator.service.starts import Starts
 from orchestrator.service.status import station_status
+from orchestrator.service.store import Store
+from orchestrator.service.strays import Strays
+from orchestrator.service.wiring import charger_port, open_contactor, stray_port
 
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
 STOP_S = 3.0
-#: An operator's request is answered by the next step; longer than this means that the loop hangs.
-ANSWER_S = 2.0
+#: A request is decided by the next step, and answered when it is on disk or after 2 s; longer is a loop that hangs.
+ANSWER_S = 3.0
+#: A disk that answers has told what the last run has left within this; else the chargers are stopped meanwhile …
+LOCK_S = 0.3
+#: … and it has this long.
+LOAD_S = 3.0
+#: At the end, what has changed is written, and everything is closed, within this.
+CONTROL_S = 0.2
+KEEP_S = 2.5
+CLOSE_S = 2.5
 
 
 class Supervisor:
@@ -49,14 +63,22 @@ class Supervisor:
         self._lost = ""  # why the guardian cannot be relied on any more
         self._wake: SimpleQueue[int | None] = SimpleQueue()
         self._ending = ""
-        self._journal = Journal(station.journal.directory, station.journal.max_mb, monotonic, time)
+        boot, kept = boot_id(), station.journal
+        self._console = Console()
+        self._say = self._console.say
+        self._journal = Journal(kept.directory, kept.max_mb, monotonic, time, boot=boot, say=self._say)
+        places = [Place.of(bay) for bay in station.bays]
+        self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_kept=self._on_kept)
         self._ports: list[ChargerPort] = []
         self._buses: list[BatteryBus] = []
         self._bays: list[BayRunner] = []
         self._build()
-        self._reload = Reload(station, self._bays, self._journal.say)
+        self._strays = Strays(
+            self._store, partial(stray_port, self._guardian, partial(self._wake.put, None)), self._say
+        )
+        self._reload = Reload(station, self._bays, self._say)
         self._reload_asked = False
-        self._control = ControlSocket(station.control.socket, self._answer, monotonic, self._journal.say)
+        self._control = ControlSocket(station.control.socket, self._answer, monotonic, self._say)
 
     def _build(self) -> None:
         """Devices for every bay; nothing is opened yet."""
@@ -66,18 +88,20 @@ class Supervisor:
             for name, settings in self._station.can.items()
         }
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
-        kept = read_kept(self._station.journal.directory, [bay.name for bay in self._station.bays])
+        alone = len(self._station.bays) == 1
+        starts = Starts(0.0 if alone else self._station.stagger_s, self._station.source.at("stagger_s"))
         for number, bay in enumerate(self._station.bays):
             poke: Callable[[], None] = partial(self._wake.put, number)
-            port = _charger_port(bay, poke, self._guardian)
+            port = charger_port(bay.charger, bay.limits, poke, self._guardian)
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             self._ports.append(port)
-            contactor, memory = _contactor(bay, self._guardian), kept[bay.name].memory(monotonic())
-            snapshots = self._station.journal.snapshots
-            self._bays.append(
-                BayRunner(bay, port, node, self._journal, memory, contactor=contactor, snapshots=snapshots)
-            )
+            contactor, snapshots = open_contactor(bay, self._guardian), self._station.journal.snapshots
+            runner = BayRunner(
+                bay, port, node, self._journal, self._store, self._say,
+                contactor=contactor, starts=starts, snapshots=snapshots,
+            )  # fmt: skip
+            self._bays.append(runner)
         self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
 
     @property
@@ -87,25 +111,48 @@ class Supervisor:
     def run(self) -> int:
         """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1. SIGHUP: `Reload`.
 
-        Without its guardian it ends, too, and with 1.
+        Without its guardian it ends, too, and with 1. Raises ServiceError where another service owns the journal.
         """
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGHUP, self._on_hangup)
+        try:
+            self._begin()
+            while not self._ending:
+                self._turn()
+            self._say(f"{self._ending}: stopping every bay")
+            return self._end()
+        finally:
+            self._console.close()
+
+    def _begin(self) -> None:
+        """Stop every charger, find out what the last run has left, and take every bay's first step."""
+        self._store.start()
+        if known := self._store.wait(LOCK_S):
+            self._strays.begin()
+        self._console.start()
         self._journal.start()
+        self._reload.start()
         self._control.start()
         for port in self._ports:
             port.start()
         load()  # the ports are stopping their chargers meanwhile; the first heartbeat comes when it is done
+        if not known and self._store.wait(LOAD_S):
+            self._strays.begin()
         for bus in self._buses:
             bus.start()
-        self._journal.say(
-            f"{self._station.station}: {len(self._bays)} bays, control socket {self._station.control.socket}"
-        )
-        while not self._ending:
-            self._turn()
-        self._journal.say(f"{self._ending}: stopping every bay")
-        return self._end()
+        self._say(f"{self._station.station}: {len(self._bays)} bays, control socket {self._station.control.socket}")
+        self._run_all()
+
+    def _run_all(self) -> None:
+        for bay in self._bays:
+            self._run(bay)
+
+    def _on_kept(self, places: Collection[Place]) -> None:
+        """What has come to the disk may let a charge begin, or answer a request."""
+        for number, bay in enumerate(self._bays):
+            if bay.place in places:
+                self._wake.put(number)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._ending = self._ending or signal.Signals(number).name
@@ -127,6 +174,7 @@ class Supervisor:
             if now_s - bay.last_s >= TICK_S:
                 self._run(bay)
         if now_s - self._beat_s >= BEAT_S:
+            self._strays.look(now_s)
             self._beat(now_s)
 
     def _run(self, bay: BayRunner) -> None:
@@ -135,7 +183,7 @@ class Supervisor:
 
     def _beat(self, now_s: float) -> None:
         """Let the guardian know that every loop turns; without it, end."""
-        workers = (*self._devices, self._control, self._journal)
+        workers = (*self._devices, self._control, self._journal, self._store)
         well = not any(worker.stalled(now_s) for worker in workers)
         self._beat_s = now_s
         self._lost = self._guardian.beat(now_s, well=well)
@@ -155,35 +203,43 @@ class Supervisor:
         for bay in self._bays:
             bay.end(self._ending, orderly=not self._lost)
         end_s = monotonic() + STOP_S
-        for bay in self._bays:
-            self._run(bay)
-        while monotonic() < end_s and not all(bay.verified for bay in self._bays):
+        self._run_all()
+        while monotonic() < end_s and (self._unverified() or any(bay.owes for bay in self._bays)):
             self._turn()
-        unverified = [bay.name for bay in self._bays if not bay.verified]
+        close_all([self._control.close], CONTROL_S)  # who asks from now on is not answered *accepted*
+        self._run_all()  # … and who has asked is heard
+        unverified = self._unverified()
         for bay in self._bays:
             bay.isolate()
         self._guardian.done()
-        self._control.close()
-        for worker in self._devices:
-            worker.close()
-        verdict = f"NOT verified: {', '.join(unverified)}" if unverified else "every charger stands by, verified"
-        self._journal.say(f"ended: {verdict}")
+        unkept = self._store.close(KEEP_S)
+        for bay in self._bays:
+            bay.answer()
+        close_all([worker.close for worker in (*self._devices, *self._strays.ports)], CLOSE_S)
+        verdicts = [f"NOT verified: {', '.join(unverified)}"] if unverified else []
+        verdicts += [f"NOT kept: {unkept}"] if unkept else []
+        self._say(f"ended: {'; '.join(verdicts) or 'every charger stands by, verified'}")
         self._journal.close()
-        return 1 if unverified or self._lost else 0
+        return 1 if verdicts or self._lost else 0
+
+    def _unverified(self) -> list[str]:
+        return [*(bay.name for bay in self._bays if not bay.verified), *self._strays.unverified]
 
     # --- what the control socket asks, in its own thread ---
 
-    def _answer(self, request: Mapping[str, object]) -> dict[str, object]:
+    def _answer(self, request: Mapping[str, object]) -> Answer | Later:
         verb = request.get("verb")
         if verb == "status":
             name = request.get("bay")
             bays = self._bays if name is None else [self._named(name)]
-            return station_status(self._station, [bay.status() for bay in bays], self._journal.problem(monotonic()))
+            now_s, shown = monotonic(), [bay.status() for bay in bays]
+            return station_status(
+                self._station, shown, self._journal.problem(now_s), self._store.unkept(now_s), self._strays.status()
+            )
         if isinstance(verb, str) and verb in set(Request):
             names = request.get("bays")
             bays = self._bays if names is None else [self._named(name) for name in _names(names)]
-            # Once each: a request that waits behind itself would make a stop that comes after it wait, too.
-            return {"results": self._ask(list(dict.fromkeys(bays)), Request(verb))}
+            return self._ask(list(dict.fromkeys(bays)), Request(verb))
         raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
 
     def _named(self, name: object) -> BayRunner:
@@ -192,15 +248,21 @@ class Supervisor:
                 return bay
         raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
 
-    def _ask(self, bays: list[BayRunner], request: Request) -> dict[str, str]:
-        """Hand the request to each bay and gather what they say; "" is yes."""
+    def _ask(self, bays: list[BayRunner], request: Request) -> Later:
+        """Hand the request to each bay; what they say is there later, "" is yes."""
         asked = {bay.name: Asked(request) for bay in bays}
         for bay in bays:
             bay.ask(asked[bay.name])
             self._wake.put(self._bays.index(bay))
         end_s = monotonic() + ANSWER_S
         late = "the control loop has not answered: look at the service's log"
-        return {name: one.answer if one.done.wait(end_s - monotonic()) else late for name, one in asked.items()}
+
+        def results() -> Answer | None:
+            if not all(one.done.is_set() for one in asked.values()) and monotonic() < end_s:
+                return None
+            return {"results": {name: one.answer if one.done.is_set() else late for name, one in asked.items()}}
+
+        return results
 
 
 def boottime() -> float:
@@ -212,24 +274,3 @@ def _names(value: object) -> list[object]:
     if not isinstance(value, list):
         raise ServiceError("'bays' is a list of names, or null for all")
     return value
-
-
-def _charger_port(bay: Bay, poke: Callable[[], None], guardian: GuardianLink) -> ChargerPort:
-    port, kernel = bay.charger.port, bay.charger.rs485 is Rs485.KERNEL
-    return ChargerPort(
-        bay.charger,
-        bay.limits,
-        open_line=partial(GuardedLine, port, partial(SerialLine.open, port, kernel_rs485=kernel), guardian),
-        clock=monotonic,
-        on_change=poke,
-    )
-
-
-def _contactor(bay: Bay, guardian: GuardianLink) -> Contactor | None:
-    """The bay's contactor, if it has one. LinkError where the library for it is not installed."""
-    config = bay.contactor
-    if config is None:
-        return None
-    need_gpiod()
-    open_output = partial(OutputLine.open, config.chip, config.line, active_low=config.active_low)
-    return Contactor(partial(GuardedOutput, bay.name, open_output, guardian))

@@ -1,22 +1,28 @@
 """The service that may be running beside an `estop`: told to hold what was stopped, and asked what it sees.
 
 While it runs it reads the ports, and would get the answers to anybody else's questions; so its readings are the proof.
-They must be newer than the stop, as everywhere else.
+They must be newer than the stop, as everywhere else, and they are two witnesses: a charger that shows 0 A while the
+BMU sees current runs. All of this is a thread of its own: no stop waits for a service that hangs or drips.
 """
 
 import os
+import threading
+import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ServiceError
+from orchestrator.link.holder import control_socket
 from orchestrator.service.control import ask
-from orchestrator.service.holder import control_socket
 
-#: A service that hangs must not keep `estop` from verifying by itself. Its own guardian gives it as long.
+#: A service that has not answered by then is asked again.
 ANSWER_S = 0.5
-#: Standby may show so much, as everywhere else.
-STANDBY_A = 0.5
+#: How often it is asked what it sees, and how old that may be.
+LOOK_S, FRESH_S = 0.1, 1.5
+#: Standby may show so much, at the charger and at the BMU, as everywhere else.
+STANDBY_A, BMU_STANDBY_A = 0.5, 1.0
+NOBODY = "no service is running"
 
 Bay = Mapping[str, Any]  #: of the status document
 
@@ -28,29 +34,48 @@ class Service:
     """
 
     def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool) -> None:
-        self.said = ""  #: what became of it, for people
+        self.said = "the service has not answered in time: nobody holds its bays"  #: what became of it, for people
+        self.told = threading.Event()  #: that it has answered, or that there is none
         self._ports = {os.path.realpath(name) for name in names}
         self._named, self._every_bay = socket, every_bay
         self._path = Path(socket)
-        self._told = self._there = False
+        self._seen: tuple[float, Mapping[str, Bay]] = (0.0, {})
+        self._thread = threading.Thread(target=self._run, name="service", daemon=True)
 
-    def hold(self) -> None:
-        """Tell it to hold its bays until an operator starts them. To be called until it has been there."""
-        if self._told:
-            return
-        self._there = False
-        found = next(filter(None, map(control_socket, self._ports)), self._named)
-        if not found:
-            self.said = "no service holds these ports"
-            return
-        self._path = Path(found)
+    def start(self) -> None:
+        """Look for it, tell it, and go on asking it."""
+        self._thread.start()
+
+    def sees(self, name: str, since_s: float) -> tuple[float, str] | None:
+        """What it last saw of this port's charger: which sample, and "" for standby. None: they are not in touch."""
+        seen_s, bays = self._seen
+        bay = bays.get(os.path.realpath(name)) if time.monotonic() - seen_s <= FRESH_S else None
         try:
-            bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
-            results = ask(self._path, {"verb": "stop", "bays": bays}, ANSWER_S)["results"]
-        except (ServiceError, LookupError, TypeError) as error:
-            self.said = f"no service was told: {error}"
-            return
-        self._told = self._there = True
+            return _sample(bay, since_s) if bay else None
+        except (LookupError, TypeError):
+            return None  # it is of another version
+
+    def _run(self) -> None:
+        while True:
+            try:
+                if not self.told.is_set() and not self._hold():
+                    return
+                self._seen = time.monotonic(), dict(self._bays())
+            except (ServiceError, LookupError, TypeError, ValueError) as error:
+                if not self.told.is_set():
+                    self.said = f"the service has not taken the stop ({error}): nobody holds its bays"
+            time.sleep(LOOK_S)
+
+    def _hold(self) -> bool:
+        """Tell it to hold its bays until an operator starts them. False where there is no service."""
+        found = control_socket(self._ports)
+        if not found and not _listens(self._named):
+            self.said = NOBODY
+            self.told.set()  # one that starts now stops its chargers first, and asks nobody
+            return False
+        self._path = Path(found or self._named)
+        bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
+        results = ask(self._path, {"verb": "stop", "bays": bays}, ANSWER_S)["results"]
         answers = dict(results) if isinstance(results, Mapping) else {}
         refused = [f"{name}: {answer}" for name, answer in answers.items() if answer]
         held = ", ".join(name for name, answer in answers.items() if not answer)
@@ -58,17 +83,8 @@ class Service:
             f"the service holds {held} until an operator starts it" if held else "the service holds none of these ports"
         )
         self.said = "; ".join([holds, *refused])
-
-    def sees(self, names: Iterable[str], since_s: float) -> dict[str, str]:
-        """Of these ports, those whose chargers the service is in touch with: "" for standby shown since then."""
-        if not self._there:
-            return {}
-        try:
-            bays = dict(self._bays())
-            found = {name: bays.get(os.path.realpath(name)) for name in names}
-            return {name: _doubt(bay, since_s) for name, bay in found.items() if bay and bay["charger"]["online"]}
-        except (ServiceError, LookupError, TypeError):
-            return {}  # it has ended meanwhile
+        self.told.set()
+        return True
 
     def _bays(self) -> list[tuple[str, Bay]]:
         """Each bay with its port's real name."""
@@ -76,10 +92,29 @@ class Service:
         return [(os.path.realpath(bay["port"]), bay) for bay in bays]
 
 
-def _doubt(bay: Bay, since_s: float) -> str:
-    charger = bay["charger"]
-    if charger["t_s"] <= since_s:
-        return "no proof of standby: the service has not heard from the charger since"
-    if charger["operation"] == 0 and charger["current_a"] <= STANDBY_A:
-        return ""
-    return f"NOT stopped: the service says {bay['state']}: {bay['reason']}"
+def _listens(path: str) -> bool:
+    """Whether there may be a service behind this name: one that is too busy to be connected to is one."""
+    import socket  # noqa: PLC0415 - control.py has it anyway
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.settimeout(ANSWER_S)
+        try:
+            probe.connect(path)
+        except (FileNotFoundError, ConnectionRefusedError):
+            return False
+        except (OSError, ValueError):
+            return bool(path)
+    return True
+
+
+def _sample(bay: Bay, since_s: float) -> tuple[float, str] | None:
+    charger, battery = bay["charger"], bay["battery"]
+    at_s, amps, bmu_a = charger["t_s"] or 0.0, charger["current_a"] or 0.0, battery.get("current_a") or 0.0
+    bmu_sees = f"the BMU sees {bmu_a:.1f} A" if battery["online"] and bmu_a > BMU_STANDBY_A else ""
+    if not charger["online"]:
+        return (at_s, f"NOT stopped: {bmu_sees}, and the charger does not answer") if bmu_sees else None
+    if at_s <= since_s:
+        return at_s, "no proof of standby: the service has not heard from the charger since"
+    if charger["operation"] == 0 and amps <= STANDBY_A:
+        return at_s, f"NOT stopped: the charger says {amps:.1f} A, {bmu_sees}" if bmu_sees else ""
+    return at_s, f"NOT stopped: the service says {bay['state']}: {bay['reason']}"

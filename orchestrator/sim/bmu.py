@@ -15,10 +15,13 @@ from durand.node import NodeCapabilities  # type: ignore[import-untyped]  # as a
 from durand.services.nmt import StateEnum  # type: ignore[import-untyped]  # as above
 
 from orchestrator.sim.can_wire import CanWire, NodePort
+from orchestrator.sim.main_loop import MainLoop
 from orchestrator.sim.old_pages import REPLY_COB_ID, REQUEST_COB_ID, minutes, pages
 from orchestrator.sim.pack import Readout
 
 HEARTBEAT, TPDO_PARAMETERS, TPDO_COB_ID = 0x1017, 0x1800, 0x180
+DEVICE_NAME, NAME = 0x1008, b"TABOS battery management unit"  #: longer than the 4 bytes of one answer
+EMERGENCY, GUARD = 0x080, 0x700
 EVENT_TIMER = 5  #: sub-index of a TPDO's period in ms
 
 #: The objects that each TPDO carries, whole and in order.
@@ -66,14 +69,16 @@ class Bmu:
         readout: Callable[[], Readout],
         *,
         layout: Layout = Layout.FIRST_HIGH,
+        main_loop: bool = False,
     ) -> None:
-        self.port = NodePort(wire, loop)
+        self.port = NodePort(wire, loop, MainLoop(loop, seed=node_id) if main_loop else None)
         self.layout = layout
         self._loop = loop
         self._readout = readout
         self._timers: dict[int, asyncio.TimerHandle] = {}
         self._node = Node(self.port, node_id, capabilities=NodeCapabilities(sdo_servers=1, rpdos=1, tpdos=0))
         self._dictionary = self._node.object_dictionary
+        self._dictionary.write(DEVICE_NAME, 0, NAME)
         for index in (index for tpdo in TPDOS for index in tpdo):
             self._dictionary[index] = Variable(DatatypeEnum.UNSIGNED32, "ro")
             self._dictionary.set_read_callback(index, 0, partial(self._read, index))
@@ -81,6 +86,8 @@ class Bmu:
             self._add_tpdo(number)
         self._node.nmt.state_callbacks.add(self._on_state)
         self.port.add_subscription(REQUEST_COB_ID + node_id, self._on_old_request)
+        self._toggle = 0
+        self.port.add_guard(GUARD + node_id, self._on_guard)
 
     @property
     def node_id(self) -> int:
@@ -95,6 +102,10 @@ class Bmu:
         """Send an EMCY frame; code 0 is "error reset"."""
         self._node.emcy.set(code, register)
 
+    def short_emergency(self, code: int) -> None:
+        """An EMCY frame of two bytes, as some stacks send it."""
+        self.port.send(EMERGENCY + self.node_id, code.to_bytes(2, "little"))
+
     def close(self) -> None:
         """Fall silent for ever."""
         self._forget()
@@ -104,6 +115,11 @@ class Bmu:
         for page in pages(self.node_id, request, self._readout()):
             self.port.send(REPLY_COB_ID + self.node_id, page)
 
+    def _on_guard(self, cob_id: int, _: bytes) -> None:
+        """Node guarding (CiA 301, §7.2.8.3.2.1): the state, and a bit that alternates."""
+        self.port.send(cob_id, bytes((self._toggle | int(self._node.nmt.state),)))
+        self._toggle ^= 0x80
+
     # --- objects ---
 
     def _read(self, index: int) -> int:
@@ -111,6 +127,7 @@ class Bmu:
 
     def _on_state(self, state: int) -> None:
         if state == StateEnum.INITIALISATION:
+            self._toggle = 0
             self._forget()
 
     def _forget(self) -> None:

@@ -2,14 +2,14 @@
 
 import asyncio
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import can
 
 from orchestrator.sim.can_noise import Bus, BusNoise
-
-Handler = Callable[[int, bytes], None]
+from orchestrator.sim.main_loop import MainLoop
+from orchestrator.sim.timers import Handler, Timers, Wire
 
 #: The length of every SDO frame.
 SDO_BYTES = 8
@@ -29,6 +29,7 @@ class CanWire:
         self._noise = BusNoise(kind)
         self._bus = bus
         self._subscribers: dict[int, dict[object, Handler]] = {}
+        self._remote: dict[int, dict[object, Handler]] = {}
         self._closing = False
         self._thread: threading.Thread | None = None
         try:
@@ -57,9 +58,20 @@ class CanWire:
         """No more frames of this COB-ID for this owner."""
         self._subscribers.get(cob_id, {}).pop(owner, None)
 
+    def subscribe_remote(self, cob_id: int, owner: object, handler: Handler) -> None:
+        """Have the remote frames that ask for this COB-ID."""
+        self._remote.setdefault(cob_id, {})[owner] = handler
+
+    def send_remote(self, cob_id: int) -> None:
+        """Ask for the frame with this COB-ID."""
+        self._put(can.Message(arbitration_id=cob_id, is_remote_frame=True, is_extended_id=False))
+
     def send(self, cob_id: int, data: bytes) -> None:
         """Put one frame on the bus; a bus that does not take it loses it, as a node without a listener does."""
-        message = self._noise.spoil(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        self._put(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+
+    def _put(self, whole: can.Message) -> None:
+        message = self._noise.spoil(whole)
         if message is None:
             return
         try:
@@ -91,9 +103,9 @@ class CanWire:
     def _deliver(self, heard: can.Message) -> None:
         self.frames += 1
         message = self._noise.spoil(heard)
-        if message is None or message.is_extended_id or message.is_error_frame or message.is_remote_frame:
+        if message is None or message.is_extended_id or message.is_error_frame:
             return
-        handlers = self._subscribers.get(message.arbitration_id)
+        handlers = (self._remote if message.is_remote_frame else self._subscribers).get(message.arbitration_id)
         if handlers:
             for handler in tuple(handlers.values()):
                 handler(message.arbitration_id, bytes(message.data))
@@ -112,11 +124,12 @@ class NodeFaults:
 class NodePort:
     """What durand calls a network, for one node: it sends and subscribes, and here its faults take effect."""
 
-    def __init__(self, wire: CanWire, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, wire: Wire, timers: Timers, main_loop: MainLoop | None = None) -> None:
         self.faults = NodeFaults()
         self.reads = 0  #: SDO requests that came
         self._wire = wire
-        self._loop = loop
+        self._timers = timers
+        self._main_loop = main_loop
 
     def add_subscription(self, cob_id: int, callback: Handler) -> None:
         """Called by durand."""
@@ -128,11 +141,21 @@ class NodePort:
                 if len(data) != SDO_BYTES:  # CANopenNode takes no others; durand would answer with an abort
                     return
                 self.reads += 1
-                if self._refuse(cob_id, data):
-                    return
-            callback(cob_id, data)
+            if self._main_loop is None:
+                self._handle(callback, cob_id, data)
+            else:
+                self._main_loop.take(partial(self._handle, callback), cob_id, data)
 
         self._wire.subscribe(cob_id, self, hear)
+
+    def add_guard(self, cob_id: int, callback: Handler) -> None:
+        """Have the remote frames that ask for this COB-ID."""
+        self._wire.subscribe_remote(cob_id, self, lambda cob_id, data: self._handle(callback, cob_id, data))
+
+    def _handle(self, callback: Handler, cob_id: int, data: bytes) -> None:
+        if self.faults.mute or (cob_id & 0x780 == 0x600 and self._refuse(cob_id, data)):
+            return
+        callback(cob_id, data)
 
     def remove_subscription(self, cob_id: int) -> None:
         """Called by durand."""
@@ -149,7 +172,7 @@ class NodePort:
         if faults.short and msg[0] == 0x43 and int.from_bytes(msg[1:3], "little") in faults.short:
             msg = b"\x4b" + msg[1:6] + b"\0\0"
         if faults.delay_s:
-            self._loop.call_later(faults.delay_s, self._wire.send, cob_id, msg)
+            self._timers.call_later(faults.delay_s, self._wire.send, cob_id, msg)
         else:
             self._wire.send(cob_id, msg)
 

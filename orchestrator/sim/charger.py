@@ -7,6 +7,7 @@ argument.
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from math import inf
 
 from orchestrator.model import ChargeMode, Connection, ControlMode, Operation, Precharge
 from orchestrator.sim.pack import Pack
@@ -75,6 +76,10 @@ class Charger:
     gain: float = 1.0  #: what it delivers of what it should
     deaf_to: set[Push] = field(default_factory=set)  #: values that it no longer takes
     ignores_stop: bool = False
+    stops_left: float = inf  #: obeys so many more stops of a running output, then none
+    restless_s: float | None = None  #: runs again by itself, each time it has stood still for so long
+    reverts_s: float | None = None  #: takes each current limit, and goes back to the highest after so long
+    limit_s: float = 0.0  #: since the limit was set
 
     def __post_init__(self) -> None:
         if self.control_mode is ControlMode.AUTOMATIC:
@@ -84,7 +89,7 @@ class Charger:
 
     def rest(self, value: int) -> None:
         """0x10: 0 to standby, whatever it is doing; 1 from standby back to what was commanded."""
-        if value == 0 and not self.ignores_stop:
+        if value == 0 and self._obeys_stop():
             self.resting = True
             self._begin()
             self.current_a = 0.0
@@ -103,7 +108,7 @@ class Charger:
         if what == Push.OPERATION:
             self._set_operation(run=value == 1)
         elif what == Push.CURRENT_LIMIT:
-            self.current_limit = value
+            self.current_limit, self.limit_s = value, 0.0
         elif what == Push.CHARGE_MODE:
             if value != self.mode:
                 self.full = False
@@ -118,8 +123,13 @@ class Charger:
             if not self.run or self.full:
                 self._begin()
             self.run, self.full = True, False
-        elif not run and not self.ignores_stop:
+        elif not run and self._obeys_stop():
             self.run, self.full, self.current_a = False, False, 0.0
+
+    def _obeys_stop(self) -> bool:
+        if self.running:
+            self.stops_left -= 1
+        return not self.ignores_stop and self.stops_left >= 0
 
     def _begin(self) -> None:
         self.stage_s = self.taper_s = 0.0
@@ -173,6 +183,7 @@ class Charger:
         if self.control_mode is ControlMode.AUTOMATIC:
             self._next_stage(pack)
         self._start_by_itself(dt_s)
+        self._go_back(dt_s)
         demand_a, room_a = self.demand_a, self.room_a(pack)
         self.current_a = self.output_a(dt_s, demand_a, room_a)
         self.voltage_v = pack.ocv_v + self.current_a * (pack.series_ohm + self.lead_ohm)
@@ -228,7 +239,13 @@ class Charger:
 
     def _start_by_itself(self, dt_s: float) -> None:
         self.still_s = 0.0 if self.running else self.still_s + dt_s
-        if self.rogue and self.still_s >= ROGUE_AFTER_S:
+        restless = self.restless_s is not None and self.still_s >= self.restless_s
+        if restless or (self.rogue and self.still_s >= ROGUE_AFTER_S):
             self.rogue = self.resting = self.full = False
             self.run, self.mode = True, ChargeMode.CHARGE
             self._begin()
+
+    def _go_back(self, dt_s: float) -> None:
+        self.limit_s += dt_s
+        if self.reverts_s is not None and self.limit_s >= self.reverts_s:
+            self.current_limit = len(self.steps_a) - 1

@@ -6,6 +6,7 @@ It shares nothing with `orchestrator.protocol`: where the two disagree, one of t
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from math import inf
 
 from orchestrator.sim.charger import Charger
 
@@ -35,6 +36,23 @@ class Kind(IntEnum):
     CHARGE_MODE = 7
     PRECHARGE = 8
     CONNECTION = 9
+
+
+@dataclass(slots=True)
+class Lie:
+    """A value that a status reply says instead of the true one: in every reply, in each n-th, or only so often."""
+
+    value: int
+    every: int = 1  #: 2: every second reply
+    times: float = inf  #: 1: once
+    replies: int = 0  #: so far
+
+    def is_told(self) -> bool:
+        """Whether the next reply has it."""
+        self.replies += 1
+        told = self.replies % self.every == 0 and self.times > 0
+        self.times -= told
+        return told
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,15 +1,28 @@
 """An emulated charger on a pseudo-terminal: real bytes on a real tty, served by an asyncio loop."""
 
 import asyncio
+import fcntl
 import os
+import termios
 import tty
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.sim.charger import Charger
-from orchestrator.sim.charger_frames import CHECKSUM_ERROR, REST, SET, STATUS, Ear, Kind, Request, complaint, status
-from orchestrator.sim.line import Line, Noise
+from orchestrator.sim.charger_frames import (
+    CHECKSUM_ERROR,
+    REST,
+    SET,
+    STATUS,
+    Ear,
+    Kind,
+    Lie,
+    Request,
+    complaint,
+    status,
+)
+from orchestrator.sim.line import Line, Noise, garbled, is_clear
 
 #: A frame that pauses for this long (some 60 byte times) has been cut off.
 FRAME_GAP_S = 0.03
@@ -54,6 +67,7 @@ class ChargerWire:
         self.mute_tx = False  #: says nothing
         self.complains = False  #: answers every frame with 0x1F, checksum error
         self.lies: dict[Kind, int] = {}  #: values that its status replies say, whatever is true
+        self.liars: dict[Kind, Lie] = {}  #: as `lies`, but only now and then
         self.on_bytes: Callable[[float, bytes], None] | None = None  #: called with (monotonic s, bytes) as they come
         self.path = ""
         self._loop = loop
@@ -63,7 +77,7 @@ class ChargerWire:
         self._now = now
         self._ear = Ear()
         self._cut_off: asyncio.TimerHandle | None = None
-        self._master = self._slave = -1
+        self._master = self._slave = self._stranger = -1
 
     # --- the port ---
 
@@ -71,6 +85,7 @@ class ChargerWire:
         """Make the pty, and the link to it if there is to be one. The line settings are the client's to set."""
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)  # also keeps the line up while no client has it open
+        self.set_speed(termios.B9600)  # as a port that nobody has set up yet
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         if self._link is not None:
@@ -87,6 +102,7 @@ class ChargerWire:
         self._loop.remove_reader(self._master)
         os.close(self._master)
         os.close(self._slave)
+        self.unlock()
         self._master = self._slave = -1
         self._ear.forget()
         if self._link is not None:
@@ -96,6 +112,34 @@ class ChargerWire:
     def is_open(self) -> bool:
         """Whether the port is there."""
         return self._master >= 0
+
+    # --- other programs on the same machine ---
+
+    def set_speed(self, speed: int) -> None:
+        """Another program sets the port to this speed, one of `termios.B…`."""
+        settings = termios.tcgetattr(self._slave)
+        settings[4] = settings[5] = speed
+        termios.tcsetattr(self._slave, termios.TCSANOW, settings)
+
+    def lock(self) -> None:
+        """Another program opens the port and locks it."""
+        if self._stranger < 0 <= self._slave:
+            self._stranger = os.open(self.path, os.O_RDWR | os.O_NOCTTY)
+            try:
+                fcntl.flock(self._stranger, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:  # the service has it: this program waits for its turn as long as it lives
+                self.unlock()
+
+    def unlock(self) -> None:
+        """It closes the port again."""
+        if self._stranger >= 0:
+            os.close(self._stranger)
+            self._stranger = -1
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the port's settings are the charger's; else both hear garbage."""
+        return is_clear(termios.tcgetattr(self._slave))
 
     # --- hearing ---
 
@@ -113,6 +157,7 @@ class ChargerWire:
             self._write(chunk)
         if self.mute_rx:
             return
+        chunk = chunk if self.is_clear else garbled(chunk)
         if self._line.byte_s:
             self._loop.call_later(len(chunk) * self._line.byte_s, self._hear, now_s, chunk)
         else:
@@ -140,7 +185,8 @@ class ChargerWire:
         elif request.command == STATUS:
             counters.polls += 1
             kind1, kind2 = request.data
-            self._say(status(self.charger, kind1, kind2, self.lies))
+            told = {kind: lie.value for kind, lie in self.liars.items() if lie.is_told()}
+            self._say(status(self.charger, kind1, kind2, {**self.lies, **told}))
         elif request.command == SET:
             counters.orders += 1
             self.charger.push(*request.data)
@@ -168,6 +214,6 @@ class ChargerWire:
     def _write(self, data: bytes) -> None:
         if self._master >= 0:
             try:
-                os.write(self._master, data)
+                os.write(self._master, data if self.is_clear else garbled(data))
             except OSError:  # nobody reads: a wire does not keep what nobody hears
                 return

@@ -27,7 +27,7 @@ class PlantProcess:
 
     def __init__(self, directory: Path, *args: str) -> None:
         self._process = subprocess.Popen(  # noqa: S603 - our own module, by our own interpreter
-            [sys.executable, "-m", "orchestrator.sim.plant", "--dir", str(directory), *args],
+            [sys.executable, "-P", "-m", "orchestrator.sim.plant", "--dir", str(directory), *args],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )

@@ -6,8 +6,10 @@ charger did because of them, and what the pack has become, stays.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 from orchestrator.model import ChargeMode, ControlMode
+from orchestrator.sim import hostile
 from orchestrator.sim.can_wire import NodeFaults
 from orchestrator.sim.charger import Push
 from orchestrator.sim.charger_frames import Kind
@@ -193,12 +195,16 @@ def _heal(rig: Rig, _: float | None) -> None:
     charger.reversed = charger.rogue = charger.ignores_stop = False
     charger.halted, charger.gain, charger.control_mode = None, 1.0, rig.as_built.control_mode
     charger.deaf_to.clear()
+    charger.stops_left, charger.restless_s, charger.reverts_s = inf, None, None
+    pack.cells = rig.as_built.cells
     pack.bias_v, pack.leaky = 0.0, False
     if pack.driven_c is not None:
         pack.driven_c = rig.as_built.ambient_c
     rig.bay.falsify.clear()
     rig.bay.connected = True
     rig.wire.lies.clear()
+    rig.wire.liars.clear()
+    rig.wire.unlock()
     rig.wire.mute_rx = rig.wire.mute_tx = rig.wire.complains = False
     rig.bmu.port.faults = NodeFaults()
     if not rig.wire.is_open:
@@ -242,5 +248,22 @@ FAULTS = {
     "ignore_stop": Fault("the charger no longer obeys a stop", _ignore_stop),
     "bmu_reboot": Fault("the BMU restarts and forgets its settings", _bmu_reboot),
     "port_gone": Fault("the serial adapter is unplugged", _port_gone),
+    "line_taken_over": Fault("another program sets the serial port to 115200 baud", hostile.line_taken_over),
+    "port_locked": Fault("another program locks the serial port as soon as it is free", hostile.port_locked),
+    "says_standby": Fault("the charger says that it stands by with 0.00 A, whatever it does", hostile.says_standby),
+    "says_standby_now_and_then": Fault(
+        "every second answer of the charger says that it stands by with 0.00 A", hostile.says_standby_now_and_then
+    ),
+    "limit_reverts": Fault(
+        "the charger takes each limit and goes back to its highest after 0.25 s", hostile.limit_reverts
+    ),
+    "runs_again": Fault("the charger runs again by itself, 3 s after each stop", hostile.runs_again),
+    "obeys_once": Fault("the charger obeys one more stop, and no later one", hostile.obeys_once),
+    "stopped_elsewhere": Fault("somebody else sends the charger to standby", hostile.stopped_elsewhere),
+    "bmu_frozen": Fault("the BMU goes on saying all values of now", hostile.bmu_frozen),
+    "pack_collapsed": Fault("the pack's voltage falls to 31 V at once", hostile.pack_collapsed),
+    "another_pack": Fault(
+        "the pack is one of 10 cells in series (36 V), with a BMU like the other's", hostile.another_pack
+    ),
     "heal": Fault("all faults are gone, the adapter is plugged in again", _heal),
 }

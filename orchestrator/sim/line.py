@@ -1,6 +1,8 @@
 """What a serial line can do to the bytes on it."""
 
 import random
+import termios
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 #: One byte at 19200 baud with start and stop bit (§2.2.2).
@@ -33,6 +35,19 @@ LINES = {
     "echo": Line(echo=True),
     "poor": Line(byte_s=BYTE_S, lost=0.01, wrong=0.001),
 }
+
+
+def is_clear(settings: Sequence[object]) -> bool:
+    """Whether a port with these settings (of `termios.tcgetattr`) brings bytes to and from a charger as they are."""
+    iflag, oflag, cflag, lflag, _, speed = (int(value) for value in settings[:6])  # type: ignore[call-overload]
+    framed = cflag & (termios.CSIZE | termios.PARENB | termios.CSTOPB | termios.CRTSCTS | termios.CREAD)
+    changed = iflag & (termios.ISTRIP | termios.ICRNL | termios.IXON) or oflag & termios.OPOST or lflag & termios.ICANON
+    return speed == termios.B19200 and framed == termios.CS8 | termios.CREAD and not changed
+
+
+def garbled(data: bytes) -> bytes:
+    """What is heard of bytes that were sent at another speed or in another format: fewer, and others."""
+    return bytes(byte * 37 + 101 & 0xFF for byte in data[::2])
 
 
 class Noise:

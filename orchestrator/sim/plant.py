@@ -23,12 +23,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import can
-
 from orchestrator.model import ControlMode
 from orchestrator.sim.bay import Bay
 from orchestrator.sim.bmu import Layout
 from orchestrator.sim.can_noise import BUSES
+from orchestrator.sim.can_pty import open_bus
 from orchestrator.sim.can_wire import CanWire
 from orchestrator.sim.charger import Charger
 from orchestrator.sim.faults import FAULTS
@@ -51,7 +50,7 @@ class Plant:
     def __init__(self, loop: asyncio.AbstractEventLoop, args: argparse.Namespace) -> None:
         self._loop = loop
         self._args = args
-        self._buses = [can.Bus(**json.loads(text)) for text in args.can or [CAN]]
+        self._buses = [open_bus(json.loads(text)) for text in args.can or [CAN]]
         self._wires = [CanWire(loop, bus, BUSES[args.bus]) for bus in self._buses]
         self._per_bus = -(-args.bays // len(self._buses))
         self.rigs = [self._build(number) for number in range(args.bays)]
@@ -70,6 +69,7 @@ class Plant:
             link=args.dir / f"bay-{number + 1}",
             line=LINES[args.line],
             layout=LAYOUTS[args.layout],
+            main_loop=args.bmu == "mainloop",
             speed=args.speed,
         )
         return Rig(self._loop, self._wires[number // self._per_bus], Bay(charger, pack), setup)
@@ -201,7 +201,11 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m orchestrator.sim.plant", description="An emulated station.")
     parser.add_argument("--dir", type=Path, required=True, help="where the ports bay-1, bay-2, … are linked")
     parser.add_argument("--bays", type=int, default=1)
-    parser.add_argument("--can", action="append", help=f"python-can's keys as JSON; may be repeated; default {CAN}")
+    parser.add_argument(
+        "--can",
+        action="append",
+        help=f"python-can's keys as JSON, or interface pty; may be repeated; default {CAN}",
+    )
     parser.add_argument("--node", type=lambda text: int(text, 0), default=0x10, help="node id of each bus's first BMU")
     parser.add_argument("--pack", choices=PACKS, default="48v")
     parser.add_argument("--soc", type=float, help="state of charge at first, %%; -100 … 0 is deep discharge")
@@ -209,6 +213,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--line", choices=LINES, default="real", help="what the serial lines do to bytes")
     parser.add_argument("--bus", choices=BUSES, default="perfect", help="what the CAN buses do to frames")
     parser.add_argument("--layout", choices=LAYOUTS, default="first-high", help="of the BMUs' words")
+    parser.add_argument("--bmu", choices=("immediate", "mainloop"), default="immediate", help="when the BMUs answer")
     parser.add_argument("--automatic", action="store_true", help="the chargers' rotary switches are on 5, not on 1")
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real time the batteries live")
     args = parser.parse_args(argv)

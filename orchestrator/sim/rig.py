@@ -25,6 +25,7 @@ class Setup:
     link: Path | None = None  #: a name for the charger's port
     line: Line = field(default_factory=Line)
     layout: Layout = Layout.FIRST_HIGH
+    main_loop: bool = False  #: the BMU answers when its main loop comes round to it
     speed: float = 1.0  #: model seconds in one real second
 
 
@@ -34,6 +35,7 @@ class AsBuilt:
 
     control_mode: ControlMode
     ambient_c: float
+    cells: int = 13
 
 
 class Rig:
@@ -41,13 +43,13 @@ class Rig:
 
     def __init__(self, loop: asyncio.AbstractEventLoop, can_wire: CanWire, bay: Bay, setup: Setup) -> None:
         self.bay = bay
-        self.as_built = AsBuilt(bay.charger.control_mode, bay.pack.ambient_c)
+        self.as_built = AsBuilt(bay.charger.control_mode, bay.pack.ambient_c, bay.pack.cells)
         self.injected_s: float | None = None  #: when the newest fault was injected, `time.monotonic()`
         self._loop = loop
         self._speed = setup.speed
         self._advanced_s = loop.time()
         self.wire = ChargerWire(loop, bay.charger, line=setup.line, link=setup.link, now=self.catch_up)
-        self.bmu = Bmu(loop, can_wire, setup.node_id, self._readout, layout=setup.layout)
+        self.bmu = Bmu(loop, can_wire, setup.node_id, self._readout, layout=setup.layout, main_loop=setup.main_loop)
         self.wire.open()
 
     def catch_up(self) -> None:
@@ -78,3 +80,8 @@ class Rig:
     def _readout(self) -> Readout:
         self.catch_up()
         return self.bay.readout()
+
+
+def cross_cables(one: Rig, other: Rig) -> None:
+    """Swap the serial cables of two bays: what is ordered for one is done by the charger of the other."""
+    one.wire.charger, other.wire.charger = other.wire.charger, one.wire.charger

@@ -1,12 +1,16 @@
 """A journal read back: every step that was recorded of a bay, with all that it was given, and what was said of it.
 
-What stands in a file is hostile until it is decoded: a line that is no snapshot of ours is named with its place.
+Theory of operation. What stands in a file is hostile until it is decoded, and a power cut leaves torn lines: what
+cannot be read is counted and passed over. Snapshots are differences, so that a line which is lost takes its successors
+with it up to the next whole one. A run of the service, and after a reboot the monotonic clock, begin anew: an event
+belongs to the step in whose few milliseconds it was written, and of several to the one of the same wall-clock time.
 """
 
 import gzip
 import json
+import zlib
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,6 +27,10 @@ from orchestrator.model import Snapshot
 #: What `decision_lines` writes of a step.
 EVENTS = frozenset({"transition", "command", "fault", "session", "decision"})
 STREAMS = ("events", "snapshots")
+#: With these, nothing that was there before goes on: another run of the service, lines that no disk took.
+BREAKS = frozenset({"run", "lost"})
+#: No step takes longer than this to be written down.
+STEP_S = 60.0
 
 Fields = dict[str, Any]
 Event = tuple[str, Mapping[str, object]]  #: kind, fields
@@ -41,27 +49,115 @@ class Recorded:
     memory: Memory | None = None
     rules: Rules | None = None
     events: list[Event] = field(default_factory=list)  #: what the journal says of it
+    written_s: float = 0.0  #: when it was written down, right after its events
+    gap: bool = False  #: steps right before it are lost
+    unsure: bool = False  #: events of it may be lost
 
 
-def read(paths: Iterable[Path]) -> dict[str, list[Recorded]]:
-    """Each bay's steps, in order, from journal directories and files (JSON Lines, also gzipped).
+@dataclass(slots=True)
+class Record:
+    """All that could be read."""
 
-    Raises ConfigError for what cannot be read, with file and line.
-    """
-    steps: dict[str, list[Recorded]] = {}
-    events: list[Fields] = []
-    parts: dict[str, Fields] = {}
-    for path in _files(paths):
-        for number, line in _lines(path):
+    bays: dict[str, list[Recorded]] = field(default_factory=dict)  #: each bay's steps, in order
+    broken: list[Finding] = field(default_factory=list)  #: the lines that could not be
+
+
+@dataclass(slots=True)
+class _Stream:
+    """How far the files of one stream have been read."""
+
+    parts: dict[str, Fields] = field(default_factory=dict)  #: each bay's last snapshot
+    gaps: set[str] = field(default_factory=set)  #: the bays that have lost steps since theirs
+    wall: str = ""  #: the time of the last line …
+    hole: bool = False  #: … after which something is missing
+
+    def stop(self) -> None:
+        """What follows does not go on from what was before."""
+        self.gaps |= self.parts.keys()
+        self.parts.clear()
+
+
+class _Reader:
+    """Reads the lines of all files, one after another."""
+
+    def __init__(self) -> None:
+        self.record = Record()
+        self.events: list[Fields] = []
+        self.holes: list[tuple[str, str]] = []  # between which wall-clock times something is missing
+        self._streams: dict[str, _Stream] = {}
+        self._stream = _Stream()
+
+    def begin(self, path: Path) -> None:
+        """Another file, which may go on where an older one has ended."""
+        self._stream = self._streams.setdefault(str(path.parent / path.name.partition(".")[0]), _Stream())
+
+    def take(self, path: Path, number: int, text: bytes) -> None:
+        """One line."""
+        try:
+            line = _line(text)
             if line["kind"] == "snapshot":
-                try:
-                    _take(line, steps.setdefault(line["bay"], []), parts)
-                except (BaseValidationError, LookupError, TypeError, ValueError) as error:
-                    raise _wrong(path, number, f"this is no snapshot that can be read: {error!r}") from None
-            elif line["kind"] in EVENTS:
-                events.append(line)
-    _spread(events, steps)
-    return {bay: taken for bay, taken in steps.items() if taken}
+                self._snapshot(line)
+        except (BaseValidationError, LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:
+            self.broken(path, number, f"this is no line of a journal: {error!r:.200}")
+            return
+        stream = self._stream
+        if stream.hole:
+            self.holes.append((stream.wall, line["wall"]))
+        stream.wall, stream.hole = line["wall"], False
+        if line["kind"] in BREAKS:
+            stream.stop()
+        elif line["kind"] in EVENTS:
+            self.events.append(line)
+
+    def broken(self, path: Path, number: int, text: str) -> None:
+        """A line that is passed over; nobody knows what it was."""
+        self.record.broken.append(Finding(str(path), number, 1, text))
+        self._stream.hole = True
+        self._stream.stop()
+
+    def end(self) -> Record:
+        """Everything, each event where it belongs."""
+        self.holes += [(stream.wall, "") for stream in self._streams.values() if stream.hole]
+        for step in (step for taken in self.record.bays.values() for step in taken):
+            step.unsure = any(since <= step.wall and (not until or step.wall <= until) for since, until in self.holes)
+        _spread(self.events, self.record.bays)
+        return self.record
+
+    def _snapshot(self, line: Fields) -> None:
+        """A whole one, or what differs from the one before."""
+        memory: Memory | None = None
+        rules: Rules | None = None
+        bay, at_s, parts = line["bay"], float(line["at_s"]), self._stream.parts
+        if line.get("whole"):
+            plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
+            memory = _CONVERTER.structure(line["memory"], Memory)
+            rules = Rules.of(_CONVERTER.structure(line["config"], Bay))
+        elif bay in parts:
+            before = parts[bay]
+            changed = {name: line[name] for name in Snapshot.__slots__ if name in line}
+            plain = {**before, **changed, "battery": {**before["battery"], **changed.get("battery", {})}}
+        else:
+            return  # what it continues has gone
+        snapshot = _CONVERTER.structure(plain, Snapshot)
+        recorded = Recorded(
+            at_s, line["wall"], snapshot, memory, rules, written_s=line["t"], gap=bay in self._stream.gaps
+        )
+        self.record.bays.setdefault(bay, []).append(recorded)
+        parts[bay] = plain
+        self._stream.gaps.discard(bay)
+
+
+def read(paths: Iterable[Path]) -> Record:
+    """Each bay's steps from journal directories and files (JSON Lines, also gzipped).
+
+    Raises ConfigError for files that cannot be read at all.
+    """
+    reader = _Reader()
+    for path in _files(paths):
+        reader.begin(path)
+        for number, text in _lines(path, reader):
+            reader.take(path, number, text)
+    return reader.end()
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
@@ -81,56 +177,48 @@ def _age(path: Path) -> int:
     return int(age) if age.isdigit() else 0
 
 
-def _lines(path: Path) -> Iterator[tuple[int, Fields]]:
+def _lines(path: Path, reader: _Reader) -> Iterator[tuple[int, bytes]]:
+    number = 0
     try:
         with (gzip.open if path.suffix == ".gz" else open)(path, "rb") as file:
             for number, text in enumerate(file, 1):
-                line = _line(path, number, text)
-                if line:
-                    yield number, line
-    except (OSError, EOFError) as error:
-        raise _wrong(path, 1, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+                if text.strip():
+                    yield number, text
+    except (EOFError, zlib.error) as error:
+        reader.broken(path, number + 1, f"the file ends here: {error}")
+    except OSError as error:
+        raise _wrong(path, number + 1, f"cannot be read: {error.strerror or error}") from None
 
 
-def _line(path: Path, number: int, text: bytes) -> Fields:
-    """One line's object; empty for the last line of a journal that a power failure has cut off."""
-    try:
-        line = json.loads(text)
-    except (ValueError, RecursionError):
-        if text.endswith(b"\n") and text.strip():
-            raise _wrong(path, number, "this is no JSON; a journal has one object a line") from None
-        return {}
+def _line(text: bytes) -> Fields:
+    """One line's object; ValueError for anything else."""
+    line = json.loads(text)
     if not isinstance(line, dict) or not all(isinstance(line.get(key), str) for key in ("kind", "bay", "wall")):
-        raise _wrong(path, number, "this is no line of a journal: it has t, wall, bay and kind")
+        raise ValueError("it has t, wall, bay and kind")
+    line["t"] = float(line["t"])
     return line
 
 
-def _take(line: Fields, steps: list[Recorded], parts: dict[str, Fields]) -> None:
-    """One snapshot line: a whole one, or what differs from the one before."""
-    memory: Memory | None = None
-    rules: Rules | None = None
-    if line.get("whole"):
-        plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
-        memory = _CONVERTER.structure(line["memory"], Memory)
-        rules = Rules.of(_CONVERTER.structure(line["config"], Bay))
-    elif line["bay"] in parts:
-        before = parts[line["bay"]]
-        changed = {name: line[name] for name in Snapshot.__slots__ if name in line}
-        plain = {**before, **changed, "battery": {**before["battery"], **changed.get("battery", {})}}
-    else:
-        return  # the file that it continues has gone
-    parts[line["bay"]] = plain
-    steps.append(Recorded(float(line["at_s"]), line["wall"], _CONVERTER.structure(plain, Snapshot), memory, rules))
-
-
-def _spread(events: Iterable[Fields], steps: Mapping[str, list[Recorded]]) -> None:
-    """Give each event to the step that it was written for: the last one begun before it."""
-    times = {bay: [step.at_s for step in taken] for bay, taken in steps.items()}
+def _spread(events: Iterable[Fields], bays: Mapping[str, list[Recorded]]) -> None:
+    """Give each event to the step that it was written for; none to those whose step is lost."""
+    by_time = {bay: sorted(steps, key=lambda step: step.at_s) for bay, steps in bays.items()}
+    times = {bay: [step.at_s for step in steps] for bay, steps in by_time.items()}
     for line in events:
-        at = bisect_right(times.get(line["bay"], []), line["t"]) - 1
-        if at >= 0:
+        near = list(_near(line["t"], by_time.get(line["bay"], []), times.get(line["bay"], [])))
+        if near:
+            later = [step for step in near if step.wall >= line["wall"]]  # a step is written down after its events
+            step = min(later or near, key=lambda step: step.wall)
             fields = {name: value for name, value in line.items() if name not in ("t", "wall", "bay", "kind")}
-            steps[line["bay"]][at].events.append((line["kind"], fields))
+            step.events.append((line["kind"], fields))
+
+
+def _near(t_s: float, steps: Sequence[Recorded], times: Sequence[float]) -> Iterator[Recorded]:
+    """The steps that something of this time may have been written for: one in each boot of the machine."""
+    for at in range(bisect_right(times, t_s) - 1, -1, -1):
+        if times[at] < t_s - STEP_S:
+            return
+        if t_s <= steps[at].written_s:
+            yield steps[at]
 
 
 def _wrong(path: Path, number: int, text: str) -> ConfigError:

@@ -37,13 +37,15 @@ def again(steps: Iterable[Recorded]) -> Iterator[Again]:
     for recorded in steps:
         wrong = ""
         if recorded.memory is not None and recorded.rules is not None:
-            if memory is not None and memory.last_s == recorded.memory.last_s:
+            if recorded.gap or recorded.memory.last_s is None:
+                before = None  # of the step before nothing is known, or there was none
+            elif memory is not None and memory.last_s == recorded.memory.last_s:
                 wrong = _differs(memory, recorded.memory)
             memory, rules = recorded.memory, recorded.rules
         assert memory is not None
         assert rules is not None
         decision, after = step(recorded.at_s, recorded.snapshot, memory, rules)
-        if not recorded.snapshot.internal and (before is not None or memory.last_s is None):
+        if not recorded.snapshot.internal and not recorded.unsure and (before is not None or memory.last_s is None):
             wrong = wrong or _said_otherwise(recorded, list(decision_lines(before, decision)))
         yield Again(recorded, rules, memory, decision, after, wrong)
         memory, before = after, decision

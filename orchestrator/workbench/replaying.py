@@ -1,6 +1,7 @@
 """`orchestrator replay`: a journal's decisions taken again, and what became of them, line by line."""
 
 from collections.abc import Callable, Iterable
+from itertools import pairwise
 from pathlib import Path
 
 from orchestrator.config.load import load_policy
@@ -21,7 +22,10 @@ def replay(journals: Iterable[Path], policy: str | None, bays: Iterable[str] = (
     Raises ConfigError for journals or a policy that cannot be read, OrchestratorError where nothing is recorded.
     """
     other = load_policy(policy) if policy else None
-    recorded = read(journals)
+    record = read(journals)
+    recorded = record.bays
+    if record.broken:
+        show(f"{len(record.broken)} lines cannot be read and are passed over, the first: {record.broken[0]}")
     chosen = {name: recorded.get(name, []) for name in bays} or recorded
     missing = [name for name, steps in chosen.items() if not steps]
     if missing or not chosen:
@@ -41,7 +45,7 @@ def _same(bay: str, steps: list[Recorded], show: Show) -> int:
         show(f"{bay}  {one.recorded.wall}  {one.wrong}")
     if len(wrong) > SHOWN:
         show(f"{bay}  … and {len(wrong) - SHOWN} more")
-    span_s = steps[-1].at_s - steps[0].at_s
+    span_s = sum(max(after.at_s - before.at_s, 0.0) for before, after in pairwise(steps) if not after.gap)
     verdict = f"{len(wrong)} are NOT as recorded" if wrong else "all as recorded"
     show(f"{bay}: {len(steps)} decisions in {span_s:.0f} s taken again: {verdict}")
     return 1 if wrong else 0

@@ -84,10 +84,9 @@ CHARGE = (
 
 
 def trail(*samples: tuple[float, float, float, float]) -> dict[str, Any]:
-    """Seconds ago, the volts of both, the pack's amps, the charger's amps; oldest first."""
-    return {**witnessed(trail=tuple(Sample(ago(age_s), volts, pack_a, volts, charger_a)
-                                    for age_s, volts, pack_a, charger_a in samples)),
-            "step": Step(4, 14.0, "")}  # fmt: skip
+    """Seconds ago, the pack's volts and amps, the charger's amps; oldest first."""
+    seen = tuple(Sample(ago(age_s), pack_v, pack_a, pack_v, amps) for age_s, pack_v, pack_a, amps in samples)
+    return {**witnessed(trail=seen), "step": Step(4, 14.0, "")}
 
 
 TAPERED = trail((5.0, 53.0, 6.9, 6.9), (0.0, 53.0, 6.9, 6.9))
@@ -323,8 +322,8 @@ PAIR = (
     Edge(measured.amps_disagree, None, bmu={"current_a": 9.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.00 A; the charger is likelier wrong, by the "
          "step that was set (8 A)", {"step": Step(2, 8.0, "")}, bmu={"current_a": 8.0}),
-    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A; the BMU is likelier wrong, by the "
-         "step that was set (10 A)", {"step": Step(2, 10.0, "")}, bmu={"current_a": 14.0}),
+    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A; the BMU is likelier wrong, by the step "
+         "that was set (10 A)", {"step": Step(2, 10.0, "")}, bmu={"current_a": 14.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A", {"step": Step(2, 2.0, "")},
          bmu={"current_a": 14.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.99 A", bmu={"current_a": 8.99}),

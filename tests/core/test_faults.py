@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
-from orchestrator.core.faults import FAULTS, ROW, Clear, Row
+from orchestrator.core.faults import FAULTS, ROW, Check, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.core.witnesses import measured, pack, paired, standby
 from orchestrator.keys import Range, Source
@@ -52,7 +52,7 @@ def test_the_rows_are_one_each() -> None:
 
 def test_every_predicate_is_in_the_table_and_says_where_it_comes_from() -> None:
     modules = (battery, charge, obedience, ourselves, reports, state_of_charge, measured, pack, paired)
-    predicates = {
+    predicates: set[Check] = {
         function
         for module in modules
         for name, function in inspect.getmembers(module, inspect.isfunction)

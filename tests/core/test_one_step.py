@@ -193,8 +193,8 @@ FOLLOWS = (
     Edge(search_s, 0.25, charger={"charge_mode": ChargeMode.BATTERY_SEARCH}),
     Edge(search_s, 0.0, charger={"charge_mode": ChargeMode.BATTERY_SEARCH, "operation": Operation.STOPPED}),
     Edge(search_s, 0.9375, {"search_s": 1.0}),
-    Edge(wake_s, 0.25, charger={"charge_mode": ChargeMode.BATTERY_RECOVERY}),
-    Edge(wake_s, 0.25, charger={"charge_mode": ChargeMode.PRECHARGE}),
+    *(Edge(wake_s, 0.25, charger={"charge_mode": mode})
+      for mode in (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)),
     Edge(wake_s, 0.9375, {"wake_s": 1.0}),
     Edge(still_values, STILL),
     Edge(still_values, replace(STILL, t_s=ago(9)), {"still": replace(STILL, t_s=ago(9))}),

@@ -6,6 +6,7 @@ It obeys in manual mode like the real one, and its line can be made as bad as re
 import os
 import random
 import select
+import termios
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -71,6 +72,7 @@ class FakeCharger:
         self.shape = shape
         self.echo = echo  #: as an RS-485 adapter that hears itself
         self.mute = False  #: receives and says nothing
+        self.baud: int | None = None  #: hears only what comes at this speed (a constant of termios); None: everything
         self.manual = True
         self.running = self.limit = self.mode = self.precharge = 0
         self.standby = False
@@ -136,9 +138,15 @@ class FakeCharger:
                 continue
             try:
                 if select.select([self.pty.master], [], [], 0.02)[0]:
-                    pending = self._receive(pending + os.read(self.pty.master, 4096))
+                    pending = self._receive(pending + self._hear())
             except (OSError, ValueError):  # unplugged
                 self._ended.wait(0.01)
+
+    def _hear(self) -> bytes:
+        """What a receiver makes of it: at another speed, nothing."""
+        heard = self.baud is None or self.baud == termios.tcgetattr(self.pty.master)[5]  # both ends have one setting
+        data = os.read(self.pty.master, 4096)
+        return data if heard else b""
 
     def _receive(self, pending: bytes) -> bytes:
         while len(pending) >= 4 and len(pending) >= pending[3] + 6:

@@ -150,6 +150,57 @@ def test_tpdos_on_a_real_bus(virtual: dict[str, object]) -> None:
         assert station.link().implausible == {}
 
 
+# --- others ---------------------------------------------------------------------------------------------------------
+
+
+def test_two_services_on_one_bus_read_the_same_bmu_and_know_of_each_other(udp: dict[str, object]) -> None:
+    with process_on(udp, 0x10), Station(udp, heartbeat_s=0.5) as station, Station(udp, heartbeat_s=0.5) as second:
+        for one in (station, second):
+            one.await_link(lambda link: link.other_master, "the other service")
+        begun_s = time.monotonic()
+        while time.monotonic() < begun_s + 1.5:
+            for one in (station, second):
+                one.await_fresh()
+                assert (one.link().problem, one.link().implausible, one.link().abort) == ("", {}, "")
+                assert one.link().heartbeat_set == ""
+
+
+def test_our_own_requests_that_come_back_are_no_other_master(udp: dict[str, object]) -> None:
+    with process_on(udp, 0x10), Station(udp, heartbeat_s=0.1, tpdo_s=0.1) as station:
+        station.await_link(lambda link: link.nmt_state == 5, "NMT start")
+        for _ in range(20):
+            station.await_fresh()
+        assert station.link().other_master == ""
+
+
+def test_thousands_of_foreign_frames_a_second_starve_nothing(udp: dict[str, object]) -> None:
+    ending = threading.Event()
+
+    def flood() -> None:
+        with can.Bus(**udp, hop_limit=0) as bus:  # type: ignore[arg-type]  # as in a station file
+            begun_s, sent = time.monotonic(), 0
+            while not ending.is_set():
+                while sent < 2000 * (time.monotonic() - begun_s):
+                    bus.send(can.Message(arbitration_id=0x123, data=bytes(8), is_extended_id=False))
+                    sent += 1
+                ending.wait(0.001)
+
+    with process_on(udp, 0x10), Station(udp) as station:
+        station.await_fresh()
+        thread = threading.Thread(target=flood)
+        thread.start()
+        try:
+            begun_s, before = time.monotonic(), station.port.foreign
+            while time.monotonic() < begun_s + 2.0:
+                station.await_fresh()
+                assert station.link().online
+                assert not station.bus.stalled(time.monotonic())
+            assert station.port.foreign - before > 1000
+        finally:
+            ending.set()
+            thread.join()
+
+
 # --- broken ----------------------------------------------------------------------------------------------------------
 
 

@@ -62,11 +62,12 @@ def test_an_answer_behind_the_deadline_is_late_even_if_nobody_looked_in_between(
     assert client.take(value(VOLTS), TIMEOUT_S) is Verdict.LATE
 
 
-def test_the_second_answer_is_a_stray() -> None:
+def test_a_second_answer_and_one_that_nobody_asked_for_are_told_apart() -> None:
     client = SdoClient(TIMEOUT_S)
     client.ask(VOLTS, 0.0)
     assert client.take(value(VOLTS), 0.01) is Verdict.ACCEPTED
-    assert client.take(value(VOLTS), 0.02) is Verdict.STRAY
+    assert client.take(value(VOLTS, 7), 0.02) is Verdict.SECOND
+    assert client.first == value(VOLTS)
     assert client.take(value(SOC), 0.03) is Verdict.STRAY
 
 

@@ -46,7 +46,7 @@ def test_the_timers_are_written_and_the_node_is_started() -> None:
 
 def test_no_tpdo_is_configured_or_heard_unless_asked_for() -> None:
     bench = Bench()
-    assert set(bench.node.cob_ids) == {0x590, 0x710, 0x090}
+    assert set(bench.node.cob_ids) == {0x590, 0x610, 0x710, 0x090}
     bench.answer_reads(3.0, WORDS)
     assert all(cob_id == REQUEST and data[0] == 0x40 for cob_id, data in bench.sent)
 
@@ -152,6 +152,41 @@ def test_tpdo_and_sdo_that_tell_different_stories_are_both_not_believed() -> Non
     assert "current_a" not in bench.link.implausible
     live(bench, 1.5)
     assert bench.link.implausible == {}
+
+
+def test_a_sender_that_lies_every_other_time_is_found_out() -> None:
+    bench = tpdo_bench()
+    live(bench, 1.5)
+    other = WORDS | {0x6000: 0x1388FFF8}
+    found = False
+    for _ in range(6):
+        for words in (other, WORDS):
+            live(bench, 1.0, words)
+            found |= "a TPDO says" in bench.link.implausible.get("voltage_v", "")
+    assert found
+
+
+@pytest.mark.parametrize(
+    ("request_", "used"),
+    [
+        ("23 00 18 01 90 02 00 00", False),  # another COB-ID
+        ("23 00 1A 01 20 00 04 60", False),  # another object
+        ("2F 00 18 02 FE 00 00 00", False),  # another moment
+        ("2B 00 18 05 64 00 00 00", True),  # our own period
+        ("2B 00 14 05 64 00 00 00", True),  # what it receives
+    ],
+)
+def test_tpdos_that_another_master_has_changed_are_used_no_more_until_the_node_boots(request_: str, used: bool) -> None:
+    bench = tpdo_bench()
+    live(bench, 1.0)
+    bench.hear(REQUEST, request_)
+    bench.hear(REPLY, f"60 {bytes.fromhex(request_)[1:4].hex()} 00 00 00 00")
+    bench.now_s += 0.01
+    bench.hear(TPDO1, "10 00 60 09 FF FF 00 00")
+    assert (bench.reading.voltage_v.value == 24.0) == used  # type: ignore[union-attr]  # live
+    bench.hear(HEARTBEAT, "00")
+    bench.hear(TPDO1, "10 00 60 09 FF FF 00 00")
+    assert bench.reading.voltage_v.value == 24.0  # type: ignore[union-attr]  # just heard
 
 
 def test_tpdos_alone_do_not_make_a_node_online() -> None:

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import termios
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -12,7 +13,8 @@ import pytest
 
 from orchestrator.config.station import ChargerConfig, Limits
 from orchestrator.devices import line_quality
-from orchestrator.devices.charger import REOPEN_S, ChargerPort, Line
+from orchestrator.devices.charger import LOOK_S, REOPEN_S, ChargerPort, Line
+from orchestrator.errors import LinkError
 from orchestrator.interlock import Grant
 from orchestrator.keys import Range
 from orchestrator.link.serial import SerialLine
@@ -36,6 +38,7 @@ from tests.devices.fake_charger import (
     perfect,
 )
 from tests.link.ptys import Pty, plugged
+from tests.link.strangers import holding, stty
 from tests.waiting import wait_until
 
 LIMITS = Limits(voltage_v=58.4, current_a=15.0, temperature_c=Range(0.0, 45.0))
@@ -412,6 +415,12 @@ def test_a_line_that_always_has_more_to_read_does_not_hold_up_a_stop() -> None:
         def read(self, timeout_s: float, expected: int = 0) -> bytes:
             return bytes(64)
 
+        def restore(self) -> str:
+            return ""
+
+        def locked_by(self) -> str:
+            return ""
+
         def close(self) -> None:
             pass
 
@@ -509,7 +518,7 @@ def test_a_port_that_fails_after_a_while_is_opened_at_once_and_its_charger_stopp
         assert time.monotonic() - failed_s < 0.5 * REOPEN_S
 
 
-def test_a_port_that_someone_else_holds_is_taken_once_it_is_free(pty: Pty, charger: FakeCharger) -> None:
+def test_a_port_that_another_orchestrator_holds_is_taken_once_it_is_free(pty: Pty, charger: FakeCharger) -> None:
     with Path(pty.path).open("rb", buffering=0) as other:
         fcntl.flock(other, fcntl.LOCK_EX)
         with running(pty.path) as bench:
@@ -517,6 +526,72 @@ def test_a_port_that_someone_else_holds_is_taken_once_it_is_free(pty: Pty, charg
             assert charger.frames == []
             fcntl.flock(other, fcntl.LOCK_UN)
             bench.wait_online()
+
+
+def test_a_strangers_lock_is_told_and_the_charger_stopped_all_the_same(pty: Pty, charger: FakeCharger) -> None:
+    with holding(pty.path) as stranger, running(pty.path) as bench:
+        assert wait_frames(charger, 2) == [REST_STOP, OPERATION_STOP]
+        wait_until(lambda: f"(pid {stranger.pid})" in bench.link.locked_by, what="its name")
+        bench.wait_online()
+        stranger.communicate()
+        wait_until(lambda: bench.link.locked_by == "", what="the lock")
+
+
+# --- others who set it to something else -----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def hard_of_hearing(pty: Pty, charger: FakeCharger) -> FakeCharger:
+    """A charger that hears what comes at 19200 baud, as every real one does."""
+    charger.baud = termios.B19200
+    return charger
+
+
+def test_a_stop_goes_out_at_the_right_speed_whatever_the_port_was_set_to(
+    pty: Pty, bench: Bench, hard_of_hearing: FakeCharger
+) -> None:
+    bench.port.order(SET_STEP_2, good())
+    wait_until(lambda: hard_of_hearing.orders[-1:] == [STEP_2])
+    stty(pty.path, "115200", "echo")
+    bench.port.order(STOP)
+    wait_until(lambda: hard_of_hearing.orders[-2:] == [REST_STOP, OPERATION_STOP])
+    assert bench.link.taken_over == "115200 baud, echo on"
+    assert bench.link.taken_over_t_s is not None
+    assert time.monotonic() - bench.link.taken_over_t_s < 5
+
+
+def test_a_line_that_was_set_to_something_else_recovers_by_itself(
+    pty: Pty, bench: Bench, hard_of_hearing: FakeCharger
+) -> None:
+    """With the first poll that nobody answers: no stop is due, and the port is not opened anew."""
+    for baud in ("9600", "300"):
+        told = len(bench.seen)
+        stty(pty.path, baud)
+        wait_until(lambda baud=baud: bench.link.taken_over == f"{baud} baud")  # type: ignore[misc]
+        bench.wait_readings(3, since=told)
+        assert all(link.online and link.misses <= 2 for _, link in bench.seen[told:])
+
+
+def test_what_does_no_harm_at_once_is_set_right_within_a_second(pty: Pty, bench: Bench, charger: FakeCharger) -> None:
+    stty(pty.path, "opost")
+    began_s = time.monotonic()
+    wait_until(lambda: bench.link.taken_over == "translated output")
+    assert time.monotonic() - began_s < LOOK_S + 0.5
+    assert bench.link.misses == 0
+
+
+def test_settings_that_cannot_be_asked_for_keep_no_stop_back(
+    pty: Pty, charger: FakeCharger, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = SerialLine.open(pty.path)
+
+    def not_now() -> str:
+        raise LinkError("not now")
+
+    monkeypatch.setattr(line, "restore", not_now)
+    with running(pty.path, open_line=lambda: line) as bench:
+        assert wait_frames(charger, 3) == [REST_STOP, OPERATION_STOP, POLL]
+        bench.wait_online()
 
 
 def test_a_stalled_line_is_a_problem_and_stops_first_when_it_moves_again(

@@ -23,13 +23,17 @@ seen, the limit, and the line of the file that sets it. This page is made from t
 | STOP | charging stops; how it goes on, says the last column |
 | TRIP | charging stops, and the bay stays stopped until a person resets and then starts it |
 
+No fault waits for its condition to last without a break: the time that it was seen for drains at a quarter of its speed
+while it is away. And no word counts alone where a second witness can be heard: what the charger says and what the BMU
+says are held against each other in every state, and the sentence names the one that is likelier wrong.
+
 """
 NUMBERS = """
 ## By the numbers of the catalogue
 
-The faults that were thought of before anything was built: C of the charger, B of battery and bus, G of the gateway, P
-of policies and people. The code refers to them as FAULTS C1. A row is named where one sees the fault; the last column
-says what else is done, or where it is handled.
+The faults that this service must handle: C of the charger, B of battery and bus, G of the gateway, P of policies and
+people. The code refers to them as FAULTS C1. A row is named where one sees the fault; the last column says what else is
+done, or where it is handled.
 
 """
 STUCK = """
@@ -44,7 +48,8 @@ that goes on saying a plausible temperature is not found, because no rule would 
 - What the pack's resistance and heat capacity are, from which a rise could be expected, nobody tells us.
 
 A rule that stops good charges is switched off by the people who have to live with it. What is left: the BMU's own
-high-temperature bit, its own protection below all of this, and current steps that suit the pack.
+high-temperature bit, its own protection below all of this, and current steps that suit the pack. A BMU of which *every*
+word stands still while a charge goes in is found (`bmu_frozen`).
 """
 BACKOFFS = ", ".join(f"{CLEAN_S + wait_s:g}" for wait_s in BACKOFF_S)
 ENDS = {

@@ -25,10 +25,10 @@ def test_the_picture_in_the_readme_is_the_machine() -> None:
 
 #: The catalogue, by its numbers.
 NUMBERS = [
-    *(f"C{number}" for number in range(1, 26)),
-    *(f"B{number}" for number in range(1, 23)),
+    *(f"C{number}" for number in range(1, 32)),
+    *(f"B{number}" for number in range(1, 29)),
     *(f"G{number}" for number in range(1, 11)),
-    *(f"P{number}" for number in range(1, 8)),
+    *(f"P{number}" for number in range(1, 12)),
 ]
 
 

@@ -1,6 +1,7 @@
 """The CAN bus: any frames with a BMU's ids, at any time, between what the node asks for."""
 
 from orchestrator.config.load import load_map
+from orchestrator.devices.other_masters import MOST_OPEN
 from orchestrator.model import BatteryReading, Measurement
 from orchestrator.protocol.pages import parse_page
 from orchestrator.protocol.sdo import NMT_COB_ID, SdoMalformed, parse_reply
@@ -9,11 +10,18 @@ from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, NODE_ID, REPLY, REQUES
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
 from tests.protocol.vectors import BMU
 
-#: What an event is: a frame on one of four ids, an answer to the newest request, time, trouble with the bus, and bytes
+#: What an event is: a frame on one of some ids, an answer to the newest request, time, trouble with the bus, and bytes
 #: for the parsers that are not the node's.
-SDO, HEART, EMCY, TPDO, ANSWER, PAUSE, TROUBLE, PARSE = range(8)
-TPDO_COB_IDS = (0x190, 0x290, 0x390)
+SDO, HEART, EMCY, ELSE, ANSWER, PAUSE, TROUBLE, PARSE = range(8)
+#: By the first byte of ELSE: a TPDO, a request or an NMT command of another master.
+ELSE_COB_IDS = (0x190, 0x290, 0x390, REQUEST, NMT_COB_ID)
+OTHERS, NMT = b"\3", b"\4"
 COMMANDS = (0x43, 0x43, 0x4B, 0x4F, 0x60, 0x80, 0x41, 0xFF)
+#: Of another master: reads, writes, aborts, segments and blocks.
+REQUESTS = (
+    "4000600000000000", "2b17100088130000", "8000600000000405", "6000000000000000", "a00060007f000000",
+    "a300000000000000", "c200600004000000", "0100000000000000", "40081000", "2b00180564000000",
+)  # fmt: skip
 MAPS = (load_map("tabos"), load_map("tabos-lsb"))
 #: By the first byte of an input: heartbeat and TPDO periods, and the map.
 CONFIGS = tuple(
@@ -51,7 +59,7 @@ class Session:
             self._answer(content)
         else:
             ids = {SDO: REPLY, HEART: HEARTBEAT, EMCY: EMERGENCY}
-            self._frame(ids.get(kind) or TPDO_COB_IDS[content[0] % 3 if content else 0], content[kind == TPDO :])
+            self._frame(ids.get(kind, ELSE_COB_IDS[content[0] % 5 if content else 0]), content[kind == ELSE :])
         self._is_honest()
 
     def _answer(self, content: bytes) -> None:
@@ -67,6 +75,8 @@ class Session:
     def _frame(self, cob_id: int, data: bytes) -> None:
         if cob_id in self.bench.node.cob_ids:  # the bus hands on no other
             self.bench.node.on_frame(cob_id, data, self.bench.now_s)
+        elif cob_id == NMT_COB_ID:
+            self.bench.node.on_nmt(data, self.bench.now_s)
 
     def _parse(self, content: bytes) -> None:
         reply = parse_reply(content)
@@ -80,7 +90,8 @@ class Session:
     def _is_honest(self) -> None:
         """What is shown is in range and of the past; nothing grows; nothing is sent but to this node."""
         bench, link = self.bench, self.bench.link
-        assert len(bench.node._client._answered) <= self._keys
+        assert len(bench.node._client._answers) <= self._keys
+        assert len(bench.node._others._open) <= MOST_OPEN
         assert all(cob_id in (NMT_COB_ID, REQUEST) and len(data) <= 8 for cob_id, data in bench.sent)
         del bench.sent[:-1]
         if bench.node.view is self._shown:
@@ -91,7 +102,14 @@ class Session:
             assert value is None or (value.value in self._ranges[name] and value.t_s <= bench.now_s), name
         assert link.online == (link.problem == "")
         assert set(link.implausible) <= set(self._ranges)
-        for text in (link.problem, link.abort, link.emergency, *link.implausible.values()):
+        for text in (
+            link.problem,
+            link.abort,
+            link.emergency,
+            link.other_master,
+            link.heartbeat_set,
+            *link.implausible.values(),
+        ):
             assert len(text) <= MAX_TEXT and text.isprintable(), text
 
 
@@ -126,16 +144,22 @@ TARGET = Target(
         record(SDO, bytes.fromhex("6017100000000000")), record(HEART, b"\0"), record(HEART, b"\5"),
         record(HEART, b"\4"), record(HEART, b"\x7f"), record(HEART), record(EMCY, bytes(8)),
         record(EMCY, b"\x10\x42\0\0\0\0\0\0"), record(EMCY, b"\1"),
-        *(record(TPDO, bytes((number,)) + content) for number in range(3) for content in (bytes(8), b"\xff" * 8)),
-        record(TPDO, b"\1\1"),
+        *(record(ELSE, bytes((number,)) + content) for number in range(3) for content in (bytes(8), b"\xff" * 8)),
+        record(ELSE, b"\1\1"),
         record(PAUSE, b"\x02"), record(PAUSE, b"\x32"), record(PAUSE, b"\xc8"), record(TROUBLE), record(TROUBLE, b"\1"),
         record(PARSE, b"\x70\1" + bytes(6)), record(PARSE, b"\x70\2" + b"\xff" * 6),
         record(PARSE, b"\x70\3" + bytes(6)),
+        *(record(ELSE, OTHERS + bytes.fromhex(request)) for request in REQUESTS),
+        record(SDO, bytes.fromhex("410810000a000000")), record(SDO, bytes.fromhex("0043006000000000")),
+        record(SDO, bytes.fromhex("c60060000a000000")), record(SDO, bytes.fromhex("0143006000000000")),
+        *(record(ELSE, NMT + command) for command in (b"\2\x10", b"\x81\0", b"\1", b"\xff\xff")),
     ],
     ["orchestrator/protocol/sdo.py", "orchestrator/protocol/words.py", "orchestrator/protocol/pages.py",
      "orchestrator/devices/battery.py", "orchestrator/devices/battery_view.py", "orchestrator/devices/bmu_setup.py",
      "orchestrator/devices/emergency.py", "orchestrator/devices/node_health.py", "orchestrator/devices/polled.py",
-     "orchestrator/devices/read_plan.py", "orchestrator/devices/sdo_client.py"],
+     "orchestrator/devices/read_plan.py", "orchestrator/devices/sdo_client.py", "orchestrator/protocol/sdo_others.py",
+     "orchestrator/devices/other_masters.py", "orchestrator/devices/two_answers.py",
+     "orchestrator/devices/whose_answer.py"],
     max_bytes=100,
     limit_s=1.0,
 )  # fmt: skip

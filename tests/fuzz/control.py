@@ -4,12 +4,13 @@ import json
 import re
 import socket
 from collections.abc import Mapping
+from selectors import EVENT_READ
 from time import monotonic
 from typing import Any
 
 from orchestrator.config.load import load_station
 from orchestrator.model import Request
-from orchestrator.service import control
+from orchestrator.service import client
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz.target import Target, kind_of_word, scratch
@@ -43,6 +44,7 @@ class Loop:
         if number not in self.stepped:
             self.stepped.add(number)
             self._supervisor._bays[number].run(monotonic())
+            self._supervisor._bays[number].answer()  # there is no disk behind it to wait for
 
 
 def _service() -> tuple[Supervisor, Loop]:
@@ -66,21 +68,36 @@ def one(data: bytes) -> None:
     for bay in SUPERVISOR._bays:
         bay._asked.clear()
     ours, theirs = socket.socketpair()
-    with ours, theirs:
+    with theirs:
         theirs.sendall(data)
         theirs.shutdown(socket.SHUT_WR)
-        answer = SUPERVISOR._control._answer(ours)
-        line = control._line(answer)
+        line = _answered(ours, theirs)
     assert len(line) <= MAX_ANSWER and line.count(b"\n") == 1
     said: dict[str, Any] = json.loads(line)
     assert said["ok"] in (True, False)
     if said["ok"]:
-        _is_what_was_asked(control.parse_request(data[: control.MAX_REQUEST]), said)
+        _is_what_was_asked(client.parse_request(data[: client.MAX_REQUEST]), said)
     else:
         assert said["error"] and not said["error"].startswith("internal"), said["error"]
     for bay in SUPERVISOR._bays:
         assert not bay._asked, "requests wait that somebody believes answered"
         assert not bay._internal, bay._internal
+
+
+def _answered(ours: socket.socket, theirs: socket.socket) -> bytes:
+    """What the control socket's turns make of it."""
+    server = SUPERVISOR._control
+    one = client.Client(ours, monotonic())
+    server._clients.add(one)
+    server._selector.register(one, EVENT_READ)
+    server._serve(one, monotonic())
+    while one in server._clients:
+        if one.answering or not server._reception.busy:
+            server._serve(one, monotonic())
+        server._reception._request_s = 0.0  # without the pause between two requests
+        server._reception.work(monotonic())
+    with theirs.makefile("rb") as stream:
+        return stream.readline()
 
 
 def _is_what_was_asked(request: Mapping[str, object], said: dict[str, Any]) -> None:
@@ -114,7 +131,7 @@ TARGET = Target(
         b"\n", b", ", b": ", b"{", b"}", b"[", b"]", b"[" * 1200, b"]" * 1200, b'{"a":' * 300, b"\xff", b"\xef\xbb\xbf",
         b"\0", b" " * 4096, b'"bay-1", ', b'"' + b"\\u0001" * 600 + b'"', b"\\", b'"',
     ],
-    ["orchestrator/service/control.py", "orchestrator/service/supervisor.py", "orchestrator/service/status.py"],
-    max_bytes=control.MAX_REQUEST + 64,
+    [f"orchestrator/service/{name}.py" for name in ("reception", "client", "control", "supervisor", "status")],
+    max_bytes=client.MAX_REQUEST + 64,
     limit_s=1.0,
 )  # fmt: skip

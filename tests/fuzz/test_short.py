@@ -2,7 +2,6 @@
 
 import json
 import os
-import socket
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -17,13 +16,15 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from orchestrator.config import ports, yamltree
+from orchestrator.core import persisted
 from orchestrator.devices import battery, dialogue
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.model import Measurement
 from orchestrator.protocol import frame, standby, words
-from orchestrator.service import control, kept, laststop
+from orchestrator.service import control, lastline, reception, typed
+from orchestrator.service.client import Client
 from orchestrator.service.guardian import Guardian
-from orchestrator.service.kept import Kept
+from orchestrator.service.reception import Later
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz import __main__ as runner
 from tests.fuzz.__main__ import NAMES, main, the_target, unguided
@@ -118,7 +119,7 @@ def remembers_all(patch: Patch) -> None:
     ask, number = SdoClient.ask, count(1)
 
     def hoards(self: SdoClient, key: tuple[int, int], now_s: float, *, write: bool = False) -> None:
-        self._answered[next(number), -1] = False
+        self._answers[next(number), -1] = None
         ask(self, key, now_s, write=write)
 
     patch.setattr(SdoClient, "ask", hoards)
@@ -149,35 +150,36 @@ def any_json(patch: Patch) -> None:
     patch.setattr(control, "parse_request", json.loads)
 
 
-def asks_twice(patch: Patch) -> None:
+def asks_one_only(patch: Patch) -> None:
     ask = Supervisor._ask
 
-    def twice(self: Supervisor, bays: list[Any], request: Any) -> dict[str, str]:
-        return ask(self, bays * 2, request)
+    def once(self: Supervisor, bays: list[Any], request: Any) -> Later:
+        return ask(self, bays[:1], request)
 
-    patch.setattr(Supervisor, "_ask", twice)
+    patch.setattr(Supervisor, "_ask", once)
 
 
 def raw_answers(patch: Patch) -> None:
-    patch.setattr(control, "_line", lambda answer: str(answer).encode() + b"\n")
+    patch.setattr(reception, "encode", lambda answer: str(answer).encode() + b"\n")
 
 
 def waits_for_the_line(patch: Patch) -> None:
-    def patient(client: socket.socket, _clock: object) -> bytes:
-        client.settimeout(None)
-        with client.makefile("rb") as stream:
-            return stream.readline()
+    hear = Client.hear
 
-    patch.setattr(control, "_read_line", patient)
+    def patient(self: Client, now_s: float) -> bool:
+        self._connection.settimeout(None)
+        return hear(self, now_s)
+
+    patch.setattr(Client, "hear", patient)
     patch.setattr(import_module("tests.fuzz.clients"), "ANSWER_S", 0.5)
 
 
 def any_record(patch: Patch) -> None:
-    patch.setattr(kept, "_kept", lambda values: Kept(**values))
+    patch.setattr(typed, "_plain", lambda value, _kind: value)
 
 
 def latches_lost(patch: Patch) -> None:
-    patch.setattr(kept, "ROW", {})
+    patch.setattr(persisted, "ROW", {})
 
 
 def keeps_old_ports(patch: Patch) -> None:
@@ -185,7 +187,7 @@ def keeps_old_ports(patch: Patch) -> None:
 
 
 def any_name(patch: Patch) -> None:
-    patch.setattr(laststop, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
+    patch.setattr(lastline, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
 
 
 #: Target → what somebody might get wrong there.
@@ -193,7 +195,7 @@ BUGS: dict[str, tuple[Bug, ...]] = {
     "charger": (no_checksum, waits_for_ever, any_error_frame, much_is_standby),
     "bmu": (any_range, remembers_all, short_emergency, asks_for_ever),
     "config": (texts_only, marks_believed, wrong_place),
-    "control": (any_json, asks_twice, raw_answers),
+    "control": (any_json, asks_one_only, raw_answers),
     "clients": (waits_for_the_line,),
     "kept": (any_record, latches_lost),
     "guardian": (keeps_old_ports, any_name),

@@ -21,17 +21,39 @@ import pytest
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT, Guardian
 from orchestrator.service.lastopen import OPEN, SET_VALUES
+from tests.devices.fake_charger import charger_on
 from tests.guardian.chargers import running_chargers
+from tests.link.ptys import plugged
+from tests.link.strangers import holding, stty
 from tests.waiting import wait_until
 from tests.whole.station import die_with_parent
 
 #: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3. There is no GPIO line
 #: on most machines: a test hands over a pipe, and what the guardian would ask of the kernel comes out at its other end.
 LAUNCH = """
-import os, socket, struct, sys, time
+import os, socket, struct, sys, termios, time
 from orchestrator.service import guardian, lastopen
-lastopen.fcntl.ioctl = lambda fd, number, asked: os.write(fd, struct.pack("=dI16s", time.monotonic(), number, asked))
-for word in sys.argv[3:]:
+ioctl = lastopen.fcntl.ioctl
+def drive(fd, number, asked=0):
+    if number != lastopen.SET_VALUES:
+        return ioctl(fd, number, asked)
+    return os.write(fd, struct.pack("=dI16s", time.monotonic(), number, asked))
+lastopen.fcntl.ioctl = drive
+call, port = sys.argv[3:5]
+if call:
+    module = os if hasattr(os, call) else termios
+    good, device = getattr(module, call), os.path.realpath(port)
+    def stuck(which, *rest, **named):
+        try:
+            name = which if isinstance(which, str) else os.readlink(f"/proc/self/fd/{which}")
+        except OSError:
+            name = ""
+        if os.path.realpath(name) == device:
+            while True:
+                time.sleep(100)
+        return good(which, *rest, **named)
+    setattr(module, call, stuck)
+for word in sys.argv[5:]:
     name, _, value = word.partition("=")
     assert hasattr(guardian, name)
     setattr(guardian, name, float(value))
@@ -136,14 +158,16 @@ def watched(
     stderr: int | None = None,
     notify: str = "",
     terminal: int | None = None,
+    hangs: tuple[str, str] = ("", ""),
 ) -> Iterator[Watched]:
+    """`hangs`: this call of the kernel never returns for this port; it is what adapters do whose firmware is dead."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.settimeout(END_S)
     log = directory / "guardian.log"
     environment = {key: value for key, value in os.environ.items() if key != "NOTIFY_SOCKET"}
     with log.open("ab") as file, ours:
         process = subprocess.Popen(
-            [sys.executable, "-c", LAUNCH, str(theirs.fileno()), controller, *constants],
+            [sys.executable, "-c", LAUNCH, str(theirs.fileno()), controller, *hangs, "VERIFY_S=1", *constants],
             stdin=subprocess.DEVNULL,
             stdout=file,
             stderr=file if stderr is None else stderr,
@@ -311,6 +335,7 @@ def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_an
         assert guardian.ended() == ACTED
         assert guardian.log.splitlines() == [
             "guardian: the controller hangs: stopping the chargers on 1 ports",
+            f"guardian: CUT THE MAINS of the chargers on {bench.name}",
             f"guardian: {bench.name}: NOT stopped: the charger says that it goes on",
         ]
 
@@ -367,7 +392,7 @@ def test_ports_that_come_and_go_leave_nothing_behind(tmp_path: Path) -> None:
         for bench in benches:
             guardian.send(DROP + bench.name.encode())
         guardian.beat()
-        assert guardian.files == before
+        wait_until(lambda: guardian.files == before, what="the end of all that was given up")
 
 
 def test_a_port_that_is_dropped_is_free(tmp_path: Path) -> None:
@@ -383,7 +408,55 @@ def test_a_port_that_is_dropped_is_free(tmp_path: Path) -> None:
             fcntl.flock(bench.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         guardian.send(DROP + bench.name.encode())
         guardian.beat()
-        fcntl.flock(bench.fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        wait_until(lambda: locked(bench.fd), what="the lock")
+
+
+def locked(fd: int) -> bool:
+    with suppress(BlockingIOError):
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    return False
+
+
+def test_a_port_whose_close_hangs_keeps_nobody_from_watching(tmp_path: Path) -> None:
+    """Nor does it when the others have to be stopped in the end."""
+    with running_chargers(tmp_path, 2) as (stuck, good), watched(tmp_path, hangs=("close", stuck.name)) as guardian:
+        for bench in (stuck, good):
+            guardian.hand_over(bench.name, bench.fd)
+        guardian.send(DROP + stuck.name.encode())
+        end_s = time.monotonic() + 1.5
+        while time.monotonic() < end_s:
+            guardian.beat()
+        assert guardian.process.poll() is None
+        dies_s = time.monotonic()
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        stop_s = good.wire.counters.first_stop_s
+        assert stop_s is not None
+        assert stop_s - dies_s < 0.2
+        assert not stuck.runs, "it was opened anew"
+
+
+@pytest.mark.parametrize("call", ["open", "write", "isatty", "tcsetattr", "close"])
+@pytest.mark.parametrize("is_open", [True, False])
+def test_a_driver_that_hangs_delays_no_other_charger_and_not_the_end(
+    tmp_path: Path, call: str, *, is_open: bool
+) -> None:
+    with running_chargers(tmp_path, 3) as benches, watched(tmp_path, hangs=(call, benches[0].name)) as guardian:
+        for bench in benches:
+            guardian.hand_over(bench.name, bench.fd)
+            if not is_open and call != "close":
+                guardian.send(DROP + bench.name.encode())
+        guardian.beat()
+        dies_s = time.monotonic()
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        assert time.monotonic() - dies_s < 4.0
+        for bench in benches[1:]:
+            stop_s = bench.wire.counters.first_stop_s
+            assert stop_s is not None
+            assert stop_s - dies_s < 0.2
+            assert f"guardian: {bench.name}: standby verified" in guardian.log
 
 
 def test_a_port_that_was_closed_when_the_controller_died_is_stopped_all_the_same(tmp_path: Path) -> None:
@@ -403,10 +476,36 @@ def test_a_port_that_another_service_has_taken_is_left_to_it(tmp_path: Path) -> 
         guardian.hand_over(bench.name, bench.fd)
         guardian.send(DROP + bench.name.encode())
         guardian.beat()
-        fcntl.flock(bench.fd, fcntl.LOCK_EX)
+        with holding(bench.name, name="orchestrator"):
+            guardian.link.close()
+            assert guardian.ended() == ACTED
+        assert bench.stops == 0
+        assert "CUT THE MAINS" not in guardian.log
+
+
+def test_a_port_that_a_stranger_has_locked_meanwhile_is_stopped(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.send(DROP + bench.name.encode())
+        guardian.beat()
+        with holding(bench.name):
+            guardian.link.close()
+            assert guardian.ended() == ACTED
+        assert not bench.runs
+
+
+def test_a_port_that_was_set_to_another_speed_is_stopped(tmp_path: Path) -> None:
+    with plugged(tmp_path / "port") as pty, charger_on(pty) as charger, watched(tmp_path) as guardian:
+        charger.baud, charger.running = termios.B19200, 1
+        port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+        guardian.hand_over(pty.path, port)
+        guardian.beat()
+        os.close(port)
+        stty(pty.path, "115200")
         guardian.link.close()
         assert guardian.ended() == ACTED
-        assert bench.stops == 0
+        assert not charger.running
+        assert f"guardian: {pty.path}: standby verified" in guardian.log
 
 
 def test_strange_messages_are_no_harm(tmp_path: Path) -> None:
@@ -586,7 +685,7 @@ def heard(manager: socket.socket) -> list[str]:
 
 def test_systemd_hears_that_it_is_ready_that_it_lives_and_what_it_does(tmp_path: Path) -> None:
     with systemd(tmp_path) as manager, running_chargers(tmp_path) as (bench,):
-        with watched(tmp_path, "WATCHDOG_S=60", notify=str(tmp_path / "notify")) as guardian:
+        with watched(tmp_path, "WATCHDOG_S=60", "VERIFY_S=0.4", notify=str(tmp_path / "notify")) as guardian:
             guardian.hand_over(bench.name, bench.fd)
             for _ in range(5):
                 guardian.beat()

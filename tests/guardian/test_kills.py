@@ -23,8 +23,9 @@ from tests.whole.station import Service, orchestrator, station_document
 
 GUARD = """
 import sys
-from orchestrator.service.guardian import guard
-sys.exit(guard(sys.argv[2:], ("-m", "tests.guardian.saboteur", sys.argv[1])))
+from orchestrator.service import guardian
+guardian.VERIFY_S = 1.0
+sys.exit(guardian.guard(sys.argv[2:], ("-m", "tests.guardian.saboteur", sys.argv[1])))
 """
 #: Started with neither input nor output, as by a program that has closed its own.
 WITHOUT_STREAMS = """
@@ -223,7 +224,9 @@ def test_when_both_are_killed_only_an_emergency_stop_is_left(services: Services)
     one.service.kill_all()
     assert one.runs
     done = orchestrator("estop", str(one.service.file), "--leave-held")
-    assert (done.returncode, done.stdout, done.stderr) == (0, f"bay-1 ({one.port}): standby verified\n", "")
+    assert (done.returncode, done.stdout, done.stderr) == (
+        0, f"bay-1 ({one.port}): standby verified\nevery charger stands by, verified\n", "",
+    )  # fmt: skip
     one.check_stopped(since_s)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.service import lastopen
-from orchestrator.service.lastopen import GET_LINE, HELD, OPEN, OPENED, REQUEST, SET_VALUES, open_contactors
+from orchestrator.service.lastopen import GET_LINE, HELD, OPEN, OPENED, REQUEST, SET_VALUES, request
 
 SOURCE = Path(__file__).with_name("gpio_abi.c")
 #: A C compiler, where there are one and the kernel's header.
@@ -63,14 +63,14 @@ def test_numbers_and_structures_are_those_of_the_kernels_header(
     assert REQUEST.unpack(golden["granted"])[-1] == 0x01020304
     for name, active_low in (("active_high", False), ("active_low", True)):
         asked = kernel(monkeypatch).asked
-        open_contactors([(os.devnull, 17, active_low)])
+        request(os.devnull, 17, active_low=active_low)
         assert asked == [(GET_LINE, golden[name])]
 
 
 def test_a_line_that_nobody_holds_is_requested_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     before = files()
     made = kernel(monkeypatch)
-    assert open_contactors([(os.devnull, 17, False)]) == {"/dev/null line 17": OPENED}
+    assert request(os.devnull, 17, active_low=False) == OPENED
     assert made.granted > 0
     assert not is_open(made.granted)
     assert files() == before
@@ -83,16 +83,13 @@ def test_a_line_that_nobody_holds_is_requested_and_given_back(monkeypatch: pytes
 def test_a_line_that_is_not_granted_is_told(error: int, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
     before = files()
     kernel(monkeypatch, error)
-    assert open_contactors([(os.devnull, 17, False)]) == {"/dev/null line 17": said}
+    assert request(os.devnull, 17, active_low=False) == said
     assert files() == before
 
 
-def test_what_is_no_chip_does_not_keep_the_others_closed(tmp_path: Path) -> None:
-    lines = [(str(tmp_path / "none"), 1, False), (os.devnull, 2, True)]
-    assert open_contactors(lines) == {
-        f"{tmp_path}/none line 1": "No such file or directory",
-        "/dev/null line 2": "Inappropriate ioctl for device",
-    }
+def test_what_is_no_chip_is_told(tmp_path: Path) -> None:
+    assert request(str(tmp_path / "none"), 1, active_low=False) == "No such file or directory"
+    assert request(os.devnull, 2, active_low=True) == "Inappropriate ioctl for device"
 
 
 def test_a_descriptor_of_something_else_is_told() -> None:

@@ -11,13 +11,18 @@ import pytest
 from tests.guardian.chargers import running_chargers
 from tests.test_imports import PACKAGE, ROOT, Module, product
 
-PACKAGES = {"", "protocol", "service"}
-STOP = PACKAGES | {"protocol.standby", "service.laststop"}
+LINK = {"", "link"}
+PACKAGES = LINK | {"protocol", "service"}
+LINE = PACKAGES | {"link.holder", "link.settings", "protocol.standby", "service.lastline"}
+STOP = LINE | {"service.laststop"}
 #: Module → all of the product that is imported with it.
 LEAN: dict[str, set[str]] = {
     "protocol.standby": {"", "protocol", "protocol.standby"},
+    "link.holder": LINK | {"link.holder"},
+    "link.settings": LINK | {"link.settings"},
     "service.say": {"", "service", "service.say"},
     "service.lastopen": {"", "service", "service.lastopen"},
+    "service.lastline": LINE,
     "service.laststop": STOP,
     "service.estop": STOP | {"service.estop"},
     "service.guardian": STOP | {"service.lastopen", "service.say", "service.guardian"},
@@ -83,7 +88,9 @@ def test_an_emergency_stop_needs_no_other_library(tmp_path: Path) -> None:
     with running_chargers(tmp_path) as (bench,):
         argv = [sys.executable, "-S", "-m", PACKAGE, "estop", "--port", bench.name]
         done = subprocess.run(argv, cwd=ROOT.parent, capture_output=True, text=True, check=False, timeout=30)
-        assert (done.returncode, done.stdout) == (0, f"{bench.name}: standby verified\n")
+        assert (done.returncode, done.stdout) == (
+            0, f"{bench.name}: standby verified\nevery charger stands by, verified\n",
+        )  # fmt: skip
 
 
 def test_an_import_that_is_not_listed_is_seen() -> None:

@@ -21,6 +21,7 @@ from tests.link.ptys import Pty
 from tests.waiting import wait_until
 
 READ = bytes.fromhex("40 00 60 00 00 00 00 00")
+OTHER_READ = bytes.fromhex("40 01 60 00 00 00 00 00")
 ANSWER = bytes.fromhex("43 00 60 00 F8 FF 40 09")
 Frames = list[tuple[int, bytes]]
 
@@ -88,12 +89,30 @@ def test_foreign_frames_do_not_disturb(pair: Pair) -> None:
     for _ in range(5):
         bus.receive(1.0)
     assert heard == []
-    assert bus.foreign == 3
+    assert bus.foreign == 5
     assert bus._network is not None
     assert bus._network.lss.responses.empty()
     other.send(message(0x590, ANSWER))
     bus.receive(1.0)
     assert heard == [(0x590, ANSWER)]
+
+
+@pytest.mark.parametrize("length", [0, 1, 8, 12, 64])
+def test_a_can_fd_frame_is_never_taken_for_canopen(channel: str, length: int) -> None:
+    settings: dict[str, object] = {"interface": "virtual", "channel": channel, "protocol": can.CanProtocol.CAN_FD}
+    bus, heard = opened(settings)
+    bus.subscribe(0x710, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.close()
+    bus.open()
+    with can.Bus(**settings) as other:  # type: ignore[arg-type]  # as in a station file
+        for cob_id in (0x590, 0x710):
+            other.send(message(cob_id, bytes(length), is_fd=True))
+            bus.receive(1.0)
+        assert (heard, bus.foreign) == ([], 2)
+        other.send(message(0x590, ANSWER))
+        bus.receive(1.0)
+        assert heard == [(0x590, ANSWER)]
+    bus.close()
 
 
 def test_frames_of_any_length_are_handed_on_whole(pair: Pair) -> None:
@@ -104,15 +123,20 @@ def test_frames_of_any_length_are_handed_on_whole(pair: Pair) -> None:
     assert [len(data) for _, data in heard] == list(range(9))
 
 
-def test_who_is_on_the_bus_is_known(pair: Pair) -> None:
-    bus, _, other = pair
-    other.send(message(0x70A, b"\x05"))
-    other.send(message(0x590, ANSWER))
-    bus.receive(1.0)
-    bus.receive(1.0)
-    assert list(bus.nodes_seen) == [0x0A, 0x10]
-    bus.close()
-    assert list(bus.nodes_seen) == []
+def test_who_is_on_the_bus_is_known_to_who_asks_for_it(channel: str) -> None:
+    settings: dict[str, object] = {"interface": "virtual", "channel": channel}
+    for filtered, seen in ((False, [0x0A, 0x10]), (True, [0x10])):
+        bus = CanBus("can0", settings, [0x10], filtered=filtered)
+        bus.subscribe(0x590, lambda _cob_id, _data: None)
+        bus.open()
+        with can.Bus(**settings) as other:  # type: ignore[arg-type]  # as in a station file
+            other.send(message(0x70A, b"\x05"))
+            other.send(message(0x590, ANSWER))
+            bus.receive(1.0)
+            bus.receive(1.0)
+        assert list(bus.nodes_seen) == seen
+        bus.close()
+        assert list(bus.nodes_seen) == []
 
 
 def test_what_a_callback_raises_is_not_swallowed(pair: Pair) -> None:
@@ -324,6 +348,46 @@ def test_our_own_echo_is_tolerated_and_nothing_leaves_the_host(udp: dict[str, ob
         other.send(message(0x590, ANSWER))
         listen(bus, lambda: heard, "the answer")
     assert heard == [(0x590, ANSWER)]
+    bus.close()
+
+
+ECHOES = [{"interface": "udp_multicast"}, {"interface": "virtual", "receive_own_messages": True}]
+
+
+@pytest.mark.parametrize("kind", ECHOES, ids=["udp_multicast", "asked for"])
+def test_what_we_sent_is_not_heard_but_the_same_frame_of_somebody_else_is(
+    udp: dict[str, object], channel: str, kind: dict[str, object]
+) -> None:
+    settings = udp | kind if kind["interface"] == "udp_multicast" else {**kind, "channel": channel}
+    bus, heard = opened(settings)
+    bus.subscribe(0x610, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.close()
+    bus.open()
+    with can.Bus(**settings) as other:  # type: ignore[arg-type]  # as in a station file
+        bus.send(0x610, OTHER_READ)
+        bus.send(0x610, READ)
+        other.send(message(0x610, READ))
+        bus.send(0x610, READ)
+        other.send(message(0x610, OTHER_READ))
+        listen(bus, lambda: len(heard) >= 2, "the other's requests")
+        other.send(message(0x590, ANSWER))
+        listen(bus, lambda: len(heard) >= 3, "the answer behind them")
+    assert heard == [(0x610, READ), (0x610, OTHER_READ), (0x590, ANSWER)]
+    bus.close()
+
+
+def test_an_echo_that_was_lost_does_not_hide_another_masters_frame(udp: dict[str, object]) -> None:
+    bus, heard = opened(udp)
+    bus.subscribe(0x610, lambda cob_id, data: heard.append((cob_id, data)))
+    bus.close()
+    bus.open()
+    bus._echo.append((0x610, OTHER_READ))  # the bus lost it
+    bus.send(0x610, READ)
+    listen(bus, lambda: not bus._echo, "our own echo")
+    with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
+        other.send(message(0x610, OTHER_READ))
+        listen(bus, lambda: heard, "the other's request")
+    assert heard == [(0x610, OTHER_READ)]
     bus.close()
 
 

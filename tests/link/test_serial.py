@@ -3,20 +3,22 @@
 import errno
 import fcntl
 import os
-import subprocess
 import sys
 import termios
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import serial
 
 from orchestrator.errors import LinkError
+from orchestrator.link import holder, settings
 from orchestrator.link.serial import BYTE_S, SerialLine
 from tests.link.ptys import Pty, plugged
+from tests.link.strangers import holding, stty
 from tests.waiting import wait_until
 
 
@@ -104,16 +106,148 @@ def test_a_port_has_one_owner_and_is_free_once_closed(pty: Pty, line: SerialLine
     SerialLine.open(pty.path).close()
 
 
-def test_a_port_held_by_another_process_is_busy_until_that_ends(pty: Pty) -> None:
-    hold = (
-        "import fcntl, sys; f = open(sys.argv[1], 'rb', 0); fcntl.flock(f, fcntl.LOCK_EX); print(flush=True); input()"
-    )
-    holder = subprocess.Popen([sys.executable, "-c", hold, pty.path], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    assert holder.stdout is not None
-    holder.stdout.readline()
-    assert "in use" in failure(pty.path)
-    holder.communicate(b"\n")
+def test_a_port_held_by_another_orchestrator_is_busy_until_that_ends(pty: Pty) -> None:
+    with holding(pty.path, name="orchestrator"):
+        assert "in use" in failure(pty.path)
     SerialLine.open(pty.path).close()
+
+
+def test_a_strangers_lock_keeps_no_stop_away_and_is_named_until_it_is_ours(pty: Pty) -> None:
+    with holding(pty.path) as stranger:
+        line = SerialLine.open(pty.path)
+        line.write(b"stop")
+        assert os.read(pty.master, 16) == b"stop"
+        assert line.locked_by() == f"{Path(f'/proc/{stranger.pid}/comm').read_text().strip()} (pid {stranger.pid})"
+    assert line.locked_by() == ""
+    assert "in use" in failure(pty.path), "the lock is ours now"
+    line.close()
+
+
+def test_a_stranger_that_nobody_can_see_is_one_all_the_same(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    with holding(pty.path):
+        monkeypatch.setattr(holder, "_pids", list)  # as with /proc mounted hidepid=2
+        monkeypatch.setattr(holder, "_lockers", lambda _: [])
+        line = SerialLine.open(pty.path)
+        assert line.locked_by() == "an unknown program"
+        line.close()
+
+
+def test_a_port_that_one_program_has_for_itself_alone_says_what_to_do(pty: Pty) -> None:
+    with holding(pty.path, "TIOCEXCL") as stranger, without_privileges(pty) as device:
+        text = failure(device)
+    assert "another program has opened it for itself alone (TIOCEXCL)" in text
+    assert "or cut the charger's mains" in text
+    if os.geteuid():
+        assert f"(pid {stranger.pid})" in text
+
+
+def test_a_port_that_is_ours_stays_open_for_a_stop_tool(pty: Pty, line: SerialLine) -> None:
+    fcntl.ioctl(line.fileno(), termios.TIOCEXCL)
+    assert line.locked_by() == ""
+    with without_privileges(pty) as device:
+        os.close(os.open(device, os.O_WRONLY | os.O_NOCTTY))
+
+
+# --- others set it to something else ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (["115200"], "115200 baud"),
+        (["9600", "echo"], "9600 baud, echo on"),
+        (["cstopb"], "2 stop bits"),
+        (["crtscts"], "hardware flow control"),
+        (["ixon", "ixoff"], "software flow control"),
+        (["-clocal"], "modem control"),
+        (["icanon", "opost"], "reading line by line, translated output"),
+        (["isig"], "control characters"),
+        (["icrnl"], "translated input"),
+        (["min", "255"], "reads that wait for more"),
+        (["sane"], "echo on"),
+    ],
+)
+def test_what_another_program_has_set_is_named_and_set_right(
+    pty: Pty, line: SerialLine, words: list[str], found: str
+) -> None:
+    stty(pty.path, *words)
+    assert found in line.restore()
+    assert termios.tcgetattr(line.fileno())[4:6] == [termios.B19200, termios.B19200]
+    assert line.restore() == ""
+    every_byte = bytes(range(256))
+    os.write(pty.master, every_byte)
+    assert line.read(1.0) == every_byte
+
+
+@pytest.mark.parametrize(
+    ("flag", "words"),
+    [
+        (termios.CS7, "7 data bits"),
+        (termios.CS8 | termios.PARENB, "even parity"),
+        (termios.CS8 | termios.PARENB | termios.PARODD, "odd parity"),
+        (termios.CS8, "receiver off"),
+    ],
+)
+def test_a_format_that_no_pty_takes_has_its_words(flag: int, words: str) -> None:
+    cflag = flag | termios.CLOCAL | (0 if words == "receiver off" else termios.CREAD)
+    flags = [0, 0, cflag, 0, termios.B19200, termios.B19200]
+    assert settings.differences(flags, [0] * 32) == words
+
+
+def test_a_speed_without_a_name_is_still_another_one() -> None:
+    flags = [0, 0, termios.CS8 | termios.CLOCAL | termios.CREAD, 0, 12345, 12345]
+    assert settings.differences(flags, [0] * 32) == "an odd number of baud"
+
+
+def test_settings_that_a_driver_does_not_take_are_nobodys_doing(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    takes = termios.tcsetattr
+
+    def always_two_stop_bits(fd: int, when: int, attributes: list[Any]) -> None:
+        attributes[2] |= termios.CSTOPB
+        takes(fd, when, attributes)
+
+    monkeypatch.setattr(termios, "tcsetattr", always_two_stop_bits)
+    line = SerialLine.open(pty.path)
+    assert line.restore() == ""
+    stty(pty.path, "115200")
+    assert line.restore() == "115200 baud, 2 stop bits"
+    assert line.restore() == ""
+    line.close()
+
+
+def test_a_driver_that_does_not_take_the_speed_is_told(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    takes = termios.tcsetattr
+
+    def always_fast(fd: int, when: int, attributes: list[Any]) -> None:
+        attributes[4] = attributes[5] = termios.B115200
+        takes(fd, when, attributes)
+
+    monkeypatch.setattr(termios, "tcsetattr", always_fast)
+    text = failure(pty.path)
+    assert "its driver does not take the charger's settings, 19200 baud 8N1; use another adapter (115200 baud)" in text
+    monkeypatch.undo()
+    SerialLine.open(pty.path).close()  # it was given back
+
+
+def test_output_that_was_suspended_goes_on(pty: Pty, line: SerialLine) -> None:
+    termios.tcflow(line.fileno(), termios.TCOOFF)
+    line.restore()
+    line.write(b"stop")
+    assert os.read(pty.master, 16) == b"stop"
+
+
+def test_another_line_discipline_is_taken_back(pty: Pty, line: SerialLine) -> None:
+    try:
+        fcntl.ioctl(line.fileno(), termios.TIOCSETD, (1).to_bytes(4, sys.byteorder))  # N_SLIP
+    except OSError:
+        pytest.skip("this kernel has no other one")
+    assert line.restore() == "line discipline 1"
+    assert line.restore() == ""
+
+
+def test_a_look_at_the_settings_costs_a_stop_next_to_nothing(line: SerialLine) -> None:
+    took_s = sorted(_seconds(line.restore) for _ in range(200))
+    assert took_s[100] < 0.001
 
 
 def test_a_stop_tool_that_takes_no_lock_can_write_to_a_port_that_is_in_use(pty: Pty, line: SerialLine) -> None:
@@ -204,6 +338,13 @@ def test_an_order_that_a_stalled_line_kept_does_not_come_out_later(pty: Pty, lin
     assert b"order" not in left
 
 
+def test_a_port_that_is_gone_has_no_settings(pty: Pty, line: SerialLine) -> None:
+    pty.unplug()
+    for use in (line.restore, lambda: [line.locked_by(), line.read(0.0)]):
+        with pytest.raises(LinkError, match="unplugged"):
+            use()
+
+
 def test_a_port_that_is_gone_has_no_output_to_forget(pty: Pty, line: SerialLine) -> None:
     pty.unplug()
     line._forget_output()  # between a time-out and this, an adapter can be pulled
@@ -211,7 +352,7 @@ def test_a_port_that_is_gone_has_no_output_to_forget(pty: Pty, line: SerialLine)
 
 def test_every_use_after_close_is_a_link_error(line: SerialLine) -> None:
     line.close()
-    for use in (line.fileno, lambda: line.write(b"x"), lambda: line.read(0.1)):
+    for use in (line.fileno, lambda: line.write(b"x"), lambda: line.read(0.1), line.restore, line.locked_by):
         with pytest.raises(LinkError):
             use()
 
@@ -240,6 +381,21 @@ def test_whatever_pyserial_raises_is_translated(
 
 def _waiting(fd: int) -> int:
     return int.from_bytes(fcntl.ioctl(fd, termios.FIONREAD, bytes(4)), sys.byteorder)
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    begun_s = time.perf_counter()
+    work()
+    return time.perf_counter() - begun_s
+
+
+@contextmanager
+def without_privileges(pty: Pty) -> Iterator[str]:
+    """Root may open what is one program's alone, so be somebody else who may use this device."""
+    device = os.path.realpath(pty.path)
+    Path(device).chmod(0o666)
+    with _somebody_else():
+        yield device
 
 
 @contextmanager

@@ -1,9 +1,11 @@
 """The campaign: every proof on the whole service in virtual time, in its long form, one after the other.
 
-    python -m tests.proof                 grid, scripts, calls
+    python -m tests.proof                 grid, scripts, calls, environment
     python -m tests.proof core            only this one, which takes longer than those together
+    python -m tests.proof seeds           only this one: which proof finds which bug, into docs/proofs.md
 
-Each has a main of its own, with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`, `exploring`.
+Each has a main of its own, with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`,
+`environment`, `exploring`, `seeds`.
 """
 
 import argparse
@@ -12,18 +14,20 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from tests.proof import campaign, exploring, nth_call, whole_grid
+from tests.proof import campaign, environment, exploring, nth_call, seeds, whole_grid
 from tests.proof.report import say
 
 PARTS: Mapping[str, tuple[str, Callable[[Sequence[str]], int]]] = {
     "grid": ("every state × every row of the fault table × what the line is just doing", whole_grid.main),
     "scripts": ("random fault scripts", campaign.main),
     "calls": ("every call of a charge made to fail in turn, with each of its errors, once and lasting", nth_call.main),
+    "environment": ("random trouble with lines, disk, bus, people, over lives of the gateway", environment.main),
     "core": ("everything that the core can come to", exploring.main),
+    "seeds": ("the proofs themselves: every hole that was closed, opened again", seeds.main),
 }
 
 
-USUAL = ("grid", "scripts", "calls")
+USUAL = ("grid", "scripts", "calls", "environment")
 
 
 def cpu_s() -> float:

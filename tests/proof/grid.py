@@ -150,10 +150,10 @@ class Run:
         self.time.call_later(REACH_S, self._too_late)
         status = self.world.run()
         if status:
-            self.wrong.append(f"the service ended with {self.world.journal.said[-1]!r}")
+            self.wrong.append(f"the service ended with {self.world.console.said[-1]!r}")
         if self.rig.bay.charger.running:
             self.wrong.append("the charger runs at the end")
-        self.wrong += [line for line in self.world.journal.said if "internal error" in line]
+        self.wrong += [line for line in self.world.console.said if "internal error" in line]
         if self.world.guardian.unwell:
             self.wrong.append("a thread of the service ended or hung")
         return self.ended

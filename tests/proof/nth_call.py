@@ -79,6 +79,7 @@ ERRORS: dict[str, dict[str, Fault]] = {
     "ioctl": {"EIO": GONE["EIO"], "ENOTTY": _os(errno.ENOTTY)},
     "tcgetattr": TERMIOS,
     "tcsetattr": TERMIOS,
+    "tcflow": TERMIOS,
     "tcflush": TERMIOS,
     "poll": {"ENOMEM": _os(errno.ENOMEM), "POLLHUP": lambda: select.POLLHUP, "ValueError": _raises(ValueError)},
     "read": {**GONE, **ODD, "EAGAIN": _os(errno.EAGAIN), "nothing": lambda: b"", "noise": lambda: b"\xaf\xfa\x90\xff"},

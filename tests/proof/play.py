@@ -16,7 +16,8 @@ from orchestrator.config.shipped import shipped_dir
 from orchestrator.core.memory import Memory
 from orchestrator.model import ENERGISED, ChargeMode, ControlMode, Decision, Request, Snapshot, State
 from orchestrator.protocol.charger import STOP_FRAME
-from orchestrator.service.bay import VERIFIED, Asked
+from orchestrator.service.asked import Asked
+from orchestrator.service.bay import VERIFIED
 from orchestrator.sim.can_noise import Bus
 from orchestrator.sim.can_wire import PERFECT
 from orchestrator.sim.faults import FAULTS
@@ -202,6 +203,7 @@ class Player:
         bay, watch = self.world.bays[number], self.watches[number]
         decision, after, snapshot = bay.decision, bay._memory, bay._snapshot
         assert decision is not None
+        assert after is not None
         before = watch.before or Memory()
         if after.state is not before.state:
             self._changed(number, before.state, after.state)
@@ -283,13 +285,13 @@ class Player:
                 )
 
     def _judge_end(self) -> None:
-        for line in self.world.journal.said:
+        for line in self.world.console.said:
             if "internal" in line:
                 self._wrong(0, "exception", line)
         if self.script.heal_s is None:
             return
         if self.played.status:
-            self._wrong(0, "end", f"all faults are gone, and the service ended with {self.world.journal.said[-1]!r}")
+            self._wrong(0, "end", f"all faults are gone, and the service ended with {self.world.console.said[-1]!r}")
         for number, rig in enumerate(self.world.rigs):
             rig.catch_up()
             if rig.bay.charger.running:

@@ -18,8 +18,13 @@ LINE_FAULTS = ("port_stalled", "bus_down", "bus_lost")
 ARRIVES = "arrives"
 MENDS = ("heal", ARRIVES)
 REQUESTS = tuple(str(request) for request in Request)
+#: What `hazards.py` plays, with invariants of its own.
+ENVIRONMENT = (
+    "line_taken_over", "port_locked", "says_standby", "says_standby_now_and_then", "limit_reverts", "runs_again",
+    "obeys_once", "stopped_elsewhere", "bmu_frozen", "pack_collapsed", "another_pack",
+)  # fmt: skip
 #: Everything that can befall a bay; `heal` takes all faults away again.
-INJECTIONS = (*(name for name in FAULTS if name != "heal"), *LINE_FAULTS)
+INJECTIONS = (*(name for name in FAULTS if name not in ("heal", *ENVIRONMENT)), *LINE_FAULTS)
 #: Other strengths of some faults than their usual one.
 STRENGTHS: dict[str, tuple[float, ...]] = {
     "over_temperature": (46.0, 56.0, 70.0),

@@ -10,10 +10,11 @@ from collections.abc import Callable
 import can
 
 from orchestrator.sim.can_noise import Bus, BusNoise
-from orchestrator.sim.can_wire import PERFECT, Handler
+from orchestrator.sim.can_wire import PERFECT
+from orchestrator.sim.timers import Handler
+from tests.proof.virtual_kernel import Calls
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
-from tests.proof.virtual_tty import Calls
 
 #: One frame of 8 bytes at 250 kbit/s, stuff bits and pause included.
 FRAME_S = 0.0005
@@ -32,6 +33,7 @@ class BusWire:
         self._time = time
         self._free_s = 0.0
         self._subscribers: dict[int, dict[object, Handler]] = {}
+        self._remote: dict[int, dict[object, Handler]] = {}
         self._noise = BusNoise(kind)
 
     def subscribe(self, cob_id: int, owner: object, handler: Handler) -> None:
@@ -40,16 +42,31 @@ class BusWire:
     def unsubscribe(self, cob_id: int, owner: object) -> None:
         self._subscribers.get(cob_id, {}).pop(owner, None)
 
+    def subscribe_remote(self, cob_id: int, owner: object, handler: Handler) -> None:
+        self._remote.setdefault(cob_id, {})[owner] = handler
+
     def send(self, cob_id: int, data: bytes) -> None:
-        """A node says something."""
-        self._put(self._to_drivers, cob_id, data)
+        """A node says something, or another master: everybody hears it."""
+        self._put(self._to_all, can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
 
-    def from_driver(self, cob_id: int, data: bytes) -> None:
-        self._put(self._to_nodes, cob_id, data)
+    def raw(self, message: can.Message) -> None:
+        """Somebody sends a frame of a kind that the emulated nodes do not hear."""
+        self._time.call_at(self._slot(), self._to_drivers, message)
 
-    def _put(self, hear: Callable[[can.Message], None], cob_id: int, data: bytes) -> None:
+    def _to_drivers(self, message: can.Message) -> None:
+        for driver in () if self.down or self.lost else self.drivers:
+            driver.deliver(message)
+
+    def send_remote(self, cob_id: int) -> None:
+        self._put(self._to_all, can.Message(arbitration_id=cob_id, is_remote_frame=True, is_extended_id=False))
+
+    def from_driver(self, cob_id: int, data: bytes, sender: "Driver") -> None:
+        message = can.Message(arbitration_id=cob_id, data=data, is_extended_id=False)
+        self._put(lambda heard: self._to_nodes(heard, sender), message)
+
+    def _put(self, hear: Callable[[can.Message], None], whole: can.Message) -> None:
         at_s = self._slot()
-        message = self._noise.spoil(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
+        message = self._noise.spoil(whole)
         if message is not None:
             self._time.call_at(at_s, hear, message)
 
@@ -57,16 +74,24 @@ class BusWire:
         self._free_s = max(self._free_s, self._time.now_s) + FRAME_S
         return self._free_s
 
-    def _to_drivers(self, message: can.Message) -> None:
+    def _to_all(self, message: can.Message) -> None:
         if not (self.down or self.lost):
-            if self.drivers and not message.is_error_frame:
+            if self.drivers and not message.is_error_frame and not message.is_remote_frame:
                 self.on_frame(message.arbitration_id, bytes(message.data))
-            for driver in self.drivers:
-                driver.deliver(message)
+            self.drivers = [
+                driver for driver in self.drivers if driver.process is None or driver.process.status is None
+            ]
+            self._to_nodes(message, None)
 
-    def _to_nodes(self, message: can.Message) -> None:
-        if not (self.down or self.lost or message.is_error_frame):
-            for handler in tuple(self._subscribers.get(message.arbitration_id, {}).values()):
+    def _to_nodes(self, message: can.Message, sender: "Driver | None") -> None:
+        if self.down or self.lost:
+            return
+        for driver in self.drivers:
+            if driver is not sender and (sender is None or not message.is_error_frame):
+                driver.deliver(message)
+        if not message.is_error_frame:
+            handlers = (self._remote if message.is_remote_frame else self._subscribers).get(message.arbitration_id, {})
+            for handler in tuple(handlers.values()):
                 handler(message.arbitration_id, bytes(message.data))
 
     def go_down(self) -> None:
@@ -86,6 +111,7 @@ class Driver(can.BusABC):
             raise OSError(100, "Network is down")
         self._wire, self._time, self._epoch = wire, time, wire.epoch
         self._heard: deque[can.Message] = deque()
+        self.process = time.me().process  #: whose driver it is; when that is dead, nobody hears
         self.news = Waiting(time)
         super().__init__(channel="virtual time")
         wire.drivers.append(self)
@@ -110,7 +136,7 @@ class Driver(can.BusABC):
         self.calls("can send")
         if self._wire.down:
             raise can.CanOperationError("Failed to transmit: Network is down", 100)
-        self._wire.from_driver(msg.arbitration_id, bytes(msg.data))
+        self._wire.from_driver(msg.arbitration_id, bytes(msg.data), self)
 
     def shutdown(self) -> None:
         super().shutdown()

@@ -32,6 +32,7 @@ class Nature:
     line: str = "real"
     seed: int = 1
     speed: float = 1.0  #: model seconds in one second
+    main_loop: bool = False  #: the BMU answers when its main loop comes round to it
     running: bool = False  #: as the last service left it
 
 
@@ -46,7 +47,8 @@ class MemoryWire(ChargerWire):
         self.on_started: Callable[[float], None] = lambda _now_s: None  #: a frame has switched the output on
 
     def open(self) -> None:
-        self._plugged = self._tty.present = True
+        self._plugged = True
+        self._tty.plug()
 
     def close(self) -> None:
         self._plugged = False
@@ -56,6 +58,21 @@ class MemoryWire(ChargerWire):
     @property
     def is_open(self) -> bool:
         return self._plugged
+
+    @property
+    def is_clear(self) -> bool:
+        return self._tty.clear
+
+    def set_speed(self, speed: int) -> None:
+        self._tty.taken_over(speed)
+
+    def lock(self) -> None:
+        if self._tty.lock is None:
+            self._tty.lock = self
+
+    def unlock(self) -> None:
+        if self._tty.lock is self:
+            self._tty.lock = None
 
     def _receive(self, chunk: bytes) -> None:
         now_s = self._time.now_s
@@ -87,13 +104,16 @@ class VirtualRig(Rig):
     """What `sim.faults` acts upon."""
 
     wire: MemoryWire
+    frozen = False  #: its BMU says what it once said, in all its words
+    apart_v = 0.0  #: so much more than the truth it says most of the time
+    steady = False  #: its BMU tells the same lie in every answer
 
     def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:
         charger = Charger(nature.control)
         if nature.running:
             charger.run, charger.mode, charger.current_limit = True, ChargeMode.CHARGE, len(charger.steps_a) - 1
         self.bay = Bay(charger, nature.pack)
-        self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c)
+        self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c, nature.pack.cells)
         self.injected_s: float | None = None
         self.tty = tty
         self._loop = cast("Any", time)
@@ -103,7 +123,7 @@ class VirtualRig(Rig):
         line = type(line)(**{name: getattr(line, name) for name in line.__slots__} | {"seed": nature.seed})
         self.wire = MemoryWire(time, charger, tty, line, self.catch_up)
         set_scheduler(AsyncScheduler(time))
-        self.bmu = Bmu(cast("Any", time), cast("Any", bus), node_id, self._readout)
+        self.bmu = Bmu(cast("Any", time), cast("Any", bus), node_id, self._readout, main_loop=nature.main_loop)
         self.bmu.port.faults.delay_s = ANSWER_S
         self.wire.open()
         self.catch_up(force=True)

@@ -5,7 +5,7 @@ disk, the control socket and the guardian. `Service.run` ends as the process wou
 """
 
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
@@ -30,24 +30,29 @@ from orchestrator.config.station import (
     Station,
 )
 from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import Persisted
 from orchestrator.devices import bus as bus_module
 from orchestrator.devices import charger as charger_module
 from orchestrator.keys import Range
 from orchestrator.link import can as can_module
 from orchestrator.link import serial as serial_module
+from orchestrator.link import settings as settings_module
 from orchestrator.model import ControlMode, Decision, Request
-from orchestrator.service import bay as bay_module
+from orchestrator.service import asked as asked_module
+from orchestrator.service import reload as reload_module
 from orchestrator.service import supervisor as supervisor_module
-from orchestrator.service.bay import Asked, BayRunner
-from orchestrator.service.kept import Kept
+from orchestrator.service import wiring as wiring_module
+from orchestrator.service.asked import Asked
+from orchestrator.service.bay import BayRunner
+from orchestrator.service.past import Place
 from orchestrator.service.supervisor import Supervisor
 from orchestrator.sim.can_noise import Bus
 from orchestrator.sim.can_wire import PERFECT
 from tests.proof.virtual_can import BusWire, Driver
+from tests.proof.virtual_kernel import Kernel
 from tests.proof.virtual_rig import Nature, VirtualRig
 from tests.proof.virtual_threads import Event, SimpleQueue, Thread
 from tests.proof.virtual_time import Time
-from tests.proof.virtual_tty import Kernel
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10
@@ -96,15 +101,15 @@ class Contactor:
 class Notebook:
     """A journal that is read at once."""
 
-    def __init__(self, *_: object) -> None:
+    def __init__(self, *_: object, **__: object) -> None:
         self.said: list[str] = []
         self.lines: list[tuple[str, Any]] = []
-        self.kept: dict[str, Kept] = {}
 
     def start(self) -> None:
         """No disk, no thread."""
 
-    close = start
+    def close(self, *_: object) -> None:
+        """Nothing is left to be written."""
 
     def stalled(self, _now_s: float) -> bool:
         return False
@@ -112,16 +117,47 @@ class Notebook:
     def say(self, text: str) -> None:
         self.said.append(text)
 
-    @property
-    def unkept(self) -> str:
-        return ""
-
     def put(self, bay: str, line: Any) -> None:
         if line[0] == "fault":
             self.lines.append((bay, line[1]))
 
-    def keep(self, bay: str, kept: Kept) -> None:
-        self.kept[bay] = kept
+
+class Shelf:
+    """A store whose disk takes everything at once. `memories` are what the last run left, by the bays' names."""
+
+    kept_revision = 0
+
+    def __init__(self, memories: Mapping[str, Memory], *_: object, **__: object) -> None:
+        self._memories = memories
+        self.persisted: dict[str, Persisted] = {}
+
+    def start(self) -> None:
+        """No disk, no thread."""
+
+    def wait(self, _within_s: float) -> bool:
+        return True
+
+    def past(self, place: Place) -> "_Past":
+        return _Past(self._memories.get(place.bay, Memory()))
+
+    def strays(self) -> list[Place]:
+        return []
+
+    def put(self, place: Place, persisted: Persisted) -> int:
+        self.persisted[place.bay] = persisted
+        return self.kept_revision
+
+    def on_disk(self, place: Place) -> Persisted | None:
+        return self.persisted.get(place.bay)
+
+    def unkept(self, _now_s: float) -> str:
+        return ""
+
+    def stalled(self, _now_s: float) -> bool:
+        return False
+
+    def close(self, _within_s: float) -> str:
+        return ""
 
 
 class Silence:
@@ -200,6 +236,14 @@ class World:
     def journal(self) -> Notebook:
         return self.supervisor._journal  # type: ignore[return-value]  # it was put there by `_patch`
 
+    @property
+    def console(self) -> Notebook:
+        return self.supervisor._console  # type: ignore[return-value]  # it, too
+
+    @property
+    def store(self) -> Shelf:
+        return self.supervisor._store  # type: ignore[return-value]  # it, too
+
     def decision(self, bay: int = 0) -> Decision:
         decision = self.bays[bay].decision
         assert decision is not None
@@ -248,19 +292,27 @@ class World:
         fake = self.kernel.modules()
         change = self._patches.enter_context
         replaced: dict[Any, dict[str, Any]] = {
-            supervisor_module: {
+            wiring_module: {
                 "OutputLine": SimpleNamespace(open=lambda _chip, line, **_: Contactor(self.rigs[line])),
+                "monotonic": time.clock,
+            },
+            supervisor_module: {
                 "monotonic": time.clock, "boottime": time.clock, "SimpleQueue": _Queues(time),
-                "Journal": Notebook, "ControlSocket": Silence,
+                "Journal": Notebook, "Console": Notebook, "ControlSocket": Silence,
+                "Store": partial(Shelf, self._kept), "boot_id": lambda: "virtual", "close_all": _close_all,
                 "signal": SimpleNamespace(
                     signal=lambda *_: None, SIGTERM=15, SIGINT=2, SIGHUP=1, Signals=signal.Signals
                 ),
-                "read_kept": lambda _, names: {name: _Kept(self._kept.get(name, Memory())) for name in names},
             },
-            bay_module: {"Event": event},
+            asked_module: {"Event": event},
+            reload_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
             charger_module: {"Event": event, "Thread": thread},
             bus_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
-            serial_module: {"time": SimpleNamespace(sleep=self._sleep), "select": fake["select"], "os": fake["os"]},
+            serial_module: {
+                "time": SimpleNamespace(sleep=self._sleep),
+                **{name: fake[name] for name in ("select", "os", "fcntl")},
+            },
+            settings_module: {name: fake[name] for name in ("termios", "fcntl")},
             can_module: {"_open_bus": lambda _: Driver(self.bus, time)},
             serial.serialposix: fake,
             serial.serialutil.Timeout: {"TIME": time.clock},
@@ -286,7 +338,14 @@ class _Queues:
         return SimpleQueue(self._time)
 
 
-class _Kept:
+def _close_all(closings: Iterable[Callable[[], object]], _within_s: float) -> bool:
+    """One after another: nothing hangs here."""
+    for close in closings:
+        close()
+    return True
+
+
+class _Past:
     """What the last run left, as a memory made by hand."""
 
     def __init__(self, memory: Memory) -> None:

@@ -1,7 +1,8 @@
 """`threading` and `queue` as the service uses them, in virtual time."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import inf
 from queue import Empty
 from typing import Generic, TypeVar
@@ -16,19 +17,91 @@ class Waiting:
 
     def __init__(self, time: Time) -> None:
         self._time = time
-        self._waiting: list[Runner] = []
+        self.waiting: list[Runner] = []
 
     def wait(self, timeout_s: float | None) -> None:
         me = self._time.me()
-        self._waiting.append(me)
+        self.waiting.append(me)
         try:
             self._time.wait(inf if timeout_s is None else self._time.now_s + max(timeout_s, 0.0))
         finally:
-            self._waiting.remove(me)
+            self.waiting.remove(me)
 
     def wake(self) -> None:
-        for runner in self._waiting:
+        for runner in self.waiting:
             self._time.wake(runner)
+
+
+class Lock:
+    """`threading.Lock` and `threading.RLock`."""
+
+    def __init__(self, time: Time, *, again: bool = False) -> None:
+        self._time, self._again = time, again
+        self._holder: Runner | None = None
+        self._depth = 0
+        self._waiting = Waiting(time)
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        me = self._time.me()
+        end_s = inf if timeout < 0 else self._time.now_s + timeout
+        while self._holder is not None and not (self._again and self._holder is me):
+            if not blocking or self._time.now_s >= end_s:
+                return False
+            self._waiting.wait(end_s - self._time.now_s if end_s < inf else None)
+        self._holder, self._depth = me, self._depth + 1
+        return True
+
+    def release(self) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self._holder = None
+            self._waiting.wake()
+
+    def locked(self) -> bool:
+        return self._holder is not None
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+
+class Condition:
+    """`threading.Condition`."""
+
+    def __init__(self, time: Time, lock: Lock | None = None) -> None:
+        self._time, self._lock = time, lock or Lock(time, again=True)
+        self._waiting = Waiting(time)
+        self.acquire, self.release = self._lock.acquire, self._lock.release
+
+    def __enter__(self) -> bool:
+        return self._lock.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        began_s = self._time.now_s
+        self._lock.release()
+        try:
+            self._waiting.wait(timeout)
+        finally:
+            self._lock.acquire()
+        return timeout is None or self._time.now_s < began_s + timeout
+
+    def wait_for(self, predicate: Callable[[], object], timeout: float | None = None) -> bool:
+        end_s = inf if timeout is None else self._time.now_s + timeout
+        while not predicate():
+            if self._time.now_s >= end_s:
+                return False
+            self.wait(None if timeout is None else end_s - self._time.now_s)
+        return True
+
+    def notify(self, _count: int = 1) -> None:
+        self._waiting.wake()
+
+    notify_all = notify
 
 
 class Event:
@@ -57,8 +130,12 @@ class Event:
 class Thread:
     """`threading.Thread`."""
 
-    def __init__(self, time: Time, target: Callable[[], object], name: str = "", daemon: bool = True) -> None:
-        self._time, self._target = time, target
+    def __init__(
+        self, time: Time, target: Callable[..., object], name: str = "", daemon: bool = True,
+        args: tuple[object, ...] = (), kwargs: Mapping[str, object] | None = None,
+    ) -> None:  # fmt: skip
+        self._time, self._target = time, partial(target, *args, **(kwargs or {}))
+        self.name, self.daemon = name, daemon
         self._runner: Runner | None = None
         self._ending = Waiting(time)
 
@@ -99,3 +176,9 @@ class SimpleQueue(Generic[T]):
         if not self._items:
             raise Empty
         return self._items.popleft()
+
+    def empty(self) -> bool:
+        return not self._items
+
+    def qsize(self) -> int:
+        return len(self._items)

@@ -11,6 +11,7 @@ from functools import partial
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
+from typing import Any
 
 from greenlet import getcurrent, greenlet
 
@@ -40,8 +41,10 @@ class Runner:
     """One virtual thread; `turn` counts its wake-ups, so that a later one for the same wait is void."""
 
     let: greenlet
+    process: Any = None  #: whose thread it is: a `virtual_process.Process`, or nobody's
     turn: int = 0
     ended: bool = False
+    killed: bool = False  #: it never runs again, not even its clean-up, until the world itself is closed
 
 
 class Time:
@@ -98,12 +101,20 @@ class Time:
         if self.failure is not None:
             raise StuckError from self.failure
 
-    def start(self, target: Callable[[], object]) -> Runner:
-        runner = Runner(greenlet(parent=self._main.let))
+    def start(self, target: Callable[[], object], process: Any = None) -> Runner:
+        """A new thread, of the same process as whoever starts it, unless another is named."""
+        runner = Runner(greenlet(parent=self._main.let), process or self._running.process)
         runner.let.run = partial(self._live, runner, target)
         self._runners.append(runner)
         self.wake(runner)
         return runner
+
+    def kill(self, process: Any) -> None:
+        """All threads of this process vanish in the middle of what they are doing. Not by a thread of its own."""
+        for runner in self._runners:
+            if runner.process is process and not runner.ended:
+                runner.killed = True
+                runner.turn += 1
 
     def close(self) -> None:
         """Let every thread that is left run into its end. By the main runner, at the end of a world."""
@@ -134,7 +145,10 @@ class Time:
                 if isinstance(what, Handle):
                     if what.callback is not None:
                         what.callback(*what.args)
-                elif what.turn == turn and not what.ended:
+                elif what.turn == turn and not (what.ended or what.killed):
+                    if what.process is not None and what.process.frozen:
+                        what.process.waiting.append(what)
+                        continue
                     what.turn += 1
                     return what
         except BaseException as error:  # noqa: BLE001 - a callback belongs to nobody: the world ends

@@ -1,37 +1,34 @@
-"""Serial ports in memory, below the unchanged pyserial: what the kernel would do, in virtual time, call by call.
+"""A serial port in memory: bytes in and out, the settings that anybody may change, the lock, who reads and writes."""
 
-Every call that touches a port goes past `Calls`, so that any one of them can be made to fail as kernels do.
-"""
-
-import errno
-import os
-import select
 import termios
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import count
-from math import inf
-from types import SimpleNamespace
 from typing import Any
 
+from orchestrator.sim.line import garbled, is_clear
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
 
-#: Descriptors of ours; the others are the real kernel's. None comes twice: what is left of an earlier world, and closes
-#: its port when it is collected, must not close one of this world's.
-DESCRIPTORS = count(100_001)
 #: What a tty takes before it is full.
 ROOM = 4096
+#: The bits of `c_cflag` that are the speed.
+SPEED = 0o010017
+VMIN, VTIME = termios.VMIN, termios.VTIME
+
+Attributes = list[Any]  #: as of `termios.tcgetattr`
 
 
-class Calls:
-    """Every call passes here; `on_call` may raise or return what this one shall return instead."""
-
-    def __init__(self) -> None:
-        self.on_call: Callable[[str], Any] | None = None  #: its name → None: go on
-
-    def __call__(self, name: str) -> Any:
-        return None if self.on_call is None else self.on_call(name)
+def fresh_attributes() -> Attributes:
+    """A port that nobody has set up yet: 9600 baud, line by line, as the kernel begins."""
+    return [
+        termios.ICRNL | termios.IXON,
+        termios.OPOST | termios.ONLCR,
+        termios.B9600 | termios.CS8 | termios.CREAD | termios.HUPCL,
+        termios.ISIG | termios.ICANON | termios.ECHO | termios.ECHOE | termios.IEXTEN,
+        termios.B9600,
+        termios.B9600,
+        [b"\0"] * 32,
+    ]
 
 
 @dataclass(slots=True)
@@ -41,182 +38,72 @@ class Tty:
     time: Time
     present: bool = True
     stalled: bool = False  #: takes nothing any more
+    stolen: bool = False  #: another program reads all that comes in
     waiting_bytes: bytes = b""
+    attributes: Attributes = field(default_factory=fresh_attributes)
+    changed_s: float = 0.0  #: when somebody else changed them
     listener: Callable[[bytes], None] = lambda _: None
+    on_written: Callable[[bytes], None] = lambda _: None  #: what a process of ours wrote, heard or not
     on_delivered: Callable[[int], None] = lambda _: None  #: so many bytes have come in
-    opened: int = 0  #: how many descriptors
-    locked: bool = False
+    opened: int = 0  #: how many open files
+    lock: object = None  #: the open file that has it locked, or a stranger
     news: Waiting = field(init=False)
 
     def __post_init__(self) -> None:
         self.news = Waiting(self.time)
 
+    @property
+    def clear(self) -> bool:
+        """Whether what is said is what is heard."""
+        return is_clear(self.attributes)
+
+    def take(self, data: bytes) -> None:
+        """Bytes go out."""
+        self.on_written(data)
+        self.listener(data if self.clear else garbled(data))
+
     def deliver(self, data: bytes) -> None:
-        if self.present and self.opened:
-            self.waiting_bytes = (self.waiting_bytes + data)[:ROOM]
-            self.news.wake()
-            self.on_delivered(len(data))
+        """Bytes come in."""
+        if not (self.present and self.opened) or self.stolen:
+            return
+        if not self.clear:
+            if self.attributes[3] & termios.ICANON:
+                return  # until a line ends, and garbage ends none
+            data = garbled(data)
+        self.waiting_bytes = (self.waiting_bytes + data)[:ROOM]
+        self.news.wake()
+        self.on_delivered(len(data))
 
     def unplug(self) -> None:
         self.present, self.waiting_bytes = False, b""
         self.news.wake()
 
+    def plug(self) -> None:
+        """A new device, which nobody has set up or locked."""
+        if not self.present:
+            self.present, self.attributes = True, fresh_attributes()
 
-class Kernel:
-    """The ports by path, and the calls of `os`, `fcntl`, `termios` and `select` for them."""
+    # --- other programs -----------------------------------------------------------------------------------------------
 
-    def __init__(self, time: Time) -> None:
-        self.time = time
-        self.calls = Calls()
-        self.ttys: dict[str, Tty] = {}
-        self._open: dict[int, Tty | None] = {}
+    def taken_over(self, speed: int, *, line_by_line: bool = False) -> None:
+        """`stty -F PORT SPEED`, or a getty."""
+        settings = fresh_attributes() if line_by_line else [*self.attributes[:6], [b"\0"] * 32]
+        settings[2] = (settings[2] & ~SPEED) | speed
+        settings[4] = settings[5] = speed
+        self.attributes, self.changed_s = settings, self.time.now_s
 
-    def add(self, path: str) -> Tty:
-        self.ttys[path] = Tty(self.time)
-        return self.ttys[path]
+    def set(self, settings: Attributes) -> None:
+        """`tcsetattr`."""
+        kept = [*settings[:6], list(settings[6])]
+        kept[5] = kept[5] or termios.B9600
+        kept[2] = (kept[2] & ~SPEED) | kept[5]
+        self.attributes = kept
 
-    # --- what takes the modules' places in pyserial and in link/serial.py ---------------------------------------------
-
-    def modules(self) -> dict[str, SimpleNamespace]:
-        fake_os = SimpleNamespace(**vars(os))
-        fake_os.open, fake_os.close, fake_os.read, fake_os.write = self.open, self.close, self.read, self.write
-        fake_os.pipe = self.pipe
-        fake_termios = SimpleNamespace(**vars(termios))
-        fake_termios.tcgetattr = self._tcgetattr
-        fake_termios.tcsetattr = lambda fd, *_: self._touch("tcsetattr", fd)
-        fake_termios.tcflush = self._tcflush
-        fake_select = SimpleNamespace(**vars(select))
-        fake_select.select, fake_select.poll = self.select, lambda: Poll(self)
-        fake_fcntl = SimpleNamespace(
-            fcntl=lambda *_: 0, ioctl=lambda fd, *_: self._touch("ioctl", fd), flock=self._flock,
-            F_SETFL=4, LOCK_EX=2, LOCK_NB=4, LOCK_UN=8,
-        )  # fmt: skip
-        return {"os": fake_os, "fcntl": fake_fcntl, "termios": fake_termios, "select": fake_select}
-
-    def open(self, path: str, flags: int) -> int:
-        self.calls("open")
-        tty = self.ttys.get(path)
-        if tty is None or not tty.present:
-            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
-        tty.opened += 1
-        return self._new(tty)
-
-    def pipe(self) -> tuple[int, int]:
-        self.calls("pipe")
-        return self._new(None), self._new(None)
-
-    def _new(self, tty: Tty | None) -> int:
-        fd = next(DESCRIPTORS)
-        self._open[fd] = tty
-        return fd
-
-    def close(self, fd: int) -> None:
-        if fd not in self._open:
-            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
-        tty = self._open.pop(fd)
-        if tty is not None:
-            tty.opened -= 1
-            tty.locked = tty.locked and tty.opened > 0
-            self.calls("close")  # the descriptor is gone, whatever close says
-
-    def read(self, fd: int, size: int) -> bytes:
-        tty = self._tty(fd)
-        told = self.calls("read")
-        if told is not None:
-            return bytes(told)
-        if not tty.present:
-            return b""  # as of a USB adapter that was unplugged
-        data, tty.waiting_bytes = tty.waiting_bytes[:size], tty.waiting_bytes[size:]
-        if not data:
-            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
-        return data
-
-    def write(self, fd: int, data: bytes) -> int:
-        tty = self._tty(fd)
-        told = self.calls("write")
-        if not tty.present:
-            raise OSError(errno.EIO, os.strerror(errno.EIO))
-        if tty.stalled:
-            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
-        taken = len(data) if told is None else min(int(told), len(data))
-        tty.listener(bytes(data[:taken]))
-        return taken
-
-    def select(
-        self, readers: Iterable[int], writers: Iterable[int], _: object, timeout: float | None = None
-    ) -> tuple[list[int], list[int], list[int]]:
-        self.calls("select")
-        readers, writers = list(readers), list(writers)
-        end_s = inf if timeout is None else self.time.now_s + timeout
-        while True:
-            can_read, can_write = list(filter(self.readable, readers)), list(filter(self.writable, writers))
-            if can_read or can_write or self.time.now_s >= end_s:
-                return can_read, can_write, []
-            self.sleep([*readers, *writers], end_s)
-
-    def sleep(self, fds: Iterable[int], end_s: float) -> None:
-        """Until something happens to one of these, or until then."""
-        ttys = [tty for fd in fds if (tty := self._open.get(fd)) is not None]
-        ttys[0].news.wait(end_s - self.time.now_s)
-
-    def readable(self, fd: int) -> bool:
-        tty = self._open.get(fd)
-        return tty is not None and (bool(tty.waiting_bytes) or not tty.present)
-
-    def writable(self, fd: int) -> bool:
-        tty = self._open.get(fd)
-        return tty is not None and (not tty.stalled or not tty.present)
-
-    def _tty(self, fd: int) -> Tty:
-        tty = self._open.get(fd)
-        if tty is None:
-            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
-        return tty
-
-    def _touch(self, name: str, fd: int) -> int:
-        self._tty(fd)
-        self.calls(name)
-        return 0
-
-    def _flock(self, fd: int, operation: int) -> None:
-        tty = self._tty(fd)
-        if operation & 8:
-            tty.locked = False
-            return
-        self.calls("flock")
-        if tty.locked:
-            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
-        tty.locked = True
-
-    def _tcgetattr(self, fd: int) -> list[Any]:
-        self._touch("tcgetattr", fd)
-        return [0, 0, 0, 0, 0, 0, [b"\0"] * 32]
-
-    def _tcflush(self, fd: int, queue: int) -> None:
-        self._touch("tcflush", fd)
-        if queue == termios.TCIFLUSH:
-            self._tty(fd).waiting_bytes = b""
-
-
-class Poll:
-    """`select.poll()` for one descriptor."""
-
-    def __init__(self, kernel: Kernel) -> None:
-        self._kernel = kernel
-        self._fd, self._mask = -1, 0
-
-    def register(self, fd: int, mask: int) -> None:
-        self._fd, self._mask = fd, mask
-
-    def poll(self, timeout_ms: float) -> list[tuple[int, int]]:
-        kernel = self._kernel
-        told = kernel.calls("poll")
-        if told is not None:
-            return [(self._fd, int(told))]
-        end_s = kernel.time.now_s + timeout_ms / 1000
-        ready = kernel.readable if self._mask & select.POLLIN else kernel.writable
-        while not ready(self._fd):
-            if kernel.time.now_s >= end_s:
-                return []
-            kernel.sleep([self._fd], end_s)
-        return [(self._fd, self._mask)]
+    def shown(self) -> Attributes:
+        """`tcgetattr`: VMIN and VTIME are numbers where they mean something."""
+        kept = [*self.attributes[:6], list(self.attributes[6])]
+        if not kept[3] & termios.ICANON:
+            for at in (VMIN, VTIME):
+                value = kept[6][at]
+                kept[6][at] = value if isinstance(value, int) else value[0]
+        return kept

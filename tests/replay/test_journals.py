@@ -20,7 +20,7 @@ def test_the_journals_are_there() -> None:
 def test_every_decision_is_the_one_that_was_recorded(path: Path) -> None:
     wrong = {
         f"{bay} {one.recorded.wall}": one.wrong
-        for bay, steps in read([path]).items()
+        for bay, steps in read([path]).bays.items()
         for one in again(steps)
         if one.wrong
     }
@@ -28,7 +28,7 @@ def test_every_decision_is_the_one_that_was_recorded(path: Path) -> None:
 
 
 def test_they_have_all_that_matters_in_them() -> None:
-    taken = [one for path in PATHS for steps in read([path]).values() for one in again(steps)]
+    taken = [one for path in PATHS for steps in read([path]).bays.values() for one in again(steps)]
     assert len(taken) > 2000
     assert {one.decision.state for one in taken} == set(State)
     assert len({fault.id for one in taken for fault in one.decision.faults}) >= 8

@@ -1,12 +1,13 @@
 """A bay of the service without threads: the test is its control loop, its devices obey at once and time jumps."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.config.load import load_map, load_policy
 from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits
-from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import Persisted
 from orchestrator.interlock import Grant
 from orchestrator.keys import Range
 from orchestrator.model import (
@@ -27,9 +28,12 @@ from orchestrator.model import (
     Sent,
     State,
 )
-from orchestrator.service.bay import Asked, BayRunner
+from orchestrator.service.asked import Asked
+from orchestrator.service.bay import BayRunner
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
+from orchestrator.service.past import Entry, Place
+from orchestrator.service.store import Store
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 STEP_S = 0.2
@@ -115,23 +119,34 @@ class Battery:
 
 
 class Bench:
-    """A bay, its devices, and a journal that nobody writes: its lines wait in it."""
+    """A bay, its devices, a journal that nobody writes: its lines wait in it, and a store on a real disk.
+
+    `persisted` is what the last run has left; the store writes after each step, for as long as its `disk` is well.
+    """
 
     def __init__(
         self,
         directory: Path,
-        memory: Memory | None = None,
+        persisted: Persisted | None = None,
         bay: Bay | None = None,
         *,
         max_mb: float = 1.0,
+        now_s: float = 1000.0,
+        wall: Callable[[], float] = time.time,
         contactor: Contactor | None = None,
     ) -> None:
         self.charger, self.battery = Charger(), Battery()
-        self.now_s = 1000.0
+        self.now_s = now_s
         self.asleep_s = 0.0
-        self.journal = Journal(directory, max_mb, lambda: self.now_s, time.time)
+        self.journal = Journal(directory, max_mb, lambda: self.now_s, wall)
+        self.said: list[str] = []
+        chosen = bay or the_bay()
+        place = Place.of(chosen)
+        self.disk = True
+        self.store = Store(directory, [place], lambda: self.now_s, time.time)
+        self.store._begin([Entry(place, persisted or Persisted(), 1)])
         self.bay = BayRunner(
-            bay or the_bay(), self.charger, self.battery, self.journal, memory or Memory(), contactor=contactor
+            chosen, self.charger, self.battery, self.journal, self.store, self.said.append, contactor=contactor
         )
 
     def step(self, count: int = 1) -> State:
@@ -141,6 +156,9 @@ class Bench:
             self.battery.now_s = self.now_s
             self.battery.values["current_a"] = self.charger.reading.current_a
             self.bay.run(self.now_s, self.asleep_s)
+            if self.disk:
+                self.store.turn()
+                self.bay._answers.look(self.now_s)
         assert self.bay.decision is not None
         return self.bay.decision.state
 

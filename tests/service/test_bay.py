@@ -1,15 +1,19 @@
 """One bay of the service with devices made by hand: orders, answers, and exceptions of our own code."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
 import pytest
 
-from orchestrator.model import STOP, Request, State
+from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import Persisted
+from orchestrator.core.rules import Rules
+from orchestrator.core.step import step
+from orchestrator.model import STOP, Decision, Request, Snapshot, State
 from orchestrator.service import bay as bay_module
-from orchestrator.service.bay import Asked
-from orchestrator.service.kept import Kept
+from orchestrator.service.asked import Asked
 from tests.service.bench import STEP_S, Bench
 
 HELD = "stopped by the operator; start to go on"
@@ -21,7 +25,7 @@ def _bench(tmp_path: Path) -> Bench:
 
 
 def said(bench: Bench) -> list[str]:
-    return list(bench.journal._said)
+    return bench.said
 
 
 def test_before_the_first_step_the_status_says_that_it_starts(bench: Bench) -> None:
@@ -54,6 +58,21 @@ def test_requests_are_answered_one_a_step_in_their_order(bench: Bench) -> None:
     assert (stop.done.is_set(), pause.done.is_set()) == (True, False)
     bench.step()
     assert (stop.answer, pause.answer) == ("", f"not running: {HELD}")
+
+
+def test_a_stop_waits_for_nothing_and_what_it_overtook_is_refused(bench: Bench) -> None:
+    """However much was asked before it, and however often it is asked itself: the next step does it."""
+    bench.charging()
+    early = [Asked(Request.PAUSE), *(Asked(Request.START) for _ in range(5))]
+    stops, late = [Asked(Request.STOP), Asked(Request.STOP)], Asked(Request.PAUSE)
+    for one in (*early, *stops, late):
+        bench.bay.ask(one)
+    bench.step()
+    assert [one.done.is_set() for one in (*early, *stops, late)] == [True] * 8 + [False]
+    assert {one.answer for one in early} == {"a stop came meanwhile: ask again if it is still wanted"}
+    assert {one.answer for one in stops} == {""}
+    bench.step()
+    assert late.answer == "not running: stopped by the operator; start to go on"
 
 
 def test_every_change_of_state_is_said_once(bench: Bench) -> None:
@@ -91,16 +110,75 @@ def test_an_exception_of_our_own_stops_the_bay_latches_and_is_told(
     assert bench.ask(Request.RESET) == ""
 
 
+def kept(bench: Bench) -> tuple[bool, str, bool]:
+    """What the disk has of the bay: running, hold, paused."""
+    (entry,) = json.loads(bench.store.path.read_text(encoding="utf-8"))["entries"]
+    return entry["running"], entry["hold"], entry["paused"]
+
+
 def test_what_must_outlive_it_is_kept_whenever_it_changes(bench: Bench) -> None:
-    bench.until(State.QUALIFYING)
-    assert bench.journal._kept == {"bay-1": Kept()}
+    bench.until(State.IDLE)
+    assert kept(bench) == (False, "", False)
     bench.charging()
-    assert bench.journal._kept == {"bay-1": Kept(running=True)}
+    assert kept(bench) == (True, "", False)
     bench.ask(Request.PAUSE)
     bench.step(10)
-    assert bench.journal._kept == {"bay-1": Kept(paused=True)}
+    assert kept(bench) == (False, "", True)
     bench.ask(Request.STOP)
-    assert bench.journal._kept == {"bay-1": Kept(paused=True, hold=HELD)}
+    assert kept(bench) == (False, HELD, True)
+
+
+def test_a_request_is_answered_when_its_effect_is_on_the_disk(bench: Bench) -> None:
+    bench.charging()
+    bench.disk = False
+    stop = Asked(Request.STOP)
+    bench.bay.ask(stop)
+    bench.step(5)
+    assert not stop.done.is_set()
+    bench.store.turn()
+    bench.disk = True
+    bench.step()
+    assert (stop.done.is_set(), stop.answer) == (True, "")
+    assert kept(bench)[1] == HELD
+
+
+def test_a_request_that_no_disk_takes_is_answered_with_that(bench: Bench) -> None:
+    bench.charging()
+    bench.disk = False
+    stop = Asked(Request.STOP)
+    bench.bay.ask(stop)
+    bench.step(12)
+    assert stop.done.is_set()
+    assert stop.answer.startswith("done, but not kept: a restart would forget what changes: ")
+    assert bench.charger.reading.current_a == 0
+
+
+def test_a_refusal_waits_for_no_disk(bench: Bench) -> None:
+    bench.ask(Request.STOP)
+    bench.disk = False
+    pause = Asked(Request.PAUSE)
+    bench.bay.ask(pause)
+    bench.step()
+    assert (pause.done.is_set(), pause.answer) == (True, f"not running: {HELD}")
+
+
+def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A charge that the core intends begins only once that is kept; a write under way counts for nothing."""
+    told: list[bool] = []
+
+    def intending(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
+        told.append(snapshot.running_kept)
+        decision, after = step(now_s, snapshot, memory, rules)
+        after.intends = True
+        return replace(decision, command=None), after
+
+    bench.step(3)
+    monkeypatch.setattr(bay_module, "step", intending)
+    bench.disk = False
+    bench.step(3)
+    bench.disk = True
+    bench.step(2)
+    assert told == [False, False, False, False, True]
 
 
 def test_the_stop_at_the_end_is_no_operators(bench: Bench) -> None:
@@ -110,7 +188,7 @@ def test_the_stop_at_the_end_is_no_operators(bench: Bench) -> None:
     assert bench.bay.status()["reason"] == "the service ends: SIGTERM"
     bench.step(10)
     assert bench.bay.verified
-    assert bench.journal._kept == {"bay-1": Kept()}
+    assert kept(bench) == (False, "", False)
     (session,) = [line for _, _, _, line in bench.journal._waiting if line[0] == "session" and line[1]["result"]]
     assert session[1]["result"] == "the service ends: SIGTERM"
 
@@ -121,26 +199,42 @@ def test_what_was_charging_when_the_guardian_died_waits_for_an_operator(bench: B
     bench.step(10)
     assert bench.bay.verified
     hold = "the last run ended in mid-charge: the guardian has died; start to go on"
-    assert bench.journal._kept == {"bay-1": Kept(hold=hold)}
+    assert kept(bench) == (False, hold, False)
 
 
 def test_what_was_not_charging_when_the_guardian_died_waits_for_nobody(bench: Bench) -> None:
     bench.until(State.QUALIFYING)
     bench.bay.end("the guardian has died", orderly=False)
     bench.step(10)
-    assert bench.journal._kept == {"bay-1": Kept()}
+    assert kept(bench) == (False, "", False)
 
 
-def test_the_stop_at_the_end_does_not_undo_an_operators(bench: Bench) -> None:
+@pytest.mark.parametrize("before", [True, False])
+def test_the_end_of_the_service_and_an_operators_stop_are_two_things(bench: Bench, *, before: bool) -> None:
+    """The stop may come before the end or, in the same second, after it: the next run keeps to it and nothing else."""
     bench.charging()
-    bench.ask(Request.STOP)
+    if before:
+        bench.ask(Request.STOP)
+    bench.bay.end("SIGTERM")
+    bench.step()
+    if not before:
+        assert bench.ask(Request.STOP) == ""
+    bench.step(10)
+    assert kept(bench) == (False, HELD, False)
+
+
+@pytest.mark.parametrize("steps", range(4))
+def test_an_end_during_the_start_leaves_no_hold_behind(bench: Bench, steps: int) -> None:
+    if steps:
+        bench.step(steps)
     bench.bay.end("SIGTERM")
     bench.step(10)
-    assert bench.journal._kept == {"bay-1": Kept(hold=HELD)}
+    assert bench.bay.verified
+    assert kept(bench) == (False, "", False)
 
 
 def test_it_begins_with_what_was_kept(tmp_path: Path) -> None:
-    bench = Bench(tmp_path, Kept(running=True).memory(999.0))
+    bench = Bench(tmp_path, Persisted(running=True))
     assert bench.step(30) is State.IDLE
     assert [fault["id"] for fault in bench.bay.status()["faults"]] == ["found_running"]  # type: ignore[attr-defined]  # a JSON document
     assert bench.ask(Request.START) == ""
@@ -178,12 +272,14 @@ def test_a_machine_that_was_suspended_stops_and_qualifies_anew(bench: Bench) -> 
 
 
 def test_nothing_begins_while_a_latched_fault_would_be_forgotten(bench: Bench) -> None:
-    bench.journal._unkept = "no space"
+    fresh = bench.store.path.with_name("persisted.json.new")
+    fresh.symlink_to("/dev/full")
     bench.step(50)
     assert bench.bay.status()["state"] == "SUSPENDED"
-    assert faults(bench)["unkept"].startswith("no space; ")
-    bench.journal._unkept = ""
+    why = f"a restart would forget what changes: {bench.store.path}: No space left on device; "
+    assert faults(bench)["unkept"].startswith(why)
+    fresh.unlink()
     bench.until(State.CHARGING)
-    bench.journal._unkept = "no space"
+    fresh.symlink_to("/dev/full")
     bench.step(50)
     assert bench.bay.status()["state"] == "CHARGING"

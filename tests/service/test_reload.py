@@ -85,7 +85,7 @@ def test_what_stands_by_takes_it_over_at_once(site: Site) -> None:
     site.edit_finish()
     site.bench.step()
     assert site.policy["sha256"] != before
-    assert any("is in force" in line for line in site.bench.journal._said)
+    assert any("is in force" in line for line in site.bench.said)
 
 
 def test_a_comment_changes_the_lines_that_reasons_name(site: Site) -> None:

@@ -1,8 +1,11 @@
 """The table that `orchestrator status` prints."""
 
 from collections.abc import Mapping
+from typing import cast
 
-from orchestrator.show import figure, table
+import pytest
+
+from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
 
 
 def bay(**changes: object) -> dict[str, object]:
@@ -61,3 +64,133 @@ def test_a_policy_that_waits_is_told() -> None:
 def test_figures() -> None:
     assert figure(0, "{:.1f} A") == "0.0 A"
     assert figure(None, "{:.1f} A") == "–"
+
+
+# --- what is old -----------------------------------------------------------------------------------------------------
+
+
+def test_what_was_not_heard_lately_is_marked_with_what_is_known_instead() -> None:
+    told = bay(
+        charger={"current_a": 14.0, "age_s": 12.4, "old": True},
+        battery={"soc_pct": 54.6, "voltage_v": 48.1, "temperature_c": 8.4, "current_a": 0.04, "age_s": {}, "old": []},
+    )
+    line, below = table([told]).splitlines()[1:]
+    assert "14.00 A (old)" in line
+    assert below == "  OLD: the charger's 14.00 A, last heard 12 s ago; the BMU sees 0.0 A"
+
+
+def test_what_both_said_long_ago_is_no_evidence() -> None:
+    ages_s = {"soc_pct": 600.0, "voltage_v": 600.0, "temperature_c": 9000.0, "current_a": 600.0}
+    told = bay(
+        charger={"current_a": 14.0, "age_s": 601.0, "old": True},
+        battery={
+            "soc_pct": 54.6, "voltage_v": 48.1, "temperature_c": 8.4, "current_a": 0.0, "age_s": ages_s,
+            "old": list(ages_s),
+        },
+    )  # fmt: skip
+    line, below = table([told]).splitlines()[1:]
+    assert line.count("(old)") == 4
+    assert below == (
+        "  OLD: the charger's 14.00 A, last heard 10 min ago; SOC, pack voltage: last heard 10 min ago; "
+        "temperature: last heard 2 h ago"
+    )
+
+
+# --- what to do ------------------------------------------------------------------------------------------------------
+
+
+def test_what_needs_a_person_comes_first() -> None:
+    calm, loud = bay(), bay(name="bay-9", state="UNCONTROLLABLE", reason="it runs on", port="/dev/ttyUSB9")
+    alarmed = bay(name="bay-5", state="OFFLINE", reason="silent", alarm=True)
+    lines = table([calm, alarmed, loud]).splitlines()
+    assert lines[:2] == [
+        "ALARM: CUT THE MAINS of bay-9's charger (/dev/ttyUSB9): UNCONTROLLABLE: it runs on",
+        "ALARM: CUT THE MAINS of bay-5's charger (its port is not known): OFFLINE: silent",
+    ]
+    assert [line.split()[0] for line in lines[2:]] == ["BAY", "bay-9", "bay-5", "bay-1"]
+
+
+STOPPED = bay(
+    state="IDLE",
+    reason="stopped by the operator",
+    port="/dev/ttyUSB1",
+    command={"order": {"action": None}},
+    charger={"online": True, "operation": 0, "current_a": 0.0, "old": False},
+    battery={"current_a": 0.0, "old": []},
+)
+CHARGER, BATTERY = cast("dict[str, object]", STOPPED["charger"]), cast("dict[str, object]", STOPPED["battery"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"state": "TRIPPED"},
+        {"state": "SUSPENDED"},
+        {"state": "FULL"},
+        {"battery": {"current_a": None, "old": []}},
+        {"battery": {"current_a": 14.0, "old": ["current_a"]}},
+        {"battery": {"current_a": -5.0, "old": []}},
+    ],
+)
+def test_a_charger_that_stands_by(change: dict[str, object]) -> None:
+    assert stands_by({**STOPPED, **change})
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"state": "STOPPING"},
+        {"state": "CHARGING"},
+        {"state": "OFFLINE"},
+        {"state": "UNCONTROLLABLE"},
+        {"alarm": True},
+        {"command": {"order": {"action": "stop"}}},
+        {"charger": {**CHARGER, "online": False}},
+        {"charger": {**CHARGER, "old": True}},
+        {"charger": {**CHARGER, "operation": 1}},
+        {"charger": {**CHARGER, "operation": None}},
+        {"charger": {**CHARGER, "current_a": 0.6}},
+        {"charger": {**CHARGER, "current_a": None}},
+        {"battery": {**BATTERY, "current_a": 14.0}},
+    ],
+)
+def test_whatever_speaks_against_it_is_no_standby(change: dict[str, object]) -> None:
+    assert not stands_by({**STOPPED, **change})
+
+
+@pytest.mark.parametrize(
+    ("change", "first"),
+    [
+        ({"state": "UNCONTROLLABLE"}, "CUT THE MAINS of bay-1's charger (/dev/ttyUSB1): UNCONTROLLABLE: "),
+        ({"state": "STOPPING"}, "CUT THE MAINS of bay-1's charger (/dev/ttyUSB1): STOPPING: "),
+        ({"state": "OFFLINE", "alarm": True}, "CUT THE MAINS of bay-1's charger (/dev/ttyUSB1): OFFLINE: "),
+        ({"state": "OFFLINE"}, "LOOK at bay-1's charger (/dev/ttyUSB1), nobody has seen that it stands by: OFFLINE: "),
+    ],
+)
+def test_what_to_do_is_said_before_why(change: dict[str, object], first: str) -> None:
+    assert what_to_do({**STOPPED, **change}) == f"{first}stopped by the operator"
+
+
+def test_advice_that_the_reason_begins_with_is_not_said_twice() -> None:
+    told = bay(state="UNCONTROLLABLE", reason="CUT THE MAINS of this charger (/dev/x): it runs on")
+    assert what_to_do(told) == "bay-1: CUT THE MAINS of this charger (/dev/x): it runs on"
+
+
+def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_what_is_wrong_with_the_station() -> None:
+    stray = {"bay": "bay-7", "port": "/dev/old", "state": "STOPPING", "verified": False, "problem": "no such port"}
+    document = {
+        "bays": [],
+        "journal": {"problem": "disk full"},
+        "persisted": {"problem": "its disk hangs"},
+        "strays": [stray, {**stray, "port": "/dev/other", "verified": True}],
+    }
+    assert page(document).splitlines() == [
+        "ALARM: CUT THE MAINS of the charger on /dev/old, which was bay-7's: it may be running, nobody has seen that "
+        "it stands by: no such port",
+        "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY",
+        "WARNING: disk full",
+        "WARNING: its disk hangs",
+    ]
+    assert strays({}) == []
+    assert page({"bays": [], "journal": {"problem": ""}}) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"

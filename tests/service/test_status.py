@@ -4,8 +4,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from orchestrator.config.load import load_station
 from orchestrator.config.shipped import shipped_dir
+from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S
 from orchestrator.model import (
     ActiveFault,
     BatteryLink,
@@ -80,8 +83,11 @@ def test_the_fixed_names_are_there_whatever_is_known() -> None:
 
 def test_nothing_known_is_null() -> None:
     status = document(Snapshot(), Decision(State.STARTING, "the service has just started"))
-    assert {value for key, value in status["charger"].items() if key not in ("online", "problem")} == {None}
-    assert {value for key, value in status["battery"].items() if key not in ("online", "problem")} == {None}
+    for part, old in (("charger", False), ("battery", [])):
+        known = {key: value for key, value in status[part].items() if key not in ("online", "problem")}
+        assert known.pop("old") == old
+        ages_s = known.pop("age_s")
+        assert {*known.values(), *(ages_s.values() if ages_s else (ages_s,))} == {None}
     assert (status["step"], status["session"], status["faults"], status["alarm"]) == (None, None, [], False)
 
 
@@ -105,6 +111,26 @@ def test_what_is_known_is_in_the_devices_own_values() -> None:
     assert status["session"]["charged_ah"] == 0.5
 
 
+@pytest.mark.parametrize(
+    ("age_s", "charger_old", "battery_old"),
+    [
+        (0.0, False, []),
+        (CHARGER_STALE_S, False, []),
+        (CHARGER_STALE_S + 0.1, True, ["temperature_c"]),
+        (SLOW_STALE_S + 0.1, True, ["temperature_c", "soc_pct"]),
+    ],
+)
+def test_each_value_says_how_old_it_is_and_whether_it_still_counts(
+    age_s: float, charger_old: bool, battery_old: list[str]
+) -> None:
+    status: dict[str, Any] = bay_status("bay-1", KNOWN, CHARGING, 1.0 + age_s, 1000.0)
+    assert (status["charger"]["age_s"], status["charger"]["old"]) == (pytest.approx(age_s), charger_old)
+    assert status["charger"]["current_a"] == 13.9
+    assert status["battery"]["age_s"]["soc_pct"] == pytest.approx(age_s)
+    assert status["battery"]["age_s"]["voltage_v"] is None
+    assert status["battery"]["old"] == battery_old
+
+
 def test_since_is_the_wall_clock() -> None:
     (fault,) = document(KNOWN, CHARGING)["faults"]
     assert fault == {"id": "noisy_line", "effect": "WARN", "text": "an error frame", "since": 990.0}
@@ -115,5 +141,7 @@ def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
     assert station_status(station, [], "disk full") == {
         "station": "depot-1",
         "bays": [],
+        "strays": [],
         "journal": {"problem": "disk full"},
+        "persisted": {"problem": ""},
     }

@@ -1,8 +1,10 @@
 """Every fault does what its sentence says, seen from the lines or in the model, and healing takes it away."""
 
 import asyncio
+import termios
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from fcntl import LOCK_EX, LOCK_NB, flock
 from itertools import count
 from pathlib import Path
 
@@ -95,6 +97,49 @@ def does_not_rise(rig: Rig) -> bool:
     return rig.bay.pack.ocv_v == before_v
 
 
+def back_at_its_highest(rig: Rig) -> bool:
+    rig.bay.charger.push(Push.CURRENT_LIMIT, 0)
+    rig.bay.advance(0.3)
+    return rig.bay.charger.current_limit == 4
+
+
+def runs_again(rig: Rig) -> bool:
+    return all(stopped_for(rig, 4.0) is Operation.RUNNING for _ in range(2))
+
+
+def obeys_once(rig: Rig) -> bool:
+    first = stopped_for(rig, 1.0)
+    rig.bay.charger.rest(1)
+    rig.bay.charger.push(Push.OPERATION, 1)
+    return (first, stopped_for(rig, 1.0)) == (Operation.STOPPED, Operation.RUNNING)
+
+
+def stopped_for(rig: Rig, seconds: float) -> Operation:
+    rig.bay.charger.rest(0)
+    rig.bay.advance(seconds)
+    return rig.bay.charger.operation
+
+
+def all_frozen(rig: Rig) -> bool:
+    before, volts = rig.bay.readout(), rig.bay.charger.voltage_v
+    rig.bay.advance(60)
+    return rig.bay.readout() == before and rig.bay.charger.voltage_v > volts
+
+
+def at_115200(rig: Rig) -> bool:
+    with Path(rig.wire.path).open("rb", buffering=0) as port:
+        return bool(termios.tcgetattr(port.fileno())[5] == termios.B115200)
+
+
+def locked(rig: Rig) -> bool:
+    with Path(rig.wire.path).open("rb", buffering=0) as port:
+        try:
+            flock(port, LOCK_EX | LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
 SEEN: dict[str, Callable[[Rig], object]] = {
     "reverse_polarity": lambda rig: (
         rig.bay.charger.connection is Connection.REVERSED and rig.bay.charger.charge_mode is ChargeMode.REVERSED
@@ -141,6 +186,23 @@ SEEN: dict[str, Callable[[Rig], object]] = {
     "ignore_stop": ignores_a_stop,
     "bmu_reboot": lambda _: True,
     "port_gone": lambda rig: not rig.wire.is_open,
+    "line_taken_over": at_115200,
+    "port_locked": locked,
+    "says_standby": lambda rig: (
+        rig.wire.lies == {Kind.OPERATION: 0, Kind.CURRENT: 0} and rig.bay.charger.current_a == 8.0
+    ),
+    "says_standby_now_and_then": lambda rig: (
+        [rig.wire.liars[Kind.CURRENT].is_told() for _ in range(4)] == [False, True, False, True]
+        if rig.wire.liars
+        else False
+    ),
+    "limit_reverts": back_at_its_highest,
+    "runs_again": runs_again,
+    "obeys_once": obeys_once,
+    "stopped_elsewhere": lambda rig: rig.bay.charger.charge_mode is ChargeMode.FULL,
+    "bmu_frozen": all_frozen,
+    "pack_collapsed": lambda rig: rig.bay.readout().voltage_v < 32 and rig.bay.charger.voltage_v < 32,
+    "another_pack": lambda rig: 36 < rig.bay.readout().voltage_v < 40,
     "heal": lambda _: True,
 }
 #: One frame is all that there is of them: test_bmu.py and test_plant.py wait for it.

@@ -4,6 +4,7 @@ import contextlib
 import os
 import select
 import socket
+import termios
 import time
 import tty
 from collections.abc import Iterator
@@ -19,6 +20,9 @@ class Port:
     def __init__(self, path: str) -> None:
         self.fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self.fd)
+        settings = termios.tcgetattr(self.fd)
+        settings[4] = settings[5] = termios.B19200
+        termios.tcsetattr(self.fd, termios.TCSANOW, settings)
 
     def write(self, text: str) -> None:
         os.write(self.fd, bytes.fromhex(text))

@@ -73,13 +73,14 @@ class Service:
 
     # --- the process ---
 
-    def start(self) -> Self:
+    def start(self, stderr: int | None = None) -> Self:
+        """Until it answers; what it says goes into its log, or to `stderr`."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
                 [sys.executable, *self._run, str(self.file)],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
-                stderr=log,
+                stderr=log if stderr is None else stderr,
                 start_new_session=True,
                 preexec_fn=die_with_parent,
             )
@@ -93,6 +94,12 @@ class Service:
             return bool(self.status())
         except Exception:  # noqa: BLE001 - not yet
             return False
+
+    def edit(self, change: Callable[[Document], None]) -> None:
+        """Change the station file, as a person with an editor does."""
+        document: Document = json.loads(self.file.read_text(encoding="utf-8"))
+        change(document)
+        self.file.write_text(json.dumps(document, indent=1), encoding="utf-8")
 
     def signal(self, number: signal.Signals) -> None:
         """To the process that was started: the guardian."""
@@ -140,6 +147,10 @@ class Service:
         bays = cast("list[Document]", ask(self.socket, {"verb": "status", "bay": only})["bays"])
         return {bay["name"]: bay for bay in bays}
 
+    def strays(self) -> list[Document]:
+        """The chargers in hand that the station file has not any more."""
+        return cast("list[Document]", ask(self.socket, {"verb": "status", "bay": None})["strays"])
+
     def bay(self, name: str = "bay-1") -> Document:
         return self.status(name)[name]
 
@@ -186,11 +197,14 @@ class Service:
         return [record["to"] for record in self.journal(bay, "transition")]
 
 
-def orchestrator(*args: str, env: Mapping[str, str] | None = None) -> subprocess.CompletedProcess[str]:
+def orchestrator(
+    *args: str, env: Mapping[str, str] | None = None, cwd: Path | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run one verb of the command line."""
     return subprocess.run(
         [sys.executable, "-m", "orchestrator", *args],
         env={**os.environ, **(env or {})},
+        cwd=cwd,
         capture_output=True,
         text=True,
         timeout=30,

@@ -75,11 +75,10 @@ def held(plant: PlantProcess, service: Service) -> None:
 
 
 def kept(service: Service) -> Document:
-    path = service.directory / "run" / "journal" / "kept.json"
-    document: Document = (
-        json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"bay-1": {"running": False}}
-    )
-    record: Document = document["bay-1"]
+    path = service.directory / "run" / "journal" / "persisted.json"
+    document: Document = json.loads(path.read_text(encoding="utf-8"))
+    (entry,) = [one for one in document["entries"] if one["bay"] == "bay-1"]
+    record: Document = entry
     return record
 
 

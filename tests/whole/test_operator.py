@@ -63,9 +63,9 @@ def test_pause_and_start(station: Station) -> None:
     charging(station)
     plant, service = station
     done = service.cli("pause", "bay-1")
-    assert (done.returncode, done.stdout) == (0, "bay-1: pause accepted\n")
+    assert plant.state()["operation"] == 0  # as soon as the command line says so
+    assert (done.returncode, done.stdout) == (0, "bay-1: pause accepted; stands by, verified\n")
     service.wait("SUSPENDED")
-    assert plant.state()["operation"] == 0
     assert service.bay("bay-2")["state"] == "CHARGING"
     assert service.cli("start", "bay-1").returncode == 0
     service.wait("CHARGING")
@@ -88,9 +88,12 @@ def test_a_pause_does_not_end_the_session_and_a_stop_does(station: Station) -> N
 def test_stop_holds_until_start(station: Station) -> None:
     charging(station)
     plant, service = station
-    assert service.cli("stop", "--all").returncode == 0
-    service.wait("IDLE", ["bay-1", "bay-2"])
+    charging(station, 2)
+    stopped = service.cli("stop", "bay-1", "bay-2")
     assert (plant.state(1)["operation"], plant.state(2)["operation"]) == (0, 0)
+    assert (stopped.returncode, stopped.stderr) == (0, "")
+    assert stopped.stdout == "".join(f"bay-{number}: stop accepted; stands by, verified\n" for number in (1, 2))
+    service.wait("IDLE", ["bay-1", "bay-2"])
     refused = service.cli("pause", "bay-1", "bay-2")
     assert refused.returncode == 1
     assert refused.stderr == "".join(
@@ -98,6 +101,32 @@ def test_stop_holds_until_start(station: Station) -> None:
     )
     assert service.bay()["reason"] == "stopped by the operator; start to go on"
     charging(station)
+
+
+def test_a_stop_that_nobody_could_verify_is_no_success(station: Station) -> None:
+    """The fourth bay's port is not there: what stands behind it may be doing anything."""
+    _, service = station
+    done = service.cli("stop", "bay-4", "bay-2")
+    assert done.returncode == 1
+    assert done.stderr.startswith("LOOK at bay-4's charger (")
+    assert done.stdout == "bay-4: stop accepted\nbay-2: stop accepted; stands by, verified\n"
+
+
+def test_a_stop_that_is_not_obeyed_begins_with_what_to_do(station: Station) -> None:
+    charging(station, 2)
+    plant, service = station
+    plant.inject("ignore_stop", 2)
+    done = service.cli("stop", "bay-2")
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"bay-2: CUT THE MAINS of this charger ({plant.bays[1]['port']})")
+    assert done.stdout == "bay-2: stop accepted\n"
+    table = service.cli("status").stdout.splitlines()
+    assert table[0].startswith("ALARM: bay-2: CUT THE MAINS of this charger (")
+    assert [line.split()[0] for line in table if line.startswith("bay-")] == ["bay-2", "bay-1", "bay-3", "bay-4"]
+    plant.inject("heal", 2)
+    service.wait("TRIPPED", ["bay-2"])
+    assert service.cli("stop", "bay-2").returncode == 0
+    assert service.cli("reset", "bay-2").returncode == 0
 
 
 def test_a_trip_is_refused_a_start_and_reset_only_when_its_cause_is_gone(station: Station) -> None:
@@ -134,7 +163,11 @@ def test_wrong_use_is_told(station: Station) -> None:
     nowhere = orchestrator("status", "--socket", str(service.directory / "no.sock"))
     assert nowhere.returncode == 1
     assert "no service answers on" in nowhere.stderr
-    assert orchestrator("status", env={"ORCHESTRATOR_SOCKET": ""}).returncode == 2
+    none = orchestrator("status", env={"ORCHESTRATOR_SOCKET": ""})
+    assert none.returncode == 2
+    assert none.stderr.startswith("orchestrator: no service found: ")
+    here = orchestrator("status", env={"ORCHESTRATOR_SOCKET": ""}, cwd=service.directory)
+    assert here.returncode == 0
 
 
 def test_a_charger_that_is_not_there_at_the_start_is_used_once_it_is(station: Station) -> None:
@@ -191,6 +224,10 @@ def test_an_adapter_that_is_unplugged_and_plugged_in_again(station: Station) -> 
     bay = service.wait("UNCONTROLLABLE")["bay-1"]
     assert bay["alarm"] is True
     assert "no such port" in bay["reason"]
+    assert bay["charger"]["old"] is True and bay["charger"]["age_s"] > 2
+    table = service.cli("status", "bay-1").stdout
+    assert table.startswith("ALARM: bay-1: CUT THE MAINS of this charger (")
+    assert " A (old)" in table and "OLD: the charger's " in table and "; the BMU sees " in table
     plant.inject("heal")
     service.wait("SUSPENDED")
     truth = plant.state()
@@ -208,7 +245,7 @@ def test_a_battery_that_leaves_and_another_that_comes(station: Station) -> None:
     plant.inject("heal")
     wait_until(lambda: "SOC 99 % is not below 98 %" in service.bay()["reason"], 10, "the fuller battery is left alone")
     plant.set(soc_pct=40)
-    service.wait("CHARGING")
+    service.wait("CHARGING", timeout_s=40)  # after the backoff of a battery that left in mid-charge
 
 
 def test_the_end_names_the_charger_that_nobody_could_verify(station: Station) -> None:

@@ -27,8 +27,8 @@ BROKEN = {
     ),
     "broken/amps": (
         "charges, as measured",
-        "→ TRIPPED: check for loads on the battery and for a wrong node id, then reset – the charger reads 14.00 A, the "
-        "BMU 14.50 A; the BMU is likelier wrong, by the step that was set (14 A); no order",
+        "→ TRIPPED: check for loads on the battery and for a wrong node id, then reset – the charger reads 14.00 A, "
+        "the BMU 14.50 A; the BMU is likelier wrong, by the step that was set (14 A); no order",
     ),
 }  # fmt: skip
 

@@ -24,7 +24,7 @@ def sees_current(f: "Facts") -> bool:
 def proved(f: "Facts") -> bool:
     """The only proof of standby that is taken."""
     known = f.memory.witnessed
-    if len(known.proof) < 2 or known.stop_s is None or not f.standby or not f.charger.online:
+    if len(known.proof) < 2 or known.stop_s is None or not f.standby:
         return False
     measured = f.snapshot.battery.current_a
     return f.pack_a is None or measured is None or (measured.t_s >= known.stop_s and not sees_current(f))

@@ -1,0 +1,101 @@
+"""Two answers to one request: when they differ, none of them is believed (FAULTS B26).
+
+A BMU answers once. A second answer comes from a second node with its id, or from something that forges answers, and
+nothing on the wire says which of the two is the BMU's, whichever came first. Answers to other masters are no matter of
+this module: they are compared only where they differ by more than any battery changes within the time between.
+"""
+
+from math import inf
+
+from orchestrator.devices.sdo_client import Verdict
+from orchestrator.model import Measurement
+from orchestrator.protocol.objects import FieldMap, ObjectEntry
+from orchestrator.protocol.sdo import SdoReply, SdoValue
+from orchestrator.protocol.words import Decoded, decode_word
+
+#: Answers to one request are the same, or measured milliseconds apart where a request of another master was lost to
+#: us: they may differ by this share of a field's range.
+ONE_REQUEST = 0.002
+#: One that nobody asked for is held against the newest that we asked for, up to this old, and may differ by this share.
+UNASKED, UNASKED_S = 0.02, 2.0
+#: The same for one that another master asked for.
+OTHERS, OTHERS_S = 0.05, 0.3
+#: These do not change by so much within that time. Amperes, status bits and minutes may.
+STEADY = frozenset({"voltage_v", "temperature_c", "soc_pct", "soh_pct", "remaining_ah", "available_wh"})
+#: Nothing that is read is believed for this long after two answers that differ.
+DOUBT_S = 10.0
+
+
+class TwoAnswers:
+    """The newest answer to a request for one object, and the doubts that others have left."""
+
+    __slots__ = ("_doubts", "_doubts_s", "_entry", "_newest", "_newest_s")
+
+    def __init__(self, entry: ObjectEntry) -> None:
+        self._entry = entry
+        self._newest: SdoValue | None = None
+        self._newest_s = -inf
+        self._doubts: dict[str, str] = {}
+        self._doubts_s = -inf
+
+    def took(self, reply: SdoValue, asked_s: float) -> None:
+        """This one was taken for the answer to a request of `asked_s`."""
+        self._newest, self._newest_s = reply, asked_s
+
+    def doubts(self, now_s: float) -> dict[str, str]:
+        """Why the object's fields are not believed now; empty if they are."""
+        if self._doubts and now_s - self._doubts_s >= DOUBT_S:
+            self._doubts = {}
+        return self._doubts
+
+    def second(self, first: SdoReply, second: SdoReply, now_s: float, share: float = ONE_REQUEST) -> dict[str, str]:
+        """Two answers to one request came; the doubts of which they are the reason."""
+        texts = _readable(self._entry, first), _readable(self._entry, second)
+        words = _fields(self._entry, first), _fields(self._entry, second)
+        fields = [field for field in self._entry.fields if share == ONE_REQUEST or field.name in STEADY]
+        apart = [field.name for field in fields if _apart(field, *words, share)]
+        if not apart:
+            return {}
+        self._doubts_s = now_s
+        self._doubts = {
+            name: f"{name}: two answers to one request, "
+            + (f"{texts[0][name]} and {texts[1][name]}" if name in apart else f"which differ in {apart[0]}")
+            for name in texts[0]
+        }
+        return self._doubts
+
+    def other(self, verdict: Verdict, first: SdoReply | None, reply: SdoReply, now_s: float) -> dict[str, str]:
+        """An answer came that was not taken; the doubts that it leaves. `first`: the one before, if it is a second."""
+        if verdict is Verdict.SECOND and first is not None:
+            return self.second(first, reply, now_s)
+        if verdict is Verdict.STRAY:
+            return self._held_against_newest(reply, now_s, UNASKED, UNASKED_S)
+        if verdict is Verdict.THEIRS:
+            return self._held_against_newest(reply, now_s, OTHERS, OTHERS_S)
+        return {}
+
+    def _held_against_newest(self, reply: SdoReply, now_s: float, share: float, age_s: float) -> dict[str, str]:
+        if self._newest is None or now_s - self._newest_s > age_s or not isinstance(reply, SdoValue):
+            return {}
+        return self.second(self._newest, reply, now_s, share)
+
+
+def _fields(entry: ObjectEntry, reply: SdoReply) -> dict[str, Decoded]:
+    """What an answer says of each field; the same text for each if it is none, or one of another size."""
+    if isinstance(reply, SdoValue):
+        return decode_word(entry, reply.value, reply.size, 0.0)
+    return {field.name: "a refusal" for field in entry.fields}
+
+
+def _readable(entry: ObjectEntry, reply: SdoReply) -> dict[str, str]:
+    return {
+        name: f"{value.value:.1f}" if isinstance(value, Measurement) else value or "not available"
+        for name, value in _fields(entry, reply).items()
+    }
+
+
+def _apart(field: FieldMap, first: dict[str, Decoded], second: dict[str, Decoded], share: float) -> bool:
+    one, other = first[field.name], second[field.name]
+    if isinstance(one, Measurement) and isinstance(other, Measurement):
+        return abs(one.value - other.value) > share * (field.range.high - field.range.low)
+    return one != other

@@ -1,0 +1,142 @@
+"""Who else holds a serial port, by the kernel's lists: an orchestrator, or a stranger who must not keep a stop away.
+
+A port that is in use is locked (flock): /proc/locks names the process that did it. Where that list cannot be read, or
+the one who locked it has gone and left the open file to another, the open files of all processes are looked through.
+Only processes that we may look at are found: who is to be told apart must be of the same user, or we must be root.
+Standard library only, and nothing here asks a device or a file system, which might hang.
+"""
+
+import os
+from collections.abc import Iterable, Iterator
+
+LISTENS = "00010000"  #: __SO_ACCEPTCON among the flags in /proc/net/unix
+#: How the words of our own processes begin: the program itself, or a module of it.
+PROGRAM = "orchestrator"
+
+
+class Holder:
+    """A process that has a port; `ours` if it is an orchestrator, which looks after the charger itself."""
+
+    def __init__(self, pid: int, name: str, *, ours: bool) -> None:
+        self.pid, self.name, self.ours = pid, name, ours
+
+    def __str__(self) -> str:
+        return f"{self.name} (pid {self.pid})" if self.pid else self.name
+
+
+UNKNOWN = Holder(0, "an unknown program", ours=False)
+
+
+def holder(port: str, but: Iterable[int] = ()) -> Holder:
+    """Who has locked this port, or else has it open, other than these processes. Who cannot be told is a stranger."""
+    besides = set(but)
+    lockers = [found for pid in _lockers(port) if pid not in besides and (found := _process(pid))]
+    if lockers:
+        return _best(lockers)
+    return _best([found for pid in _openers(port) if pid not in besides and (found := _process(pid))])
+
+
+def control_socket(ports: Iterable[str]) -> str:
+    """The control socket of an orchestrator that has one of these ports open; "" where none can be found."""
+    devices = {os.path.realpath(port) for port in ports}
+    for pid, _ in orchestrators():
+        if not devices.isdisjoint(_files(pid)) and (path := _listens_on(pid)):
+            return path
+    return ""
+
+
+def orchestrators() -> Iterator[tuple[int, list[str]]]:
+    """Every running service of this program that we may look at, with its command line: guardians and controllers."""
+    for pid in _pids():
+        words = _words(pid)
+        if is_orchestrator(words):
+            yield pid, words
+
+
+def is_orchestrator(words: list[str]) -> bool:
+    """Whether a command line is one of ours: `orchestrator …`, `python orchestrator …`, `python -m orchestrator…`."""
+    if any(word.rpartition("/")[2] == PROGRAM for word in words[:2]):
+        return True
+    module = words[words.index("-m") + 1 : words.index("-m") + 2] if "-m" in words[:4] else []
+    return any(word == PROGRAM or word.startswith(f"{PROGRAM}.") for word in module)
+
+
+def _best(found: list[Holder]) -> Holder:
+    return next((one for one in found if one.ours), found[0] if found else UNKNOWN)
+
+
+def _process(pid: int) -> Holder | None:
+    """None for one that has ended."""
+    words = _words(pid)
+    if pid == os.getpid():
+        return Holder(pid, "this program", ours=True)
+    if not words:
+        return None
+    ours = is_orchestrator(words)
+    return Holder(pid, PROGRAM if ours else _read(f"/proc/{pid}/comm").strip() or words[0], ours=ours)
+
+
+def _lockers(port: str) -> list[int]:
+    """The processes that have locked this file: "1: FLOCK ADVISORY WRITE 4711 00:05:99 0 EOF"."""
+    try:
+        at = os.stat(port)
+    except (OSError, ValueError):
+        return []
+    place = f"{os.major(at.st_dev):02x}:{os.minor(at.st_dev):02x}:{at.st_ino}"
+    lines = [line.split() for line in _read("/proc/locks").splitlines()]
+    return [int(line[4]) for line in lines if len(line) > 5 and line[1] == "FLOCK" and line[5] == place]
+
+
+def _openers(port: str) -> list[int]:
+    """The processes that have this device open."""
+    device = os.path.realpath(port)
+    return [pid for pid in _pids() if device in _files(pid)]
+
+
+def _listens_on(pid: int) -> str:
+    """The Unix socket on which a process listens, "" if on none."""
+    files = set(_files(pid))
+    for line in _read("/proc/net/unix").splitlines():
+        words = line.split(None, 7)  # Num RefCount Protocol Flags Type St Inode Path
+        if len(words) == 8 and words[3] == LISTENS and f"socket:[{words[6]}]" in files:
+            return os.path.join(directory(pid), words[7])
+    return ""
+
+
+def directory(pid: int) -> str:
+    """Where a process is; "" where we may not know."""
+    return _link(f"/proc/{pid}/cwd")
+
+
+def _files(pid: int) -> list[str]:
+    """What a process has open, as the kernel names it."""
+    try:
+        return [_link(f"/proc/{pid}/fd/{fd}") for fd in os.listdir(f"/proc/{pid}/fd")]
+    except OSError:
+        return []
+
+
+def _link(path: str) -> str:
+    try:
+        return os.readlink(path)
+    except OSError:
+        return ""
+
+
+def _pids() -> list[int]:
+    try:
+        return [int(name) for name in os.listdir("/proc") if name.isdecimal()]
+    except OSError:
+        return []
+
+
+def _words(pid: int) -> list[str]:
+    return _read(f"/proc/{pid}/cmdline").split("\0")[:-1]
+
+
+def _read(path: str) -> str:
+    try:
+        with open(path, encoding="utf-8", errors="surrogateescape") as file:
+            return file.read()
+    except OSError:
+        return ""

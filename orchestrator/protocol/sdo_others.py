@@ -1,0 +1,101 @@
+"""SDO frames of other masters: who asks for which object, and how their longer transfers go on (CiA 301, §7.2.4).
+
+We never use these transfers; we must only know whose an answer is.
+"""
+
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from orchestrator.protocol.sdo import FRAME_BYTES
+
+
+class Ask(Enum):
+    """What a request wants."""
+
+    READ = auto()
+    WRITE = auto()
+    BLOCK_READ = auto()
+    BLOCK_WRITE = auto()
+    STREAM = auto()  #: "send the next block": numbered segments follow, one behind the other
+    ON = auto()  #: the next frame of a transfer that has begun
+    ABORT = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class SdoRequest:
+    """A request to a node; `index` and `sub` mean nothing for STREAM and ON."""
+
+    ask: Ask
+    index: int = 0
+    sub: int = 0
+    timer_ms: int | None = None  #: what is written, if that is an expedited value of 16 bits
+
+
+_BY_SPECIFIER = {0: Ask.ON, 1: Ask.WRITE, 2: Ask.READ, 3: Ask.ON, 4: Ask.ABORT}
+_BLOCK_READ = {0: Ask.BLOCK_READ, 1: Ask.ON, 2: Ask.STREAM, 3: Ask.STREAM}
+_U16 = 0x2B
+
+
+def parse_request(data: bytes) -> SdoRequest | None:
+    """What a frame on a node's request COB-ID asks for; None if it is no SDO request."""
+    if len(data) != FRAME_BYTES:
+        return None
+    specifier = data[0] >> 5
+    if specifier == 5:
+        ask = _BLOCK_READ[data[0] & 3]
+    elif specifier == 6:
+        ask = Ask.ON if data[0] & 1 else Ask.BLOCK_WRITE
+    elif specifier in _BY_SPECIFIER:
+        ask = _BY_SPECIFIER[specifier]
+    else:
+        return None
+    if ask in (Ask.STREAM, Ask.ON):
+        return SdoRequest(ask)
+    timer_ms = int.from_bytes(data[4:6], "little") if data[0] == _U16 else None
+    return SdoRequest(ask, data[1] | data[2] << 8, data[3], timer_ms)
+
+
+class Part(Enum):
+    """What a reply that is not an expedited one says."""
+
+    BEGIN = auto()  #: a longer transfer of the object begins
+    MORE = auto()  #: one frame of it
+    LAST = auto()  #: its last one
+
+
+@dataclass(frozen=True, slots=True)
+class SdoPart:
+    """A reply within a longer transfer; `index` and `sub` mean something for BEGIN only."""
+
+    part: Part
+    index: int = 0
+    sub: int = 0
+
+
+_BLOCK_WRITTEN = {0: Part.BEGIN, 1: Part.LAST, 2: Part.MORE}
+
+
+def parse_part(data: bytes) -> SdoPart | None:
+    """What a reply says that belongs to a longer transfer; None if it is an expedited reply, or none at all.
+
+    Segments of a block read have no mark of their own: who knows that one streams asks `segment_number`.
+    """
+    if len(data) != FRAME_BYTES:
+        return None
+    specifier, index, sub = data[0] >> 5, data[1] | data[2] << 8, data[3]
+    if specifier == 0:  # a segment that was read; bit 0: no more
+        return SdoPart(Part.LAST if data[0] & 1 else Part.MORE)
+    if specifier == 1:  # a segment was written
+        return SdoPart(Part.MORE)
+    if data[0] in (0x40, 0x41, 0x42):  # segmented, or expedited without its size
+        return SdoPart(Part.BEGIN, index, sub)
+    if specifier == 5:  # block write: begun, a block arrived, ended
+        return SdoPart(_BLOCK_WRITTEN.get(data[0] & 3, Part.MORE), index, sub)
+    if specifier == 6:  # block read: begun; ended
+        return SdoPart(Part.LAST if data[0] & 1 else Part.BEGIN, index, sub)
+    return None
+
+
+def segment_number(data: bytes) -> int:
+    """Of a segment of a block, 1 … 127."""
+    return data[0] & 0x7F

@@ -1,0 +1,45 @@
+"""A request of an operator on its way: decided by one step, answered when its effect is on the disk."""
+
+from threading import Event
+
+from orchestrator.model import Request
+from orchestrator.service.store import KEPT_WITHIN_S, Store
+
+
+class Asked:
+    """`answer` is set when `done` is: "" is yes."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.answer = ""
+        self.done = Event()
+
+
+class Answers:
+    """The requests of one bay that were done, and are not on the disk yet. Used by the control loop only."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self.waiting: list[tuple[Asked, int, float]] = []  #: with the revision that keeps it, and until when to wait
+
+    def give(self, asked: Asked, answer: str, revision: int, now_s: float) -> None:
+        """Answer it: a refusal at once, what was done when the disk has it."""
+        asked.answer = answer
+        if answer:
+            asked.done.set()
+        else:
+            self.waiting.append((asked, revision, now_s + KEPT_WITHIN_S))
+
+    def look(self, now_s: float) -> None:
+        """Tell those whose time has come."""
+        kept = self._store.kept_revision
+        left = []
+        for asked, revision, until_s in self.waiting:
+            if revision > kept and now_s < until_s:
+                left.append((asked, revision, until_s))
+                continue
+            if revision > kept:
+                why = self._store.unkept(now_s) or "the disk has not taken it"
+                asked.answer = f"done, but not kept: {why}"
+            asked.done.set()
+        self.waiting = left

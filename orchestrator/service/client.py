@@ -1,0 +1,82 @@
+"""One client of the control socket: its request as it comes, its answer as it goes. Nothing here ever waits."""
+
+import json
+import socket
+import struct
+from collections.abc import Mapping
+
+from orchestrator.errors import ServiceError
+
+#: The longest request.
+MAX_REQUEST = 4096
+#: How long a client may take for its whole request, and then for its whole answer.
+CLIENT_S = 1.0
+#: What the kernel may hold of one answer: a client that does not read costs no more.
+BUFFER = 64 * 1024
+
+
+class Client:
+    """A connection that was just accepted. Belongs to the control thread."""
+
+    def __init__(self, connection: socket.socket, now_s: float) -> None:
+        connection.settimeout(0)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
+        self.line = b""  #: its request, once that is complete
+        self.request: Mapping[str, object] = {}
+        self.heard_s = now_s  #: when the last byte of its request came
+        self.end_s = now_s + CLIENT_S  #: its time is up then, whatever it is doing
+        self.answering = False
+        self._connection = connection
+        self._heard = bytearray()
+        self._left = memoryview(b"")
+
+    def fileno(self) -> int:
+        """For a selector."""
+        return self._connection.fileno()
+
+    def peer(self) -> tuple[int, int, int]:
+        """Process, user and group at the other end."""
+        pid, uid, gid = struct.unpack("3i", self._connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
+        return pid, uid, gid
+
+    def hear(self, now_s: float) -> bool:
+        """Take what has come; whether the request is complete. ServiceError where it cannot become one any more."""
+        try:
+            part = self._connection.recv(MAX_REQUEST + 1 - len(self._heard))
+        except BlockingIOError:
+            return False
+        self._heard += part
+        self.heard_s = now_s
+        if not part or len(self._heard) > MAX_REQUEST:
+            raise ServiceError(f"a request is one line of at most {MAX_REQUEST} bytes")
+        if b"\n" in part:
+            self.line = bytes(self._heard)  # whatever stands behind the line makes it no request
+        return bool(self.line)
+
+    def answer(self, text: bytes, now_s: float) -> None:
+        """From now on this is to be written; `text` may be shared with others."""
+        self._left, self.answering, self.end_s = memoryview(text), True, now_s + CLIENT_S
+
+    def write(self) -> bool:
+        """Write as much as it takes now; whether that was all. OSError where it has left."""
+        try:
+            self._left = self._left[self._connection.send(self._left) :]
+        except BlockingIOError:
+            return False
+        return not self._left
+
+    def close(self) -> None:
+        """Let it go."""
+        self._left.release()
+        self._connection.close()
+
+
+def parse_request(line: bytes) -> Mapping[str, object]:
+    """A request's object; ServiceError for anything else."""
+    try:
+        request = json.loads(line)
+    except (ValueError, RecursionError):
+        raise ServiceError("a request is one JSON object on one line") from None
+    if not isinstance(request, dict):
+        raise ServiceError("a request is one JSON object on one line")
+    return request

@@ -1,0 +1,16 @@
+"""The end of everything that may hang: each in a thread of its own, all of them within one time."""
+
+import threading
+from collections.abc import Callable, Iterable
+from time import monotonic
+
+
+def close_all(closings: Iterable[Callable[[], object]], within_s: float) -> bool:
+    """Begin all of them at once; whether they have all ended within this. What hangs is left behind."""
+    end_s = monotonic() + within_s
+    threads = [threading.Thread(target=close, name="closing", daemon=True) for close in closings]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(max(end_s - monotonic(), 0.0))
+    return not any(thread.is_alive() for thread in threads)

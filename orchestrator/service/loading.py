@@ -1,0 +1,88 @@
+"""What the last run of the service has left on the disk, and what each bay of today makes of it."""
+# ruff: noqa: PTH105, PTH208 - as in `disk.py`
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.core.persisted import Persisted
+from orchestrator.service.disk import read_file
+from orchestrator.service.past import START, Entry, Place, past_of, settled
+from orchestrator.service.stateformat import Stamp, decode, decode_first
+
+FILE, FIRST_FILE = "persisted.json", "kept.json"
+#: Far more than any station needs.
+MOST_BYTES = 16_000_000
+NOBODY_KNOWS = f"nobody knows which faults were latched{START}"
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """All entries, those of today's bays among them."""
+
+    entries: tuple[Entry, ...]
+    run: int = 1  #: the number of this run
+    aside: tuple[str, ...] = ()  #: the files that are to be moved aside, for a person to look at
+
+
+def load(directory: Path, places: Sequence[Place], now: Stamp) -> Loaded:
+    """Read it. Where that cannot be done, every bay is held: nobody knows what was latched."""
+    path = directory / FILE
+    try:
+        found = _read(directory, now)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        return Loaded(held(places, f"{path} cannot be read ({reason})"), aside=(FILE, FIRST_FILE))
+    if found is None:
+        if any(name.startswith("events") for name in names(directory)):  # the file is there before the first of them
+            return Loaded(held(places, f"{path} is lost, though this service has run here before"))
+        return Loaded(tuple(Entry(place, Persisted(), 1) for place in places))
+    run, entries = found
+    pasts = {place: past_of(place, entries, str(path)) for place in places}
+    return Loaded(tuple(settled(places, pasts, entries, run)), run)
+
+
+def held(places: Sequence[Place], why: str) -> tuple[Entry, ...]:
+    """Every bay where nobody knows anything."""
+    return tuple(Entry(place, Persisted(hold=f"{why}: {NOBODY_KNOWS}"), 1) for place in places)
+
+
+def _read(directory: Path, now: Stamp) -> tuple[int, list[Entry]] | None:
+    """The number of this run and all entries; None where there are none.
+
+    The first format's file beside ours is newer: an older version of the service has written it since.
+    """
+    ours = _bytes(directory / FILE)
+    first = _bytes(directory / FIRST_FILE)
+    if ours is None and first is None:
+        return None
+    run, entries = decode(ours, now) if ours is not None else (0, [])
+    if first is not None:
+        entries += decode_first(first, run + 1)
+        run += 1
+    return run + 1, entries
+
+
+def _bytes(path: Path) -> bytes | None:
+    try:
+        return read_file(path, MOST_BYTES)
+    except FileNotFoundError:
+        return None
+
+
+def names(directory: Path) -> list[str]:
+    """What is in the directory."""
+    try:
+        return os.listdir(directory)
+    except FileNotFoundError:
+        return []
+
+
+def move_aside(directory: Path, files: Sequence[str], word: str) -> None:
+    """Give these files other names, those of them that are there: none of them is lost."""
+    there = names(directory)
+    for name in files:
+        if name in there:
+            free = next(one for number in range(len(there) + 1) if (one := f"{name}.{word}-{number + 1}") not in there)
+            os.replace(directory / name, directory / free)

@@ -1,0 +1,148 @@
+"""The past of a bay: which of the entries that were written down are its own, and what it makes of others'. Pure.
+
+What is known belongs to a *place*: the bay's name, its charger's port and its BMU. A station file that is edited moves
+names, ports and batteries between bays; then nobody knows what is wired where, and a person must look. Whatever was
+latched, held or running at either place goes on.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from os.path import abspath, realpath
+
+from orchestrator.config.station import Bay, Rs485
+from orchestrator.core.persisted import Persisted, PersistedFault
+from orchestrator.model import ControlMode
+
+START = "; start to go on"
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """What an entry belongs to; of the first format only the name is known, the rest is empty."""
+
+    bay: str
+    port: str = ""  #: absolute, as configured: names below by-path are not resolved
+    can: str = ""
+    node_id: int = 0
+    control: ControlMode = field(default=ControlMode.MANUAL, compare=False)
+    rs485: Rs485 = field(default=Rs485.OFF, compare=False)
+
+    @classmethod
+    def of(cls, bay: Bay) -> "Place":
+        """Where this bay is now."""
+        charger, battery, port = bay.charger, bay.battery, abspath(bay.charger.port)  # noqa: PTH100 - not resolved
+        return cls(bay.name, port, battery.can, battery.node_id, charger.control, charger.rs485)
+
+    @property
+    def bmu(self) -> tuple[str, int]:
+        """The battery's BMU."""
+        return self.can, self.node_id
+
+    def is_port_of(self, other: "Place") -> bool:
+        """Whether both are the same serial port, by whatever names."""
+        return self.port == other.port or ("" not in (self.port, other.port) and _device(self) == _device(other))
+
+    def overlaps(self, other: "Place") -> bool:
+        """Whether they have a name, a port or a BMU in common."""
+        return self.bay == other.bay or self.is_port_of(other) or self.bmu == other.bmu
+
+    def __str__(self) -> str:
+        return f"{self.bay} on {shown(self.port)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What is known of one place."""
+
+    place: Place
+    persisted: Persisted
+    run: int  #: the newest run of the service in which this place was a bay's
+
+
+def past_of(place: Place, entries: Sequence[Entry], file: str) -> Persisted:
+    """What a bay begins with.
+
+    Another entry counts if its place was in use after the bay's own was: before, it has been taken over already.
+    """
+    own = next((entry for entry in entries if entry.place == place), None)
+    since = own.run if own else -1
+    others = [entry for entry in entries if entry is not own and entry.place.overlaps(place) and entry.run > since]
+    if own is None and [entry.place for entry in others] == [Place(place.bay)]:
+        return others[0].persisted  # the first format knew names only
+    if not others:
+        return own.persisted if own else Persisted(hold=f"{place} is not in {file}: nobody knows its past{START}")
+    sentences = [f"{_moved(entry.place, place)}: see what is wired where" for entry in others]
+    return merged([*([own.persisted] if own else []), *(entry.persisted for entry in others)], sentences)
+
+
+def _moved(old: Place, new: Place) -> str:
+    if not old.port:
+        return f"an older version of this service has run {old.bay} in the meantime"
+    if old.bay != new.bay:
+        what = shown(new.port) if old.is_port_of(new) else f"the BMU on {new.can}, node {new.node_id},"
+        return f"{what} was {old.bay}'s when this service last ran, and is {new.bay}'s now"
+    if old.port != new.port:
+        return f"{new.bay} was on {shown(old.port)} when this service last ran, and is on {shown(new.port)} now"
+    return (
+        f"{new.bay} had the BMU on {old.can}, node {old.node_id}, when this service last ran, "
+        f"and has {new.can}, node {new.node_id}, now"
+    )
+
+
+def shown(port: str) -> str:
+    """A path for people; one that is no text, too."""
+    return port.encode(errors="backslashreplace").decode()
+
+
+def merged(parts: Sequence[Persisted], sentences: Sequence[str]) -> Persisted:
+    """All of them together, as the strictest would have it, held for `sentences` and for whatever held one of them."""
+    holds = [*sentences, *(part.hold.removesuffix(START) for part in parts if part.hold)]
+    faults: dict[str, PersistedFault] = {}
+    for part in parts:
+        for name, fault in part.faults.items():
+            faults[name] = _worse(faults[name], fault) if name in faults else fault
+    sessions = [part.session for part in parts if part.session is not None]
+    fulls = [part.full_pct for part in parts if part.full_pct is not None]
+    return Persisted(
+        running=any(part.running for part in parts),
+        hold="; ".join(dict.fromkeys(holds)) + START if holds else "",
+        paused=any(part.paused for part in parts),
+        faults=faults,
+        resets=tuple(sorted({reset for part in parts for reset in part.resets}, reverse=True)),
+        session=max(sessions, key=lambda session: session.charged_ah, default=None),
+        full_pct=min(fulls, default=None),
+        soc=min((part.soc for part in parts if part.soc is not None), default=None),
+    )
+
+
+def _worse(one: PersistedFault, other: PersistedFault) -> PersistedFault:
+    """One fault at two places: in force if it is at one of them, and it is not gone before it is at both."""
+    first, second = sorted((one, other), key=lambda fault: (fault.latched, fault.raised is not None), reverse=True)
+    gone = None if None in (one.clean, other.clean) else min(one.clean or 0.0, other.clean or 0.0)
+    strikes = max(one.strikes, other.strikes, key=len)
+    return replace(first, clean=gone if second.raised is not None else first.clean, strikes=strikes)
+
+
+def settled(
+    places: Sequence[Place], pasts: Mapping[Place, Persisted], entries: Iterable[Entry], run: int
+) -> list[Entry]:
+    """All entries once the bays have taken their pasts over, in this run of the service.
+
+    What belongs to places that no bay has today stays, for ever. A charger that runs is with the bay that has its port.
+    """
+    now = [Entry(place, pasts[place], run) for place in places]
+    for entry in entries:
+        old = entry.place
+        if old in pasts or any(old == Place(place.bay) or _renamed(old, place) for place in places):
+            continue
+        taken_over = entry.persisted.running and any(old.is_port_of(place) for place in places)
+        now.append(replace(entry, persisted=replace(entry.persisted, running=False)) if taken_over else entry)
+    return now
+
+
+def _renamed(old: Place, new: Place) -> bool:
+    return (old.port, old.bmu) == (new.port, new.bmu)
+
+
+def _device(place: Place) -> str:
+    return realpath(place.port)

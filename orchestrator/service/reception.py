@@ -1,0 +1,182 @@
+"""What is answered at the control socket, in which order: a stop before all that waits, one status for many.
+
+A stop is acted on in the turn in which it is heard. What waits then for the same bays was asked before it, or cannot be
+told from that, and is refused: a start must not be carried out after a stop that it preceded. Stops that say the same
+share one answer as long as nothing else has been asked in between. A status is made once for all who ask at the same
+time; other requests go to the bays one after another.
+"""
+
+import json
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from math import inf
+
+from orchestrator.errors import OrchestratorError
+from orchestrator.service.client import Client
+
+#: So many questions are answered in one turn: a stop is looked for after each.
+TURN_QUESTIONS = 32
+#: Whoever asks for the status within this gets the same one.
+SHARED_S = 0.02
+#: Other requests than stops go to the bays this far apart, and one that has waited for so long is refused.
+PAUSE_S = 0.02
+QUEUE_S = 2.0
+#: The bays have answered within this, or never will.
+ANSWER_S = 10.0
+
+STOP, STATUS = "stop", "status"
+
+Answer = Mapping[str, object]
+Later = Callable[[], Answer | None]  #: the answer, None while there is none
+Handler = Callable[[Mapping[str, object]], Answer | Later]
+Reply = Callable[[Client, bytes, float], None]
+
+
+@dataclass(slots=True)
+class Pending:
+    """A request that the bays have not answered yet, and all who made it."""
+
+    later: Later
+    clients: list[Client]
+    end_s: float
+
+
+class Reception:
+    """Takes complete requests, and calls `reply` once for each. Belongs to the control thread; nothing here waits.
+
+    `handler` must not wait either: what takes time it answers with a function that is asked until it has the answer.
+    """
+
+    def __init__(self, handler: Handler, reply: Reply) -> None:
+        self._handler, self._reply = handler, reply
+        self._urgent: list[Client] = []
+        self._questions: deque[Client] = deque()
+        self._requests: deque[Client] = deque()
+        self._request_s = -inf  # the next one goes to the bays no earlier
+        self._pending: list[Pending] = []
+        self._stops: dict[bytes, Pending] = {}  # those that the same stop may join
+        self._shared: dict[bytes, bytes] = {}  # a status, by the request for it
+        self._shared_s = -inf  # when the oldest of them was made
+
+    @property
+    def busy(self) -> bool:
+        """Whether somebody waits for an answer."""
+        return bool(self._pending or self._questions or self._requests or self._urgent)
+
+    @property
+    def stopping(self) -> set[Client]:
+        """Those who have asked for what is being done now: they are not turned out."""
+        return {*self._urgent, *(client for pending in self._pending for client in pending.clients)}
+
+    def take(self, client: Client, now_s: float) -> None:
+        """A client whose request is complete."""
+        client.end_s = now_s + QUEUE_S + ANSWER_S
+        verb = client.request.get("verb")
+        (self._urgent if verb == STOP else self._questions if verb == STATUS else self._requests).append(client)
+
+    def forget(self, client: Client) -> None:
+        """A client that has gone; what it has asked is done all the same, once it has begun."""
+        for queue in (self._questions, self._requests):
+            with suppress(ValueError):
+                queue.remove(client)
+
+    def work(self, now_s: float) -> None:
+        """Every stop, then of all else so much as one turn may take."""
+        urgent, self._urgent = self._urgent, []
+        for client in urgent:
+            self._overtake(client, now_s)
+            self._begin_stop(client, now_s)
+        for _ in range(min(len(self._questions), TURN_QUESTIONS)):
+            self._tell_status(self._questions.popleft(), now_s)
+        while self._requests and now_s - self._requests[0].heard_s > QUEUE_S:
+            self._refuse(self._requests.popleft(), "too many requests at once: ask again", now_s)
+        if self._requests and now_s >= self._request_s:
+            self._request_s = now_s + PAUSE_S
+            self._begin(self._requests.popleft(), now_s)
+        self._look_for_answers(now_s)
+
+    # --- by kind ---
+
+    def _overtake(self, stop: Client, now_s: float) -> None:
+        for client in [client for client in self._requests if _share_bays(client.request, stop.request)]:
+            self._requests.remove(client)
+            self._refuse(client, "a stop came meanwhile: ask again if it is still wanted", now_s)
+
+    def _begin_stop(self, client: Client, now_s: float) -> None:
+        if client.line in self._stops:
+            self._stops[client.line].clients.append(client)
+        elif (pending := self._handle(client, now_s)) is not None:
+            self._stops[client.line] = pending
+
+    def _begin(self, client: Client, now_s: float) -> None:
+        self._stops.clear()  # a stop after this request is another one than a stop before it
+        self._handle(client, now_s)
+
+    def _tell_status(self, client: Client, now_s: float) -> None:
+        if now_s - self._shared_s > SHARED_S:
+            self._shared.clear()
+            self._shared_s = now_s
+        if (text := self._shared.get(client.line)) is not None:
+            self._reply(client, text, now_s)
+        else:
+            self._handle(client, now_s, shared=self._shared)
+
+    def _handle(self, client: Client, now_s: float, shared: dict[bytes, bytes] | None = None) -> Pending | None:
+        """Let the handler answer; what is pending if it will later."""
+        if shared is None:
+            self._shared.clear()  # the next status has to show what comes of this request
+        try:
+            answer = self._handler(client.request)
+        except OrchestratorError as error:
+            self._refuse(client, str(error), now_s)
+            return None
+        except Exception as error:  # noqa: BLE001 - a request must never end the thread that answers them
+            self._refuse(client, f"internal: {error!r}", now_s)
+            return None
+        if callable(answer):
+            pending = Pending(answer, [client], now_s + ANSWER_S)
+            self._pending.append(pending)
+            return pending
+        text = encode({"ok": True, **answer})
+        if shared is not None:
+            shared[client.line] = text
+        self._reply(client, text, now_s)
+        return None
+
+    def _look_for_answers(self, now_s: float) -> None:
+        """Those requests that the bays have answered by now."""
+        for pending in tuple(self._pending):
+            try:
+                answer = pending.later()
+            except Exception as error:  # noqa: BLE001 - as in `_handle`
+                said: Answer = {"ok": False, "error": f"internal: {error!r}"}
+            else:
+                if answer is None and now_s < pending.end_s:
+                    continue
+                said = {"ok": False, "error": "internal: no answer"} if answer is None else {"ok": True, **answer}
+            self._pending.remove(pending)
+            self._stops = {line: one for line, one in self._stops.items() if one is not pending}
+            text = encode(said)
+            for client in pending.clients:
+                self._reply(client, text, now_s)
+
+    def _refuse(self, client: Client, why: str, now_s: float) -> None:
+        self._reply(client, refusal(why), now_s)
+
+
+def encode(answer: Answer) -> bytes:
+    """One line."""
+    return json.dumps(answer, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
+
+
+def refusal(why: str) -> bytes:
+    """The line that says no."""
+    return encode({"ok": False, "error": why})
+
+
+def _share_bays(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
+    """Whether two requests may be for the same bay; null is for all."""
+    names, others = one.get("bays"), other.get("bays")
+    return not isinstance(names, list) or not isinstance(others, list) or any(name in others for name in names)

@@ -1,0 +1,280 @@
+"""What must outlive the process, on the disk: one file, one owner, one thread that waits for nothing but its disk.
+
+Theory of operation. The control loop puts what each bay is to remember; the thread writes the whole file whenever
+something has changed that may be relied on (`Persisted.gist`), and mere counters now and then. Every such change has a
+revision; what is answered, or begun, waits until `kept_revision` has come to it. A disk that is full, gone or hangs
+delays nobody: it is told by `unkept`, and no charge begins.
+
+A restart is neither a reset nor a start. Where the file cannot be read, every bay is held; it is moved aside, never
+overwritten. Where the disk does not answer in time, nothing is written at all, and the next start finds what is there.
+"""
+
+import os
+import threading
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from orchestrator.core.persisted import Persisted
+from orchestrator.errors import ServiceError
+from orchestrator.service.disk import lock_file, make_directory, replace_file
+from orchestrator.service.loading import FILE, FIRST_FILE, held, load, move_aside
+from orchestrator.service.past import Entry, Place
+from orchestrator.service.stateformat import Stamp, encode
+
+LOCK = "lock"
+#: A change that is not on disk within this counts as not kept (FAULTS P9).
+KEPT_WITHIN_S = 2.0
+#: Mere counters are written this often while nothing else changes.
+COUNTERS_S = 30.0
+#: A disk that refused is asked again this often.
+RETRY_S = 1.0
+#: A service that has just been killed may hold the lock for so long.
+LOCKED_S = 1.5
+
+
+@dataclass(frozen=True, slots=True)
+class _Put:
+    persisted: Persisted
+    at_s: float
+    run: int
+
+
+class Store:
+    """The persisted state of a station's bays. `put` and the questions never wait; any thread may ask them.
+
+    `clock` is monotonic, `wall` the wall clock, `boot` names the boot of the machine. `on_kept` is called from the
+    store's thread with the places whose changes have just come to the disk; it has to be quick.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        places: Sequence[Place],
+        clock: Callable[[], float],
+        wall: Callable[[], float],
+        *,
+        boot: str = "",
+        on_kept: Callable[[Collection[Place]], None] = lambda _: None,
+    ) -> None:
+        self.path = directory / FILE
+        self._directory, self._places = directory, tuple(places)
+        self._clock, self._wall, self._boot, self._on_kept = clock, wall, boot, on_kept
+        self._lock = threading.Lock()  # guards what follows; nobody waits for a disk with it
+        self._table: dict[Place, _Put] = {}
+        self._disk: dict[Place, Persisted] = {}  # without what a write under way may turn round
+        self._revision, self.kept_revision = 1, 0  # the file is written once at the start
+        self._pending_s: float | None = None  # since when a change has been waiting for the disk …
+        self._later_s: float | None = None  # … and one that the write under way does not have
+        self._counted = False  # a counter has changed
+        self._problem = self._foreign = self._blind = ""
+        self._run_number = 1
+        self._aside: tuple[str, ...] = ()
+        self._descriptor: int | None = None
+        self._written_s = self._failed_s = 0.0
+        self._ended = False
+        self._wake, self._loaded = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, name="store", daemon=True)
+
+    # --- asked by the control loop ------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Lock the directory, read what the last run has left, then write what changes."""
+        self._thread.start()
+
+    def wait(self, within_s: float) -> bool:
+        """Whether the past is known within this; ServiceError where another service owns the directory."""
+        known = self._loaded.wait(within_s)
+        if self._foreign:
+            raise ServiceError(self._foreign)
+        return known
+
+    def past(self, place: Place) -> Persisted:
+        """What a bay begins with. From the first call on, what the disk has not told by then is not asked for."""
+        with self._lock:
+            if not self._table:
+                self._blind = f"the disk of {self._directory} does not answer"
+                self._begin(held(self._places, self._blind))
+            return self._table[place].persisted
+
+    def strays(self) -> list[Place]:
+        """Where a charger may be running, at a port that no bay has today."""
+        with self._lock:
+            running = [place for place, put in self._table.items() if put.persisted.running]
+        return [place for place in running if not any(place.is_port_of(one) for one in self._places)]
+
+    def put(self, place: Place, persisted: Persisted) -> int:
+        """Remember this from now on. The revision that keeps it: `kept_revision` comes to it."""
+        now_s = self._clock()
+        with self._lock:
+            old = self._table[place].persisted
+            self._table[place] = _Put(persisted, now_s, self._table[place].run)
+            if persisted.gist == old.gist:
+                self._counted = self._counted or _counters(persisted) != _counters(old)
+                return self._revision
+            self._revision += 1
+            if self._pending_s is None:
+                self._pending_s = now_s
+            elif self._later_s is None:
+                self._later_s = now_s
+            revision = self._revision
+        self._wake.set()
+        return revision
+
+    def on_disk(self, place: Place) -> Persisted | None:
+        """What the disk has of this place, ages as they were then; None while it is not certain whether that runs."""
+        return self._disk.get(place)
+
+    def unkept(self, now_s: float) -> str:
+        """Why a restart would forget something; "" while it would not."""
+        if self._blind:
+            return f"a restart would forget what changes: {self._blind}; restart the service once it does"
+        pending_s = self._pending_s
+        if self._problem:
+            return f"a restart would forget what changes: {self._problem}"
+        if pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:
+            return f"a restart would forget what changes: {self.path} is not written within {KEPT_WITHIN_S:g} s"
+        return ""
+
+    def stalled(self, _now_s: float) -> bool:
+        """True when the writer has died. That it waits for its disk is no hang: it is what `unkept` is for."""
+        return not self._thread.is_alive()
+
+    def close(self, within_s: float) -> str:
+        """Write what is left and end; why something could not be kept, "" if all is."""
+        self._ended = True
+        self._wake.set()
+        if self._thread.is_alive():
+            self._thread.join(within_s)
+        if self._blind or self._problem:
+            return self._blind or self._problem
+        if self._thread.is_alive() or self.kept_revision < self._revision:
+            return f"{self.path} is not written within {within_s:g} s: its disk hangs"
+        return ""
+
+    # --- the thread ---------------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            entries = self._load()
+        except BlockingIOError:
+            self._foreign = f"another service keeps its state in {self._directory}: stop it first, or give this "
+            self._foreign += "station a journal.directory of its own"
+            self._loaded.set()
+            return
+        with self._lock:
+            if not self._blind:
+                self._begin(entries)
+        self._loaded.set()
+        while not self._blind:
+            ended = self._ended
+            self.turn(ended=ended)
+            if ended:
+                break
+            self._wake.wait(RETRY_S)
+            self._wake.clear()
+        self._give_up_ownership()
+
+    def turn(self, *, ended: bool = False) -> None:
+        """Write what is due; before the end, everything."""
+        try:
+            if self._due(ended=ended):
+                self._write()
+        except Exception as error:  # noqa: BLE001 - a thread that dies here takes every charge with it
+            self._fail(f"internal error: {error!r}", self._clock())
+
+    def _begin(self, entries: Sequence[Entry]) -> None:
+        now_s = self._clock()
+        self._table = {entry.place: _Put(entry.persisted, now_s, entry.run) for entry in entries}
+        self._pending_s = now_s
+
+    def _load(self) -> Sequence[Entry]:
+        """Every place's entry at the start; BlockingIOError where another service owns the directory."""
+        try:
+            self._own()
+        except BlockingIOError:
+            raise
+        except OSError as error:
+            self._problem = _said(error, self._directory)
+        loaded = load(self._directory, self._places, self._stamp())
+        self._run_number, self._aside = loaded.run, loaded.aside
+        return loaded.entries
+
+    def _own(self) -> None:
+        """Be the only service that writes here."""
+        if self._descriptor is not None:
+            return
+        make_directory(self._directory)
+        end_s, pause = self._clock() + LOCKED_S, threading.Event()
+        while self._descriptor is None:
+            try:
+                self._descriptor = lock_file(self._directory / LOCK)
+            except BlockingIOError:
+                if self._clock() > end_s or self._ended:
+                    raise
+                pause.wait(0.05)
+
+    def _due(self, *, ended: bool) -> bool:
+        now_s = self._clock()
+        if ended:
+            return self.kept_revision < self._revision or self._counted
+        if self._problem and now_s - self._failed_s < RETRY_S:
+            return False
+        return self.kept_revision < self._revision or (self._counted and now_s - self._written_s >= COUNTERS_S)
+
+    def _write(self) -> None:
+        stamp = self._stamp()
+        with self._lock:
+            revision, table, self._counted = self._revision, dict(self._table), False
+            self._later_s = None
+            changed = {place for place, put in table.items() if _gist(self._disk.get(place)) != put.persisted.gist}
+            self._disk = {
+                place: one for place, one in self._disk.items() if one.running is table[place].persisted.running
+            }
+        entries = [
+            Entry(place, put.persisted.aged(max(stamp.clock_s - put.at_s, 0.0)), put.run)
+            for place, put in table.items()
+        ]
+        try:
+            self._own()
+            move_aside(self._directory, self._aside, "unread")
+            self._aside = ()
+            replace_file(self.path, encode(stamp, self._run_number, entries))
+            if not self.kept_revision:  # an older version that is started again finds nothing, and holds every bay
+                move_aside(self._directory, [FIRST_FILE], "old")
+        except OSError as error:
+            self._fail(_said(error, self.path), stamp.clock_s)
+            if isinstance(error, FileNotFoundError):
+                self._give_up_ownership()
+            return
+        with self._lock:
+            self._disk = {place: put.persisted for place, put in table.items()}
+            self.kept_revision, self._pending_s = revision, self._later_s
+            self._problem, self._written_s = "", stamp.clock_s
+        self._on_kept(changed)
+
+    def _fail(self, problem: str, now_s: float) -> None:
+        self._problem, self._failed_s, self._counted = problem, now_s, True
+
+    def _give_up_ownership(self) -> None:
+        """At the end; or somebody has removed the directory and the lock in it, and it has to be locked anew."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def _stamp(self) -> Stamp:
+        return Stamp(self._wall(), self._clock(), self._boot)
+
+
+def _said(error: OSError, path: Path) -> str:
+    return f"{error.filename or path}: {error.strerror or error}"
+
+
+def _gist(persisted: Persisted | None) -> object:
+    return persisted and persisted.gist
+
+
+def _counters(persisted: Persisted) -> object:
+    """What changes all the time while current flows."""
+    session = persisted.session and replace(persisted.session, started_s=0.0)
+    return session, persisted.soc and persisted.soc[1]

@@ -1,0 +1,44 @@
+"""A bay's devices as the service has them: each port and each contactor's line with a duplicate at the guardian."""
+
+from collections.abc import Callable
+from functools import partial
+from time import monotonic
+
+from orchestrator.config.station import Bay, ChargerConfig, Limits, Rs485
+from orchestrator.devices.charger import ChargerPort
+from orchestrator.keys import Range
+from orchestrator.link.gpio import OutputLine, need_gpiod
+from orchestrator.link.serial import SerialLine
+from orchestrator.service.contactor import Contactor
+from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLink
+from orchestrator.service.past import Place
+
+
+def charger_port(
+    charger: ChargerConfig, limits: Limits, poke: Callable[[], None], guardian: GuardianLink
+) -> ChargerPort:
+    """The port of one charger, not started yet; `poke` is called for every reading."""
+    port, kernel = charger.port, charger.rs485 is Rs485.KERNEL
+    return ChargerPort(
+        charger,
+        limits,
+        open_line=partial(GuardedLine, port, partial(SerialLine.open, port, kernel_rs485=kernel), guardian),
+        clock=monotonic,
+        on_change=poke,
+    )
+
+
+def stray_port(guardian: GuardianLink, poke: Callable[[], None], place: Place) -> ChargerPort:
+    """A port that is only ever stopped: no current is within its limits."""
+    charger = ChargerConfig(port=place.port, control=place.control, steps_a=(0.0,) * 5, rs485=place.rs485)
+    return charger_port(charger, Limits(voltage_v=0.0, current_a=0.0, temperature_c=Range(0, 0)), poke, guardian)
+
+
+def open_contactor(bay: Bay, guardian: GuardianLink) -> Contactor | None:
+    """The bay's contactor, if it has one. LinkError where the library for it is not installed."""
+    config = bay.contactor
+    if config is None:
+        return None
+    need_gpiod()
+    open_output = partial(OutputLine.open, config.chip, config.line, active_low=config.active_low)
+    return Contactor(partial(GuardedOutput, bay.name, open_output, guardian))

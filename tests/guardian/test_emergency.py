@@ -1,0 +1,395 @@
+"""`orchestrator estop` as it is used in an emergency: from anywhere, on any terminal, beside anything that hangs."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestrator.service import inhand
+from orchestrator.service.inhand import ports_in_hand, stations
+from orchestrator.service.witness import NOBODY, Service
+from tests.guardian.chargers import Bench, running_chargers
+from tests.link.ptys import plugged
+from tests.waiting import wait_until
+
+DONE = "every charger stands by, verified\n"
+
+
+def estop(*args: str, cwd: Path, stdout: int = subprocess.PIPE, **env: str) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, "-m", "orchestrator", "estop", *args], cwd=cwd,
+        env={**os.environ, "ORCHESTRATOR_SOCKET": "", **env}, stdin=subprocess.DEVNULL, stdout=stdout,
+        stderr=subprocess.PIPE, text=True, encoding="latin-1", timeout=30, check=False,
+    )  # fmt: skip
+
+
+def station_file(path: Path, *benches: Bench, more: str = "") -> Path:
+    bays = "".join(f"  - {{name: bay-{n}, charger: {{port: {b.name}}}}}\n" for n, b in enumerate(benches, start=1))
+    path.write_text(f"bays:\n{bays}{more}")
+    return path
+
+
+# --- which station ---------------------------------------------------------------------------------------------------
+
+
+def test_without_arguments_the_file_in_this_folder_counts(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        file = station_file(tmp_path / "station.yaml", bench)
+        done = estop(cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (0, f"bay-1 ({bench.name}): standby verified\n{DONE}")
+        assert done.stderr == f"station file: {file}\n{NOBODY}\n"
+
+
+#: An emergency stop that sees only these processes: others on this machine may be somebody else's tests.
+AMONG = """
+import sys
+from orchestrator.service import estop, inhand
+every, ours = inhand.orchestrators, {int(word) for word in sys.argv[1:]}
+inhand.orchestrators = lambda: (one for one in every() if one[0] in ours)
+sys.exit(estop.main([]))
+"""
+
+
+def test_else_those_of_the_services_that_run(tmp_path: Path) -> None:
+    """Found by their command lines, relative to their own folders."""
+    if Path(inhand.PLACES[1]).exists():
+        pytest.skip("there is an installed one on this machine")
+    with running_chargers(tmp_path, 2) as benches, ExitStack() as stack:
+        files, services = [], []
+        for number, bench in enumerate(benches):
+            (tmp_path / str(number)).mkdir()
+            files.append(station_file(tmp_path / str(number) / "depot.yaml", bench))
+            services.append(stack.enter_context(running(files[-1])))
+        argv = [sys.executable, "-c", AMONG, *(str(service.pid) for service in services)]
+        (tmp_path / "here").mkdir()
+        done = subprocess.run(argv, cwd=tmp_path / "here", capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout.count("standby verified")) == (0, 2)
+        assert [f"station file: {file}" in done.stderr for file in files] == [True, True]
+        assert not any(bench.runs for bench in benches)
+
+
+@contextmanager
+def running(file: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """What looks like a service, with this station file in its own folder."""
+    service = subprocess.Popen(
+        ["orchestrator", "-c", "print(flush=True); input()", "run", file.name], executable=sys.executable,
+        cwd=file.parent, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    assert service.stdout is not None
+    service.stdout.readline()
+    try:
+        yield service
+    finally:
+        service.communicate(b"\n")
+
+
+def test_the_installed_one_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    installed = tmp_path / "installed.yaml"
+    installed.touch()
+    monkeypatch.setattr(inhand, "PLACES", (str(tmp_path / "none"), str(installed)))
+    none, first, *_ = stations()
+    assert (none, first) == ([], [str(installed)])
+
+
+@pytest.mark.parametrize(
+    ("words", "station"),
+    [
+        (["/opt/bin/python", "/opt/bin/orchestrator", "run", "/etc/x.yaml"], "/etc/x.yaml"),
+        (["python", "-m", "orchestrator", "run"], inhand.PLACES[0]),
+        (["python", "-P", "-m", "orchestrator.service.controller", "7", "s.yaml"], "s.yaml"),
+        (["python", "-m", "orchestrator", "demo"], ""),
+    ],
+)
+def test_whose_file_a_command_line_names(words: list[str], station: str) -> None:
+    assert inhand._station(words) == station
+
+
+# --- ports in hand ---------------------------------------------------------------------------------------------------
+
+
+def in_hand(directory: Path, *entries: object, name: str = "persisted.json") -> None:
+    directory.mkdir(exist_ok=True)
+    (directory / name).write_text(json.dumps({"format": 2, "entries": entries}))
+
+
+@pytest.mark.parametrize("broken", ["", "  - ]}: {\n"])
+@pytest.mark.parametrize("name", inhand.FILES)
+def test_a_port_that_the_file_names_no_more_is_stopped_if_its_charger_may_run(
+    tmp_path: Path, name: str, broken: str
+) -> None:
+    with running_chargers(tmp_path, 3) as (named, dropped, idle):
+        file = station_file(tmp_path / "station.yaml", named, more=f"journal:\n  directory: ./journal\n{broken}")
+        in_hand(
+            tmp_path / "journal",
+            {"bay": "old", "port": dropped.name, "running": True},
+            {"bay": "idle", "port": idle.name, "running": False},
+            {"bay": "bay-1", "port": os.path.realpath(named.name), "running": True},
+            name=name,
+        )
+        done = estop(str(file), cwd=tmp_path)
+        assert done.stdout.splitlines()[-2:] == [f"old ({dropped.name}): standby verified", DONE.strip()]
+        assert not (named.runs or dropped.runs)
+        assert idle.stops == 0, "nobody has told it to run"
+
+
+def test_a_station_file_without_a_port_still_leads_to_those_in_hand(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        file = station_file(tmp_path / "station.yaml", more="journal: {directory: j}\n")
+        in_hand(tmp_path / "j", {"bay": "left", "port": bench.name, "running": True})
+        assert estop(str(file), cwd=tmp_path).stdout == f"left ({bench.name}): standby verified\n{DONE}"
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        b"", b"[]", b"{", b"\xff\xfe", b'{"entries": 7}', b'{"entries": [7, null, {}]}', b"[" * 100_000,
+        b'{"entries": [{"running": true}, {"running": true, "port": 7}, {"running": true, "port": "x\\u0000/"}]}',
+        b'{"entries": [{"running": true, "port": "/\\ud800"}]}', b'{"bay-1": {"running": true}}',
+    ],
+    ids=range(10),
+)  # fmt: skip
+def test_what_cannot_be_understood_is_passed_over(tmp_path: Path, written: bytes) -> None:
+    (tmp_path / "persisted.json").write_bytes(written)
+    assert ports_in_hand(str(tmp_path)) == {}
+
+
+def test_a_bay_without_a_name_has_a_port_all_the_same(tmp_path: Path) -> None:
+    in_hand(tmp_path, {"port": "/dev/x", "running": 1, "bay": 7})
+    assert ports_in_hand(str(tmp_path)) == {"/dev/x": ""}
+
+
+def test_a_disk_that_hangs_delays_no_stop(tmp_path: Path) -> None:
+    """A fifo hangs in open(), as a file on a dead disk does."""
+    with running_chargers(tmp_path) as (bench,):
+        file = station_file(tmp_path / "station.yaml", bench, more="journal: {directory: j}\n")
+        (tmp_path / "j").mkdir()
+        os.mkfifo(tmp_path / "j" / "persisted.json")
+        began_s = time.monotonic()
+        done = estop(str(file), cwd=tmp_path)
+        stop_s = bench.wire.counters.first_stop_s
+        assert stop_s is not None
+        assert stop_s - began_s < 1.0
+        assert (done.returncode, done.stdout) == (0, f"bay-1 ({bench.name}): standby verified\n{DONE}")
+        assert "cannot be read in time" in done.stderr
+
+
+# --- where it is told ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_terminal_that_cannot_show_a_name_gets_what_it_can(tmp_path: Path, encoding: str) -> None:
+    directory = tmp_path / "충전기"
+    directory.mkdir()
+    with running_chargers(directory) as (bench,):
+        done = estop("--port", bench.name, cwd=tmp_path, PYTHONIOENCODING=encoding)
+        assert (done.returncode, "Traceback" in done.stderr) == (0, False)
+        assert "standby verified" in done.stdout
+        assert ("\\ucda9" in done.stdout) == (encoding != "utf-8")
+
+
+@pytest.mark.parametrize("arguments", [["--port", "PORT"], ["--help"], ["--nonsense"], ["none.yaml"]])
+def test_whoever_does_not_listen_changes_nothing(tmp_path: Path, arguments: list[str]) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        words = [bench.name if word == "PORT" else word for word in arguments]
+        heard = estop(*words, cwd=tmp_path)
+        for gone in (1, 2):
+            argv = [sys.executable, "-m", "orchestrator", "estop", *words]
+            closed = subprocess.run(
+                ["sh", "-c", f'exec {gone}>&-; exec "$@"', "sh", *argv], cwd=tmp_path, capture_output=True, text=True,
+                check=False, env={**os.environ, "ORCHESTRATOR_SOCKET": ""},
+            )  # fmt: skip
+            assert closed.returncode == heard.returncode
+            assert "Traceback" not in closed.stderr
+        reader, writer = os.pipe()
+        os.close(reader)
+        piped = estop(*words, cwd=tmp_path, stdout=writer)
+        os.close(writer)
+        assert (piped.returncode, "Traceback" in piped.stderr) == (heard.returncode, False)
+
+
+def test_a_terminal_that_stands_still_keeps_nobody_from_the_exit_status(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    with running_chargers(tmp_path) as (bench,):
+        began_s = time.monotonic()
+        assert estop("--port", bench.name, cwd=tmp_path, stdout=writer).returncode == 0
+        assert time.monotonic() - began_s < 8.0
+    os.close(reader)
+    os.close(writer)
+
+
+def test_ctrl_c_leaves_no_traceback(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        argv = [sys.executable, "-m", "orchestrator", "estop", "--port", bench.name]
+        with subprocess.Popen(argv, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as running:
+            wait_until(lambda: bench.wire.counters.polls, what="the first question")
+            running.send_signal(signal.SIGINT)
+            assert running.communicate() == (b"", b"")
+            assert running.returncode == -signal.SIGINT
+        assert not bench.runs
+
+
+# --- beside what calls itself a service ------------------------------------------------------------------------------
+
+
+@contextmanager
+def answering(path: Path, status: Mapping[str, Any] | None) -> Iterator[list[Mapping[str, Any]]]:
+    """What listens on a Unix socket, and all that it is asked: it answers like a service, or drips for ever."""
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    listener.bind(str(path))
+    listener.listen()
+    asked: list[Mapping[str, Any]] = []
+    over = threading.Event()
+
+    def drip(client: socket.socket) -> None:
+        while not over.wait(0.2):
+            client.send(b" ")
+
+    def serve() -> None:
+        while True:
+            try:
+                client, _ = listener.accept()
+                line = client.makefile("rb").readline()
+            except OSError:
+                return
+            if not line:
+                continue
+            asked.append(json.loads(line))
+            if status is None:
+                threading.Thread(target=drip, args=(client,), daemon=True).start()
+                continue
+            answer = {"results": {"bay-1": ""}} if asked[-1]["verb"] == "stop" else status
+            client.sendall(json.dumps({"ok": True, **answer}).encode() + b"\n")
+            client.close()
+
+    threading.Thread(target=serve, daemon=True).start()
+    try:
+        yield asked
+    finally:
+        over.set()
+        listener.shutdown(socket.SHUT_RDWR)
+        listener.close()
+
+
+def test_a_service_that_drips_costs_neither_the_stop_nor_the_end(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,), answering(tmp_path / "s", None) as asked:
+        began_s = time.monotonic()
+        done = estop("--port", bench.name, "--socket", str(tmp_path / "s"), cwd=tmp_path)
+        assert time.monotonic() - began_s < 6.0
+        stop_s = bench.wire.counters.first_stop_s
+        assert stop_s is not None
+        assert stop_s - began_s < 0.5
+        assert asked
+        assert (done.returncode, done.stdout) == (0, f"{bench.name}: standby verified\n{DONE}")
+        assert done.stderr.startswith("the service has not ")
+
+
+def bay(port: str, charger: Mapping[str, Any], battery: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "name": "bay-1", "port": port, "state": "IDLE", "reason": "no battery",
+        "charger": {"online": True, "t_s": 1e9, "operation": 0, "current_a": 0.0, **charger},
+        "battery": {"online": True, "current_a": 0.0, **battery},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("charger", "battery", "why"),
+    [
+        ({}, {"current_a": 14.0}, "NOT stopped: the charger says 0.0 A, the BMU sees 14.0 A"),
+        ({"online": False}, {"current_a": 14.0}, "NOT stopped: the BMU sees 14.0 A, and the charger does not answer"),
+        ({"operation": 1}, {}, "NOT stopped: the service says IDLE: no battery"),
+        ({"t_s": 0.5}, {}, "no proof of standby: the service has not heard from the charger since"),
+        ({}, {"online": False, "current_a": 14.0}, ""),
+        ({}, {"current_a": None}, ""),
+        ({}, {"current_a": -20.0}, ""),
+        ({"online": False}, {}, None),
+    ],
+)
+def test_both_witnesses_have_to_agree(
+    tmp_path: Path, charger: Mapping[str, Any], battery: Mapping[str, Any], why: str | None
+) -> None:
+    port = str(tmp_path / "port")
+    with answering(tmp_path / "s", {"bays": [bay(port, charger, battery)]}) as asked:
+        service = Service([port], str(tmp_path / "s"), every_bay=True)
+        service.start()
+        assert service.told.wait(5.0)
+        wait_until(lambda: len(asked) >= 2)
+        assert asked[0] == {"verb": "stop", "bays": None}
+        wait_until(lambda: service._seen[1])
+        seen = service.sees(port, 1.0)
+        assert (seen[1] if seen else None) == why
+        assert service.said == "the service holds bay-1 until an operator starts it"
+        assert service.sees("/dev/other", 1.0) is None
+
+
+def test_a_current_that_only_the_bmu_sees_is_told_first(tmp_path: Path) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        status = {"bays": [bay(bench.name, {}, {"current_a": 14.0})]}
+        with answering(tmp_path / "s", status):
+            done = estop("--port", bench.name, "--socket", str(tmp_path / "s"), cwd=tmp_path)
+        assert done.returncode == 1
+        assert done.stdout.splitlines() == [
+            f"CUT THE MAINS of {bench.name}: nothing proves that they stand by",
+            f"{bench.name}: NOT stopped: the charger says 0.0 A, the BMU sees 14.0 A",
+        ]
+
+
+# --- a file of that name ---------------------------------------------------------------------------------------------
+
+
+def test_a_file_of_the_working_directory_is_not_imported_by_the_controller(tmp_path: Path) -> None:
+    from orchestrator.service.guardian import CONTROLLER
+
+    for name in ("serial", "can", "transitions", "yaml", "select"):
+        (tmp_path / f"{name}.py").write_text("print('imported')\n")
+    done = subprocess.run(
+        [sys.executable, *CONTROLLER, "no descriptor", "no file"], cwd=tmp_path, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert "ValueError" in done.stderr, "it got as far as its arguments"
+    assert "imported" not in done.stdout
+
+
+def test_one_port_whose_open_hangs_delays_no_other(tmp_path: Path) -> None:
+    """The whole program, with a kernel that does not come back from one open()."""
+    program = """
+import os, sys, time
+good, stuck = os.open, os.path.realpath(sys.argv[1])
+def opens(path, *rest):
+    while os.path.realpath(path) == stuck:
+        time.sleep(100)
+    return good(path, *rest)
+os.open = opens
+from orchestrator.service.estop import main
+sys.exit(main(["--port", *sys.argv[1:]]))
+"""
+    with plugged(tmp_path / "stuck") as pty, running_chargers(tmp_path) as (bench,):
+        began_s = time.monotonic()
+        done = subprocess.run(
+            [sys.executable, "-c", program, pty.path, bench.name], capture_output=True, text=True, check=False
+        )
+        assert time.monotonic() - began_s < 8.0
+        stop_s = bench.wire.counters.first_stop_s
+        assert stop_s is not None
+        assert stop_s - began_s < 0.5
+        assert done.stdout.splitlines() == [
+            f"CUT THE MAINS of {pty.path}: nothing proves that they stand by",
+            f"{pty.path}: the port's driver hangs",
+            f"{bench.name}: standby verified",
+        ]
+        assert done.returncode == 1
+        assert pty.drain() == b""

@@ -1,0 +1,36 @@
+"""Other programs that use a charger's port: each a process of its own, as on a real machine."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_HOLD = """
+import fcntl, os, sys, termios
+fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+if sys.argv[2] == "flock":
+    fcntl.flock(fd, fcntl.LOCK_EX)
+elif sys.argv[2] == "TIOCEXCL":
+    fcntl.ioctl(fd, termios.TIOCEXCL)
+print(flush=True)
+sys.stdin.read()
+"""
+
+
+@contextmanager
+def holding(port: str, how: str = "flock", name: str = sys.executable) -> Iterator["subprocess.Popen[bytes]"]:
+    """A program that has the port open, and locked by "flock" or "TIOCEXCL"; `name` is how it was called."""
+    process = subprocess.Popen(
+        [name, "-c", _HOLD, port, how], executable=sys.executable, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    try:
+        yield process
+    finally:
+        process.communicate()
+
+
+def stty(port: str, *words: str) -> None:
+    """As a person would, or a program that opens the port for itself."""
+    subprocess.run(["stty", "-F", port, *words], check=True, capture_output=True)

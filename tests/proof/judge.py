@@ -1,0 +1,485 @@
+"""What must hold on the wire and on the plant, whatever befalls the station; our own words count only where they claim.
+
+1. Current flows only under an order that is allowed now (`REASONS`: facts of the plant under which none is).
+2. A stop that is meant is understood by a charger that can hear, within its budget, whatever the other ports do.
+3. Nothing that waits for a person energises by itself, over any number of lives.
+4. What is said to be stopped, verified or at rest is so; who cannot be stopped is called so.
+
+A lie that both witnesses tell alike cannot be seen by anybody: nothing is demanded there. A temperature has one witness
+only, the BMU.
+"""
+
+import json
+import re
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from orchestrator.model import ENERGISED, ChargeMode
+from orchestrator.sim.charger_frames import Kind
+from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name
+from tests.proof.hazards import Bay, Script
+from tests.proof.virtual_rig import VirtualRig
+
+STOP, OPERATION_0 = bytes.fromhex("AFFA900410900034AFA0"), bytes.fromhex("AFFA90050290010028AFA0")
+OPERATION_1 = bytes.fromhex("AFFA90050290010129AFA0")
+LIMIT = re.compile(re.escape(bytes.fromhex("AFFA9005029002")) + b"(.)", re.DOTALL)
+
+#: An output below this is none; what flows above it can be seen by everybody.
+FLOWS_A, SEEN_A = 0.5, 1.0
+#: "Device falls silent or its line is reconfigured → stop understood", "stop not verified → UNCONTROLLABLE", and what
+#: the noticing of it may take: a repetition, a poll, a status.
+LINE_S, VERIFY_S, MARGIN_S = 2.0, 3.0, 1.4
+#: A bay that has been opened begins with a stop within this.
+OPEN_S = 2.0
+#: Within this after an operator's answer, or the end of a process, its stop is understood.
+ASKED_S, KILLED_S, FROZEN_S, TERM_S, ESTOP_S = 0.6, 0.25, 1.2, 0.7, 0.5
+#: The control socket is there this long after the start, and answers within that.
+START_S, ANSWER_S = 1.5, 6.0
+#: Over this the current is held against what was ordered.
+MEAN_S = 12.0
+#: Who runs again without an order this often within that time was not stopped, and is called so.
+RESTARTS, RESTARTS_S = 3, 25.0
+#: What latched this long ago is on the disk.
+KEPT_S = 2.6
+VERIFIED = re.compile(r"standby verified|stands? by, verified|verified (?:standby|to stand by)", re.IGNORECASE)
+DENIED = re.compile(r"NOT|not verified|no proof")
+
+
+@dataclass(slots=True)
+class Charger:
+    """One charger of the plant and what is known of its bay."""
+
+    number: int
+    rig: VirtualRig
+    meant: str = (
+        ""  #: the newest that a process of ours has written to its port: "run", "stop"; "" nothing in this life
+    )
+    meant_s: float = 0.0
+    limit: int = 4  #: the newest current limit that was written
+    deaf_s: float = 0.0  #: when it could last not hear, or not be reached
+    since_s: dict[str, float] = field(default_factory=dict)  #: reason → since when it holds while current flows
+    named_s: float = 0.0  #: when people were last told that it is not under control
+    waits: dict[str, str] = field(default_factory=dict)  #: for a person: why, in words
+    tripped_s: float | None = None  #: since when the status says TRIPPED
+    asked_stop: bool = False  #: an operator's stop was accepted, and no start since
+    flown: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=300))
+    stopped_s: float = 0.0  #: when a stop was last understood at its port
+    looked_s: float = 1000.0
+    charged_ah: float = 0.0
+    precharged_s: float = 0.0
+    onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
+
+    @property
+    def flows(self) -> bool:
+        return bool(self.rig.bay.charger.running or self.rig.bay.charger.current_a > FLOWS_A)
+
+    @property
+    def current_a(self) -> float:
+        return float(self.rig.bay.charger.current_a)
+
+    @property
+    def obeys(self) -> bool:
+        charger = self.rig.bay.charger
+        return not (
+            charger.ignores_stop or charger.stops_left < 1 or charger.restless_s is not None or charger.rogue
+        )  # fmt: skip
+
+    def honest(self, kind: Kind, *fields: str) -> bool:
+        """At least one of the two witnesses tells the truth."""
+        wire, bay = self.rig.wire, self.rig.bay
+        charger_honest = kind not in wire.lies and kind not in wire.liars and not wire.mute_tx
+        bmu_honest = not set(fields) & set(bay.falsify) and not self.rig.bmu.port.faults.mute
+        return charger_honest or bmu_honest
+
+    @property
+    def seen(self) -> bool:
+        """Somebody tells the truth about the current."""
+        wire = self.rig.wire
+        charger = not {Kind.OPERATION, Kind.CURRENT} & {*wire.lies, *wire.liars} and not (wire.mute_tx or wire.mute_rx)
+        faults = self.rig.bmu.port.faults
+        return charger or ("current_a" not in self.rig.bay.falsify and not faults.mute and faults.delay_s < 0.3)
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """A fact of the plant under which no current may flow for longer than `within_s`."""
+
+    name: str
+    within_s: float
+    holds: Callable[["Judge", Charger], bool]
+
+
+def _temperature_honest(charger: Charger) -> bool:
+    """What somebody else sends in the BMU's name is no excuse: the BMU answers as well, and differently."""
+    return "temperature_c" not in charger.rig.bay.falsify
+
+
+def _volts(charger: Charger) -> bool:
+    return charger.rig.bay.charger.voltage_v > 55.3 and charger.honest(Kind.VOLTAGE, "voltage_v")
+
+
+def _crossed(judge: "Judge", charger: Charger) -> bool:
+    entry = judge.entry(charger)
+    return charger.rig.wire.charger is not charger.rig.bay.charger or (entry is not None and entry.node != entry.port)
+
+
+def _hot(_: "Judge", charger: Charger) -> bool:
+    return charger.rig.bay.pack.temperature_c > 45.2 and _temperature_honest(charger)
+
+
+def _cold(_: "Judge", charger: Charger) -> bool:
+    return charger.rig.bay.pack.temperature_c < -0.2 and _temperature_honest(charger)
+
+
+def _frozen(_: "Judge", charger: Charger) -> bool:
+    return "voltage_v" in charger.rig.bay.falsify and charger.rig.frozen
+
+
+def _too_much(judge: "Judge", charger: Charger) -> bool:
+    entry = judge.entry(charger)
+    limit_a = (entry.limit_a if entry else 15.0) * 1.1 + 0.8
+    return charger.current_a > limit_a and charger.seen
+
+
+REASONS: tuple[Reason, ...] = (
+    Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run" and not judge.wants(c)),
+    Reason("operator's stop", ASKED_S, lambda _, c: c.asked_stop),
+    Reason("hot", LINE_S, _hot),
+    Reason("cold", LINE_S, _cold),
+    Reason("over-voltage", LINE_S, lambda _, c: _volts(c)),
+    Reason("over-current", LINE_S, _too_much),
+    Reason("BMU silent", LINE_S, lambda _, c: c.rig.bmu.port.faults.mute),
+    Reason("another pack", LINE_S + 3.0, lambda _, c: c.rig.bay.pack.cells != 13 and not c.rig.bay.falsify),
+    Reason("collapsed", LINE_S, lambda _, c: c.rig.bay.pack.bias_v < -8.0 and c.honest(Kind.VOLTAGE, "voltage_v")),
+    Reason("crossed", 9.0, _crossed),
+    Reason("BMU frozen", 65.0, _frozen),
+    Reason("apart, most of the time", 20.0, lambda _, c: c.rig.apart_v > 1.2),
+    Reason("status word", LINE_S, lambda _, c: "status" in c.rig.bay.falsify and _trips(c)),
+)
+
+
+#: Somebody reads or writes on bus and line as everybody may: no reason to stop.
+HARMLESS = ("boot", "tool")
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
+
+
+def _trips(charger: Charger) -> bool:
+    return bool(int(charger.rig.bay.readout().status) & (1 << 0 | 1 << 2 | 1 << 4 | 1 << 6)) and charger.rig.steady
+
+
+class Judge:
+    """Follows one script; `wrong` are its findings, "t = …, charger n, invariant: what"."""
+
+    def __init__(self, gateway: Gateway, script: Script) -> None:
+        self.gateway, self.script = gateway, script
+        self.time = gateway.time
+        self.began_s = self.time.now_s
+        self.wrong: list[str] = []
+        self.chargers = [Charger(number, rig) for number, rig in enumerate(gateway.rigs)]
+        self.life = list(gateway.entries)  #: what the running service has read
+        self.booted_s: float | None = None  #: when the present life began; None: nobody is there
+        self.status: Mapping[str, Any] | None = None
+        self.status_s = 0.0
+        self.frozen = False
+        self._read = 0  # lines that were said
+        for charger in self.chargers:
+            charger.rig.tty.on_written = partial(self._written, charger)
+            charger.rig.wire.on_started = partial(self._started, charger)
+
+    def entry(self, charger: Charger) -> Any:
+        """The bay of the present life that this charger's port belongs to."""
+        return next((entry for entry in self.life if entry.port == charger.number), None)
+
+    def by(self, charger: Charger) -> Charger:
+        """At whose port this charger hangs: its own, unless cables are crossed."""
+        model = charger.rig.bay.charger
+        return charger if charger.rig.wire.charger is model else next(
+            one for one in self.chargers if one.rig.wire.charger is model
+        )  # fmt: skip
+
+    def wants(self, charger: Charger) -> bool:
+        """The service says that it charges here: where the charger runs already, it need not be told to."""
+        return self._shown(charger).get("state") in ENERGISED and self.time.now_s - self.status_s < 1.0
+
+    def find(self, charger: int, name: str, text: str) -> None:
+        if not any(f" {name}: " in line for line in self.wrong):
+            self.wrong.append(f"t = {self.time.now_s - self.began_s:.2f} s, charger {charger + 1}, {name}: {text}")
+
+    # --- what comes over the wires ------------------------------------------------------------------------------------
+
+    def _written(self, charger: Charger, data: bytes) -> None:
+        if STOP in data or OPERATION_0 in data:
+            charger.meant, charger.meant_s = "stop", self.time.now_s
+        elif OPERATION_1 in data:
+            charger.meant, charger.meant_s = "run", self.time.now_s
+        if limit := LIMIT.search(data):
+            charger.limit = limit[1][0]
+
+    def _started(self, charger: Charger, _now_s: float) -> None:
+        """A frame has switched an output on: of the charger behind this port."""
+        if charger.waits:
+            self.find(charger.number, "by itself", f"it was started, and waits for a person: {charger.waits}")
+        if self.booted_s is None or charger.meant_s < self.booted_s:
+            self.find(charger.number, "by itself", "it was started by nobody")
+
+    # --- what people are told, and ask --------------------------------------------------------------------------------
+
+    def told(self, asked: Asked) -> None:
+        """A status."""
+        if asked.answer is None:
+            return
+        self.status, self.status_s = asked.answer, self.time.now_s
+        for bay in asked.answer["bays"]:
+            charger = self._of(bay["name"])
+            if charger is None:
+                continue
+            if bay["alarm"]:
+                charger.named_s = self.time.now_s
+            if bay["state"] == "TRIPPED":
+                charger.tripped_s = self.time.now_s if charger.tripped_s is None else charger.tripped_s
+                charger.waits["tripped"] = bay["reason"]
+            else:
+                charger.tripped_s = None
+
+    def _of(self, name: str) -> Charger | None:
+        return next((self.chargers[entry.port] for entry in self.life if entry.name == name), None)
+
+    def asked(self, asked: Asked, names: list[str]) -> None:
+        """A person asks: a stop is one whatever is answered, and something is answered."""
+        if self.booted_s is None or self.frozen or self.time.now_s < self.booted_s + START_S:
+            return
+        if asked.request["verb"] == "stop":
+            for charger in filter(None, map(self._of, names)):
+                self._meant(charger, asked.asked_s, ASKED_S, "an operator asked for a stop")
+        self.time.call_later(ANSWER_S, self._unanswered, asked, self.gateway.controller)
+
+    def _unanswered(self, asked: Asked, controller: Any) -> None:
+        if asked.answer is None and not asked.error and self.gateway.alive(controller) and not self.frozen:
+            self.find(-1, "unanswered", f"nobody answers {asked.request}")
+
+    def answered(self, asked: Asked) -> None:
+        """A person's request was answered: "" is yes."""
+        verb, results = asked.request["verb"], (asked.answer or {}).get("results", {})
+        for name, answer in results.items():
+            charger = self._of(name)
+            if charger is None or answer:
+                continue
+            if verb == "stop":
+                charger.asked_stop = True
+                charger.waits["operator"] = "stopped by the operator"
+            elif verb == "start":
+                charger.asked_stop = False
+                charger.waits.clear()
+
+    # --- lives --------------------------------------------------------------------------------------------------------
+
+    def boots(self) -> None:
+        self.life, self.booted_s, self.frozen = list(self.gateway.entries), self.time.now_s, False
+        self.status = None
+        for charger in self.chargers:
+            charger.meant, charger.limit = "", 4
+            charger.since_s.clear()
+
+    def dies(self, why: str, *, orderly: bool = False) -> None:
+        """The controller is gone, or is told to go."""
+        for charger in self.chargers:
+            if not orderly and charger.meant == "run" and charger.flows and charger.current_a > FLOWS_A:
+                charger.waits["died"] = f"{why} in mid-charge"
+            tripped_s = charger.tripped_s
+            if tripped_s is not None and self.time.now_s - tripped_s < KEPT_S and "died" not in charger.waits:
+                charger.waits.pop("tripped", None)
+            charger.tripped_s = None
+
+    def gone(self) -> None:
+        """No process of ours is left."""
+        self.booted_s = None
+
+    def helped(self) -> None:
+        """Somebody stops the station without a service."""
+        self.booted_s = self.time.now_s if self.booted_s is None else self.booted_s
+
+    def meant(self, within_s: float, why: str) -> None:
+        """A stop of every charger of this life is meant, now."""
+        for charger in self.chargers:
+            if self.entry(charger) is not None:
+                self._meant(charger, self.time.now_s, within_s, why)
+
+    def _meant(self, charger: Charger, since_s: float, within_s: float, why: str) -> None:
+        if charger.meant == "run" and charger.rig.wire.charger.running:
+            self.time.call_at(max(since_s + within_s, self.time.now_s), self._understood, charger, since_s, why)
+
+    def _understood(self, charger: Charger, since_s: float, why: str) -> None:
+        due_s = charger.rig.tty.changed_s + LINE_S
+        if due_s > self.time.now_s:  # the line was set up otherwise just then
+            self.time.call_at(due_s, self._understood, charger, since_s, why)
+        elif charger.stopped_s < since_s and charger.deaf_s < since_s and self.booted_s is not None:
+            self.find(
+                charger.number, "not understood", f"{why}, and {self.time.now_s - since_s:.2f} s later it knows of none"
+            )
+
+    # --- what must be -------------------------------------------------------------------------------------------------
+
+    def look(self) -> None:
+        now_s = self.time.now_s
+        for charger in self.chargers:
+            charger.rig.catch_up()
+        for charger in self.chargers:
+            self._reach(charger, now_s)
+            if charger.rig.wire.counters.first_stop_s is not None:
+                charger.stopped_s = now_s
+                charger.rig.wire.counters.mark()
+            self._judge(charger, now_s)
+            self._judge_mean(charger, now_s)
+        self._judge_words()
+        self._judge_small(now_s)
+
+    def _judge_small(self, now_s: float) -> None:
+        """Limits of a charge hold over restarts."""
+        for charger, bay in zip(self.chargers, self.script.bays, strict=True):
+            dt_s, charger.looked_s = now_s - charger.looked_s, now_s
+            if not bay.small:
+                continue
+            charger.charged_ah += charger.current_a * dt_s / 3600
+            charger.precharged_s += dt_s * (charger.flows and charger.rig.bay.pack.leaky)
+            if charger.charged_ah > SMALL_AH * 1.2:
+                self.find(charger.number, "limits", f"{charger.charged_ah:.3f} Ah went in, {SMALL_AH:g} are allowed")
+            if charger.precharged_s > SMALL_RISE_S * 1.4:
+                self.find(charger.number, "limits", f"{charger.precharged_s:.0f} s of precharge without a rise")
+
+    def ends(self) -> None:
+        """The script is over: what was harmless has stopped nobody, and the record can be read."""
+        if all(one.what in HARMLESS for one in self.script.hazards) and self.script.bays == (Bay(),) * 3:
+            for charger in self.chargers:
+                if not charger.rig.bay.charger.running:
+                    self.find(charger.number, "goes on", f"something harmless has stopped it, {self._state(charger)}")
+        if not any(one.what == "power" for one in self.script.hazards):
+            for path, inode in self.gateway.disk.names.items():
+                lines = bytes(inode.data).split(b"\n")[:-1] if path.endswith(".jsonl") else []
+                if broken := [line for line in lines if not _is_json(line)]:
+                    self.find(-1, "record", f"{path} has a line that cannot be read: {broken[0]!r}")
+
+    def _reach(self, charger: Charger, now_s: float) -> None:
+        tty, wire = charger.rig.tty, charger.rig.wire
+        name = port_name(charger.number)
+        troubled = any(
+            trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles
+        )
+        if not tty.present or tty.stalled or tty.stolen or wire.mute_rx or troubled:
+            charger.deaf_s = now_s
+
+    def _judge(self, charger: Charger, now_s: float) -> None:
+        for reason in REASONS:
+            if not (charger.flows and reason.holds(self, charger)):
+                charger.since_s.pop(reason.name, None)
+                continue
+            since_s = charger.since_s.setdefault(reason.name, now_s)
+            if self.booted_s is None or self.entry(charger) is None:
+                charger.since_s[reason.name] = now_s
+                continue
+            port = self.by(charger)
+            deaf_s = port.deaf_s + OPEN_S if port.deaf_s else 0.0
+            reached_s = max(since_s, self.booted_s + OPEN_S, deaf_s, port.rig.tty.changed_s)
+            if charger.obeys and now_s - reached_s > reason.within_s:
+                self.find(
+                    charger.number, reason.name, f"current flows for {now_s - since_s:.2f} s, {self._state(charger)}"
+                )
+            self._judge_named(charger, reason, since_s, now_s)
+        self._judge_restless(charger, now_s)
+
+    def _judge_restless(self, charger: Charger, now_s: float) -> None:
+        """Who is stopped, and runs again and again, was never stopped."""
+        if charger.since_s.get("no order") == now_s and charger.seen:
+            charger.onsets.append(now_s)
+        onsets = charger.onsets
+        if self.booted_s is None or len(onsets) < RESTARTS or onsets[0] < self.booted_s:
+            return
+        if now_s - onsets[0] < RESTARTS_S and charger.named_s < onsets[0] and now_s - onsets[-1] > MARGIN_S:
+            self.find(charger.number, "nobody is told", f"it runs again and again by itself, {self._state(charger)}")
+
+    def _judge_named(self, charger: Charger, reason: Reason, since_s: float, now_s: float) -> None:
+        """Who cannot be stopped is called so."""
+        if charger.current_a < SEEN_A or not charger.seen or not self.gateway.alive(self.gateway.controller):
+            return
+        if self.booted_s is None or self.frozen or now_s - self.status_s > 1.0 or reason.name == "crossed":
+            return
+        unnamed_s = now_s - max(since_s, self.booted_s + OPEN_S, charger.named_s)
+        if unnamed_s > reason.within_s + VERIFY_S + MARGIN_S:
+            self.find(
+                charger.number,
+                "nobody is told",
+                f"{reason.name}: it runs for {unnamed_s:.2f} s, {self._state(charger)}",
+            )
+
+    def _judge_mean(self, charger: Charger, now_s: float) -> None:
+        """On the average, no more flows than was ordered."""
+        port = self.by(charger)
+        ordered_a = STEPS_A[min(port.limit, 4)] if port.meant == "run" else 20.0
+        flown = charger.flown
+        flown.append((now_s, charger.current_a, ordered_a))
+        while flown and now_s - flown[0][0] > MEAN_S:
+            flown.popleft()
+        if now_s - flown[0][0] < MEAN_S - 0.2 or charger.rig.bay.charger.mode is not ChargeMode.CHARGE:
+            return
+        mean_a, most_a = sum(one[1] for one in flown) / len(flown), max(one[2] for one in flown)
+        if mean_a > most_a * 1.1 + 1.5 and charger.seen and charger.obeys and now_s - charger.deaf_s > MEAN_S:
+            self.find(
+                charger.number,
+                "more than ordered",
+                f"{mean_a:.1f} A in the mean of {MEAN_S:g} s, {most_a:g} A were ordered",
+            )
+
+    def _state(self, charger: Charger) -> str:
+        shown = self._shown(charger)
+        return f"{shown['state']}: {shown['reason']}" if shown else "and no status tells of it"
+
+    def _shown(self, charger: Charger) -> Mapping[str, Any]:
+        """The bay in the newest status."""
+        entry = self.entry(charger)
+        bays = self.status["bays"] if self.status is not None else []
+        return next((bay for bay in bays if entry is not None and bay["name"] == entry.name), {})
+
+    # --- words --------------------------------------------------------------------------------------------------------
+
+    def _judge_words(self) -> None:
+        for line in self.gateway.said[self._read :]:
+            if "internal" in line.text or "Traceback" in line.text:
+                self.find(-1, "exception", f"{line.process}: {line.text}")
+            if VERIFIED.search(line.text) and not DENIED.search(line.text):
+                self._judge_claim(line.process, line.text)
+        self._read = len(self.gateway.said)
+        for process in self.gateway.processes.all.values():
+            for text in process.said:
+                self.find(-1, "exception", text)
+
+    def _judge_claim(self, process: str, text: str) -> None:
+        for charger in self.chargers:
+            entry = self.entry(charger)
+            named = port_name(charger.number) in text or (entry is not None and re.search(rf"\b{entry.name}\b", text))
+            if not (named or "every charger" in text) or charger.current_a < SEEN_A or entry is None:
+                continue
+            alone = process == "guardian" or self.gateway.door is None  # who has the charger's word only
+            lies = {*charger.rig.wire.lies, *charger.rig.wire.liars} & {Kind.OPERATION, Kind.CURRENT}
+            if not lies if alone else charger.seen:
+                self.find(charger.number, "verified", f"{process} says {text!r}, and {charger.current_a:.1f} A flow")
+
+    def ended(self, name: str, status: int) -> None:
+        """A process has ended in order: with 0, nothing flows."""
+        if name in ("controller", "guardian", "estop") and status == 0:
+            for charger in self.chargers:
+                if self.entry(charger) is None or charger.current_a < SEEN_A:
+                    continue
+                lies = {*charger.rig.wire.lies, *charger.rig.wire.liars} & {Kind.OPERATION, Kind.CURRENT}
+                if charger.seen if name == "controller" else not lies:
+                    self.find(
+                        charger.number, "verified", f"{name} has ended with 0, and {charger.current_a:.1f} A flow"
+                    )

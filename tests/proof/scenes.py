@@ -1,0 +1,142 @@
+"""What was once seen to go wrong, as scripts: each played first, and each a hole that a bug may open again.
+
+A scene is small: one or two things happen to a station that charges, or to one that has stopped, and it is followed for
+long enough to see what comes of it, over further lives where the past matters.
+"""
+
+import termios
+
+from tests.proof.hazards import BEGIN_S, FOR_EVER, TOOLS, Bay, Hazard, Script
+
+THREE = (Bay(), Bay(), Bay())
+#: In mid-charge.
+T = BEGIN_S
+
+
+def _scene(*hazards: Hazard, bays: tuple[Bay, ...] = THREE, end_s: float = 0.0, systemd: bool = True) -> Script:
+    hazards = (Hazard(0.0, "boot"), *hazards)
+    return Script(1, bays, hazards, end_s or max(one.t_s for one in hazards) + 12.0, systemd)
+
+
+def h(t_s: float, what: str, bay: int = -1, value: float | None = None, detail: str = "") -> Hazard:
+    return Hazard(T + t_s, what, bay, value, detail)
+
+
+SCENES: dict[str, Script] = {
+    # 1. The line is not ours alone.
+    "another speed": _scene(h(0, "settings", 0, float(termios.B115200)), h(4, "ask", 0, None, "stop")),
+    "a getty": _scene(h(0, "getty", 1, float(termios.B9600))),
+    "another speed, then killed": _scene(h(0, "settings", 0, float(termios.B115200)), h(0.1, "kill")),
+    "another speed, then ended": _scene(h(0, "settings", 2, float(termios.B38400)), h(0.1, "term")),
+    "locked by a stranger": _scene(Hazard(0.0, "lock", 0), bays=(Bay(running=True), Bay(), Bay()), end_s=16.0),
+    "answers stolen": _scene(h(0, "steal", 1)),
+    # 2. What must survive is not on disk.
+    "fsync hangs, begun, killed": _scene(
+        Hazard(1.0, "slow", -1, FOR_EVER, "fsync:disk:60"), h(4, "kill both"), h(8, "boot"), systemd=False, end_s=50.0
+    ),
+    "standard error stands still": _scene(
+        Hazard(1.0, "stderr", value=1),
+        h(4, "kill both"),
+        h(8, "stderr", value=0),
+        h(8, "boot"),
+        systemd=False,
+        end_s=50.0,
+    ),
+    "disk full": _scene(
+        Hazard(1.0, "slow", -1, 0.0, "write:disk:22:ENOSPC"), h(4, "kill both"), h(8, "boot"), systemd=False, end_s=50.0
+    ),
+    "stopped, then no power": _scene(
+        h(0, "ask", 1, None, "stop"), h(3, "power", detail="nothing more"), h(5, "boot"), end_s=T + 20
+    ),
+    "charging, then no power": _scene(h(0, "power", detail="nothing more"), h(3, "boot"), end_s=T + 20),
+    "charging, then the disk is torn": _scene(h(0, "power", detail="some of it, torn"), h(3, "boot"), end_s=T + 20),
+    "tripped, taken out, put back": _scene(
+        h(0, "fault", 0, None, "status_bits"),
+        h(5, "term"),
+        h(7, "edit", 0, None, "remove"),
+        h(7.2, "boot"),
+        h(14, "term"),
+        h(16, "edit", 0, None, "restore"),
+        h(16.1, "heal", 0),
+        h(16.2, "boot"),
+        end_s=T + 34,
+    ),
+    "stopped, then renamed": _scene(
+        h(0, "ask", 0, None, "stop"), h(4, "term"), h(6, "edit", 0, None, "rename"), h(6.2, "boot"), end_s=T + 22
+    ),
+    "file edited, then both killed": _scene(h(0, "edit", 1, None, "remove"), h(1, "kill both"), end_s=T + 10),
+    # 3. Two reasons in one field.
+    "stopped while it ends": _scene(h(0, "term"), h(0.2, "ask", 0, None, "stop"), h(4, "boot"), end_s=T + 20),
+    # 4. Verified by one witness, in one sample.
+    "says standby": _scene(
+        h(0, "fault", 0, None, "says_standby"), h(0, "fault", 0, None, "ignore_stop"), h(1, "ask", 0, None, "stop")
+    ),
+    "says standby now and then": _scene(
+        h(0, "fault", 1, None, "says_standby_now_and_then"),
+        h(0, "fault", 1, None, "ignore_stop"),
+        h(1, "ask", 1, None, "stop"),
+        end_s=T + 16,
+    ),
+    "says standby now and then, ended": _scene(
+        h(0, "fault", 1, None, "says_standby_now_and_then"), h(0, "fault", 1, None, "ignore_stop"), h(1, "term")
+    ),
+    "runs again": _scene(h(0, "fault", 2, None, "runs_again"), h(1, "ask", 2, None, "stop"), end_s=T + 24),
+    "crossed cables": _scene(bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=40.0),
+    "crossed cables, hot": _scene(
+        h(0, "fault", 0, 60.0, "over_temperature"), bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=T + 14
+    ),
+    "obeys once": _scene(
+        h(0, "fault", 0, None, "obeys_once"),
+        h(1, "ask", 0, None, "stop"),
+        h(4, "ask", 0, None, "start"),
+        h(14, "ask", 0, None, "stop"),
+        end_s=T + 26,
+    ),
+    # 5. One port delays another.
+    "half dead adapter, killed": _scene(
+        h(0, "slow", 0, 5.0, "open:port:60"), h(0.1, "fault", 0, None, "port_gone"), h(0.5, "heal", 0), h(1.5, "kill")
+    ),
+    "half dead adapter, estop": _scene(
+        h(0, "slow", 0, 5.0, "open:port:60"), h(1, "kill both"), h(1.3, "estop"), systemd=False
+    ),
+    "a port that closes never": _scene(h(0, "slow", 0, FOR_EVER, "close:port:60"), h(0.5, "kill")),
+    "a port that closes slowly": _scene(
+        h(0, "slow", 0, 5.0, "close:port:60"), h(0.5, "fault", 0, None, "port_gone"), h(1.5, "heal", 0), end_s=T + 16
+    ),
+    "settings take for ever": _scene(h(0, "slow", 0, FOR_EVER, "tcsetattr:port:60"), h(0.5, "kill")),
+    # 6. Limits that a restart forgets.
+    "ampere-hours over restarts": _scene(
+        *(one for t_s in (17.0, 37.0, 57.0, 77.0) for one in (Hazard(t_s, "term"), Hazard(t_s + 5, "boot"))),
+        bays=(Bay(small=True), Bay(), Bay()),
+        end_s=100.0,
+    ),
+    "precharge over restarts": _scene(
+        Hazard(1.0, "fault", 0, None, "precharge_no_rise"),
+        *(one for t_s in (17.0, 37.0, 57.0, 77.0) for one in (Hazard(t_s, "term"), Hazard(t_s + 5, "boot"))),
+        bays=(Bay(small=True, soc_pct=-100.0), Bay(), Bay()),
+        end_s=100.0,
+    ),
+    # 7. Conditions that come and go.
+    "limit goes back": _scene(
+        h(0, "fault", 0, None, "limit_reverts"), bays=(Bay(temperature_c=8.0), Bay(), Bay()), end_s=T + 26
+    ),
+    "apart for most of the time": _scene(h(0, "comes", 0, 2.0, "voltage_v"), end_s=T + 30),
+    # 8. Not the battery that is meant.
+    "a pack of 36 V": _scene(bays=(Bay(cells=10, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
+    "a pack that collapses": _scene(h(0, "fault", 1, None, "pack_collapsed")),
+    "a BMU that is frozen": _scene(h(0, "fault", 1, None, "bmu_frozen"), end_s=T + 76),
+    "ports swapped in the file": _scene(h(0, "term"), h(4, "edit", 0, None, "swap"), h(4.2, "boot"), end_s=T + 36),
+    # 9. Our own exception.
+    "a BMU that reads 0.00 V": _scene(
+        h(0, "bmu", 0, 0.0, "voltage_v:is:1"), h(0, "fault", 0, None, "ignore_stop"), end_s=T + 16
+    ),
+    # 11. The last words.
+    "cut off, then killed": _scene(
+        h(0, "fault", 0, None, "charger_cut_off"), h(8, "kill both"), h(9, "boot"), end_s=T + 24
+    ),
+    # 12. Others on the bus.
+    **{f"on the bus: {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
+    "a temperature that is forged": _scene(
+        h(0, "bus", 1, None, "forged"), h(1, "fault", 1, 60.0, "over_temperature"), end_s=T + 16
+    ),
+}

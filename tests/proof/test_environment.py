@@ -1,0 +1,83 @@
+"""The environment's campaign in its short form, and the judge: nothing is found here, and each bug that is put in."""
+
+from collections.abc import Callable
+
+import pytest
+from orchestrator.service.kept import Kept
+
+from orchestrator.service import kept, laststop
+from orchestrator.sim.charger_frames import Kind
+from tests.proof.environment import play, smallest
+from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
+from tests.proof.lives import live
+from tests.proof.scenes import SCENES
+
+#: Scenes and random scripts that are played each time; `make campaign` plays all, and a thousand.
+SHORT: tuple[str | int, ...] = (
+    "answers stolen",
+    "obeys once",
+    "a port that closes never",
+    "settings take for ever",
+    0,
+    3,
+)
+Patch = pytest.MonkeyPatch
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_nothing_is_found(name: str | int) -> None:
+    _, lived = play(name)
+    assert not lived.wrong, "again: python -m tests.proof.environment --scene … or --seed … -v"
+    assert lived.charged, "a station in which nobody charges proves nothing"
+
+
+def test_a_script_is_its_json_and_plays_the_same_again() -> None:
+    script = Script.of_seed(3)
+    again = Script.from_json(script.to_json())
+    assert again == script
+    first, second = live(script), live(again)
+    assert (first.wrong, first.said) == (second.wrong, second.said)
+
+
+def test_scenes_and_random_scripts_begin_with_a_service() -> None:
+    for script in (*SCENES.values(), *map(Script.of_seed, range(50))):
+        assert script.hazards[0] == Hazard(0.0, "boot")
+        assert script.end_s > max(one.t_s for one in script.hazards)
+
+
+def scene(*hazards: Hazard, end_s: float = BEGIN_S + 16, bays: tuple[Bay, ...] = (Bay(),) * 3) -> Script:
+    return Script(1, bays, (Hazard(0.0, "boot"), *hazards), end_s, systemd=False)
+
+
+def forgets(patch: Patch) -> None:
+    patch.setattr(kept.Kept, "of", classmethod(lambda _cls, _memory: Kept()))
+
+
+def one_port_only(patch: Patch) -> None:
+    write = laststop._Line.write
+    patch.setattr(laststop._Line, "write", lambda line, frame: write(line, frame) if line.name[-1] == "1" else None)
+
+
+KILLED = (Hazard(BEGIN_S, "kill both"), Hazard(BEGIN_S + 2, "boot"))
+#: The invariant → a bug that breaks it, and a script that shows it.
+BUGS: dict[str, tuple[Callable[[Patch], None], Script]] = {
+    "by itself": (forgets, scene(*KILLED)),
+    "not understood": (one_port_only, scene(Hazard(BEGIN_S, "kill"), Hazard(BEGIN_S + 1, "kill guardian"))),
+}
+
+
+@pytest.mark.parametrize("name", BUGS)
+def test_a_bug_is_found_and_its_script_made_small(name: str, monkeypatch: Patch) -> None:
+    bug, script = BUGS[name]
+    assert not live(script).wrong, "the bug must be what breaks it"
+    bug(monkeypatch)
+    assert name in live(script).kinds
+    assert len(smallest(script).hazards) <= len(script.hazards)
+
+
+def test_who_says_standby_while_current_flows_is_believed_only_where_nobody_knows_better() -> None:
+    """Both witnesses tell the same lie: nobody can know, so nothing is demanded."""
+    lies = tuple(Hazard(8.0, "lie", 0, 0.0, f"{kind.name}:1") for kind in (Kind.CURRENT, Kind.OPERATION))
+    deaf = Hazard(8.0, "fault", 0, None, "ignore_stop")
+    blind = (*lies, Hazard(8.0, "bmu", 0, 0.0, "current_a:is:1"))
+    assert not live(scene(*blind, deaf, end_s=24.0)).wrong

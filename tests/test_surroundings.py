@@ -1,0 +1,130 @@
+"""What lies in the working directory, and what kind of terminal or pipe we speak to, changes nothing."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from orchestrator.config.shipped import shipped_dir
+from tests.whole.station import die_with_parent
+
+ROOT = Path(__file__).resolve().parent.parent
+STATION = shipped_dir() / "configs" / "stations" / "one-bay.yaml"
+#: Names of what any of our verbs imports sooner or later.
+TRAPS = ("serial", "yaml", "can", "canopen", "transitions", "durand", "rich", "json", "argparse", "selectors", "queue")
+
+#: As a console script, and by the interpreter.
+WAYS = {
+    "module": ("-m", "orchestrator"),
+    "script": ("-c", "import sys; from orchestrator.__main__ import main; sys.exit(main())"),
+}
+
+
+@pytest.fixture(name="folder")
+def _folder(tmp_path: Path) -> Path:
+    """Somebody else's files wait in it for whoever imports by name."""
+    for name in TRAPS:
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'RAN')!r}, 'a').write('{name} ')", encoding="utf-8")
+    return tmp_path
+
+
+def run(
+    way: str, folder: Path, *words: str, env: Mapping[str, str] | None = None, **streams: int
+) -> subprocess.CompletedProcess[str]:
+    process = subprocess.Popen(
+        [sys.executable, *(("-P",) if way == "script" else ()), *WAYS[way], *words],
+        env={**os.environ, "PYTHONPATH": str(ROOT), "ORCHESTRATOR_SOCKET": str(folder / "no.sock"), **(env or {})},
+        cwd=folder,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+        preexec_fn=die_with_parent,
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams},  # type: ignore[call-overload]
+    )
+    try:
+        out, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    return subprocess.CompletedProcess(words, process.returncode, out, err)
+
+
+#: Verbs that get far without devices.
+VERBS: tuple[tuple[str, ...], ...] = (
+    ("status",),
+    ("stop", "--all"),
+    ("check", str(STATION)),
+    ("probe", str(STATION)),
+    ("estop", str(STATION)),
+    ("run", "nowhere.yaml"),
+    ("schema", "station"),
+    ("demo", "--fault", "list"),
+)
+
+
+@pytest.mark.parametrize("path", [str(ROOT), f"{os.pathsep}{ROOT}", f"{ROOT}{os.pathsep}."])
+@pytest.mark.parametrize("words", VERBS, ids=lambda words: words[0])
+@pytest.mark.parametrize("way", WAYS)
+def test_nothing_in_the_working_directory_is_run(way: str, words: tuple[str, ...], path: str, folder: Path) -> None:
+    done = run(way, folder, *words, env={"PYTHONPATH": path})
+    assert not (folder / "RAN").exists(), (folder / "RAN").read_text(encoding="utf-8")
+    assert "Traceback" not in done.stderr
+
+
+def test_nor_by_the_processes_that_are_started(folder: Path) -> None:
+    """The controller is a process of its own; its station is there, its devices are not."""
+    station = STATION.read_text(encoding="utf-8").replace("interface: socketcan", "interface: virtual")
+    (folder / "station.yaml").write_text(station, encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, *WAYS["module"], "run"],
+        env={**os.environ, "PYTHONPATH": f"{os.pathsep}{ROOT}"},
+        cwd=folder,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=die_with_parent,
+    )
+    try:
+        assert process.stderr is not None
+        lines = [process.stderr.readline() for _ in range(3)]
+        assert "OFFLINE" in lines[-1], lines  # it has opened ports and buses
+    finally:
+        process.terminate()
+        process.communicate(timeout=20)
+    assert not (folder / "RAN").exists(), (folder / "RAN").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+@pytest.mark.parametrize("words", [*VERBS, ("--help",), ("estop", "--help"), ("check", "ungültig\udc80.yaml")], ids=str)
+def test_no_terminal_is_too_poor(words: tuple[str, ...], encoding: str, tmp_path: Path) -> None:
+    done = run("module", tmp_path, *words, env={"PYTHONIOENCODING": encoding})
+    assert "Traceback" not in done.stderr
+    assert done.stdout or done.stderr or done.returncode == 0
+
+
+@pytest.mark.parametrize("words", [("demo", "--fault", "list"), ("schema", "station"), ("check", "none.yaml")], ids=str)
+def test_an_output_that_takes_nothing_is_told_without_a_traceback(words: tuple[str, ...], tmp_path: Path) -> None:
+    with Path("/dev/full").open("wb") as full:
+        done = run("module", tmp_path, *words, stdout=full.fileno())
+    assert "Traceback" not in done.stderr and "Exception ignored" not in done.stderr
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        done = run("module", tmp_path, *words, stdout=writer)
+    finally:
+        os.close(writer)
+    assert "Traceback" not in done.stderr and "Exception ignored" not in done.stderr
+
+
+def test_streams_that_are_closed_are_no_error(tmp_path: Path) -> None:
+    script = '"$0" -m orchestrator "$@" <&- >&- 2>&-'
+    for words, status in ((("schema", "station"), 0), (("status", "--watch"), 1), (("check", "none.yaml"), 1)):
+        done = subprocess.run(
+            ["/bin/sh", "-c", script, sys.executable, *words],
+            env={**os.environ, "PYTHONPATH": str(ROOT), "ORCHESTRATOR_SOCKET": "none.sock"},
+            cwd=tmp_path,
+            timeout=30,
+            check=False,
+        )
+        assert done.returncode == status, words

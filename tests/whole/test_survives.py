@@ -1,0 +1,181 @@
+"""What a restart must not forget, by real processes: disks that are full, readers that stand still, edited files."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import ServiceError
+from orchestrator.sim.client import PlantProcess
+from tests.waiting import wait_until
+from tests.whole.station import Document, Service, whole_station
+
+HELD = "stopped by the operator; start to go on"
+Station = tuple[PlantProcess, Service]
+
+
+@pytest.fixture(name="station")
+def _station(tmp_path: Path) -> Iterator[Station]:
+    with whole_station(tmp_path, 2) as (plant, service):
+        yield plant, service
+
+
+def charging(plant: PlantProcess, service: Service, *bays: int) -> None:
+    service.wait("CHARGING", [f"bay-{bay}" for bay in bays])
+    wait_until(lambda: all(plant.state(bay)["current_a"] > 13 for bay in bays), 10, "the current")
+
+
+def kept(service: Service) -> dict[str, Document]:
+    path = service.directory / "run" / "journal" / "persisted.json"
+    document: Document = json.loads(path.read_text(encoding="utf-8"))
+    return {entry["bay"]: entry for entry in document["entries"]}
+
+
+def without(name: str) -> Callable[[Document], None]:
+    def change(document: Document) -> None:
+        document["bays"] = [bay for bay in document["bays"] if bay["name"] != name]
+
+    return change
+
+
+def test_an_accepted_stop_outlives_a_kill_right_after_it(station: Station) -> None:
+    plant, service = station
+    charging(plant, service.start(), 1, 2)
+    assert service.ask("stop", "bay-1") == {"bay-1": ""}
+    service.kill_all()
+    assert kept(service)["bay-1"]["hold"] == HELD
+    service.start()
+    assert "then start" in service.wait("IDLE")["bay-1"]["reason"]
+    assert plant.state(1)["operation"] == 0
+    assert kept(service)["bay-1"]["hold"] == HELD
+
+
+def test_a_stop_while_the_service_ends_is_kept(station: Station) -> None:
+    """systemctl restart, and somebody presses stop in the same second."""
+    plant, service = station
+    charging(plant, service.start(), 1, 2)
+    service.signal(signal.SIGTERM)
+    try:
+        accepted = service.ask("stop", "bay-1") == {"bay-1": ""}
+    except ServiceError:
+        accepted = False  # it was late: nobody has told that it was accepted
+    assert service.ended() == 0
+    service.start()
+    if accepted:
+        assert service.wait("IDLE")["bay-1"]["reason"] == HELD
+    charging(plant, service, 2)
+
+
+def test_a_reader_that_stands_still_delays_neither_the_stop_nor_what_is_kept(station: Station) -> None:
+    """Ctrl-S on the terminal, or a log collector that hangs: the pipe is full before the service says a word."""
+    plant, service = station
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    try:
+        while True:
+            os.write(writer, b"x" * 4096)
+    except BlockingIOError:
+        os.set_blocking(writer, True)
+    charging(plant, service.start(stderr=writer), 1, 2)
+    assert service.ask("stop", "bay-1") == {"bay-1": ""}
+    wait_until(lambda: plant.state(1)["operation"] == 0, 2, "the stop")
+    began_s = time.monotonic()
+    service.signal(signal.SIGTERM)
+    assert service.ended() == 0
+    assert time.monotonic() - began_s < 8
+    assert service.path_of("bay-2")[-2:] == ["STOPPING", "IDLE"], "the journal is whole"
+    os.close(reader)
+    os.close(writer)
+    service.start()
+    assert service.wait("IDLE")["bay-1"]["reason"] == HELD
+
+
+def test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one(station: Station) -> None:
+    plant, service = station
+    charging(plant, service.start(), 1, 2)
+    journal = service.directory / "run" / "journal"
+    (journal / "persisted.json.new").symlink_to("/dev/full")
+    answer = service.ask("stop", "bay-1")["bay-1"]
+    assert answer.startswith("done, but not kept: a restart would forget what changes: ")
+    assert answer.endswith("persisted.json: No space left on device")
+    assert plant.state(1)["operation"] == 0
+    service.signal(signal.SIGTERM)
+    assert service.ended() == 1
+    assert service.log().splitlines()[-1] == f"ended: NOT kept: {journal / 'persisted.json'}: No space left on device"
+    assert (plant.state(1)["operation"], plant.state(2)["operation"]) == (0, 0)
+
+
+def test_a_charger_that_the_station_file_has_lost_is_stopped_by_the_next_start(station: Station) -> None:
+    plant, service = station
+    charging(plant, service.start(), 1, 2)
+    before = service.file.read_text(encoding="utf-8")
+    service.edit(without("bay-1"))
+    service.kill_all()
+    assert plant.state(1)["operation"] == 1
+    service.start()
+    wait_until(lambda: plant.state(1)["operation"] == 0, 10, "the stop")
+    wait_until(lambda: service.strays()[0]["verified"], 10, "two replies that show standby")
+    (stray,) = service.strays()
+    assert (stray["bay"], stray["state"]) == ("bay-1", "IDLE")
+    assert "the station file has no bay on this port, but its charger may be running: stopping it" in service.log()
+    service.signal(signal.SIGTERM)
+    assert service.ended() == 0
+    service.file.write_text(before, encoding="utf-8")
+    bay = service.start().wait("IDLE")["bay-1"]
+    assert "while its charger was running" in bay["reason"]
+    assert plant.state(1)["operation"] == 0
+
+
+def test_one_that_does_not_stop_makes_the_end_a_bad_one(station: Station) -> None:
+    plant, service = station
+    charging(plant, service.start(), 1, 2)
+    plant.inject("ignore_stop", 1)
+    service.edit(without("bay-1"))
+    service.kill_all()
+    service.start()
+    service.wait("IDLE", ["bay-2"])
+    assert [stray["verified"] for stray in service.strays()] == [False]
+    service.signal(signal.SIGTERM)
+    assert service.ended() == 1
+    port = service.directory / "bay-1"
+    assert service.log().splitlines()[-1] == f"ended: NOT verified: bay-1 on {port}"
+    service.start()
+    assert [stray["bay"] for stray in service.strays()] == ["bay-1"], "and the next run knows of it, too"
+
+
+def test_two_bays_whose_ports_were_changed_over_are_held(station: Station) -> None:
+    plant, service = station
+    charging(plant, service.start(), 1, 2)
+    service.signal(signal.SIGTERM)
+    assert service.ended() == 0
+
+    def swap(document: Document) -> None:
+        one, other = (bay["charger"] for bay in document["bays"])
+        one["port"], other["port"] = other["port"], one["port"]
+
+    service.edit(swap)
+    service.start()
+    bays = service.wait("IDLE", ["bay-1", "bay-2"])
+    for bay in bays.values():
+        assert "when this service last ran" in bay["reason"]
+        assert "see what is wired where; start to go on" in bay["reason"]
+    assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
+
+
+def test_a_second_service_on_the_same_journal_ends_with_a_sentence(station: Station, tmp_path: Path) -> None:
+    _, service = station
+    service.start()
+    other = tmp_path / "other.yaml"
+    text = service.file.read_text(encoding="utf-8")
+    other.write_text(text.replace("run/orchestrator.sock", "run/other.sock"), encoding="utf-8")
+    command = [sys.executable, "-m", "orchestrator", "run", str(other)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode != 0
+    assert f"another service keeps its state in {tmp_path / 'run' / 'journal'}: stop it first" in done.stderr
+    assert service.status()
