@@ -99,6 +99,10 @@ class OtherMasters:
     def clear(self) -> None:
         """The node booted: nothing is answered any more."""
         self._open.clear()
+        self._forget_transfer()
+
+    def _forget_transfer(self) -> None:
+        """Nothing of a longer transfer comes any more."""
         self._going = False
         self._end()
 
@@ -227,7 +231,7 @@ class OtherMasters:
         while self._open and now_s - self._open[0].t_s > FORGET_S:
             self._open.popleft()
         if self._going and now_s - self._going_s > FORGET_S:
-            self._going = False
+            self._forget_transfer()
         if self._transfer is not None and now_s - self._transfer_s > TRANSFER_S:
             self._end()
 
