@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import pytest
+from orchestrator.service.kept import Kept
 
 from orchestrator.service import kept, laststop
-from orchestrator.service.kept import Kept
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.environment import play, smallest
 from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
