@@ -52,6 +52,14 @@ def proved_to_last(f: Facts) -> bool:
     return f.stopped and f.charger.online and f.now_s - proof[0] >= LASTS_S
 
 
+def _runs_again(f: Facts) -> bool:
+    """It was stopped before, in vain: a second reply that shows it is no stray measurement."""
+    since_s, stopping_s, reading = f.memory.since_s, f.memory.stopping_s, f.reading
+    if since_s is None or stopping_s is None or f.now_s - stopping_s < OBEY_STOP_S:
+        return False
+    return f.unordered or (f.runs and reading is not None and reading.t_s > since_s)
+
+
 def gives_up(f: Facts) -> bool:
     """The charger has had its time.
 
@@ -60,9 +68,7 @@ def gives_up(f: Facts) -> bool:
     """
     memory = f.memory
     if memory.state is State.STOPPING:
-        return f.state_s >= OBEY_STOP_S or (
-            memory.stopping_s is not None and f.now_s - memory.stopping_s >= OBEY_STOP_S
-        )
+        return f.state_s >= OBEY_STOP_S or _runs_again(f)
     if memory.state is not State.STARTING:
         return False
     if f.unordered and f.state_s >= OBEY_STOP_S:
