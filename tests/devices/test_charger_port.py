@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -661,6 +662,23 @@ def test_a_line_that_cannot_even_be_closed_does_not_end_the_thread(pty: Pty, cha
         bench.wait_online()
         pty.unplug()
         bench.wait_problem("no such port")
+        pty.plug()
+        bench.wait_online()
+
+
+def test_a_close_that_hangs_is_no_line_that_is_well(pty: Pty, charger: FakeCharger) -> None:
+    goes_on = Event()
+
+    class Stuck(SerialLine):
+        def close(self) -> None:
+            goes_on.wait(30)
+            super().close()
+
+    with running(pty.path, open_line=lambda: Stuck.open(pty.path)) as bench:
+        bench.wait_online()
+        pty.unplug()
+        bench.wait_problem("unplugged")
+        goes_on.set()
         pty.plug()
         bench.wait_online()
 
