@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.service import guardian, laststop, supervisor
+from orchestrator.service import guardian, lastline, supervisor
 from orchestrator.service.estop import VERIFY_S, Options
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,9 +39,9 @@ def seconds(key: str) -> float:
 def test_systemd_waits_for_longer_than_the_program_does() -> None:
     closing_s = supervisor.STOP_S + guardian.END_S + guardian.VERIFY_S
     assert seconds("TimeoutStopSec") > closing_s
-    assert seconds("TimeoutStopSec") > VERIFY_S + laststop.ROUND_S  # of ExecStopPost
+    assert seconds("TimeoutStopSec") > VERIFY_S + lastline.ROUND_S  # of ExecStopPost
     assert seconds("TimeoutStartSec") > guardian.STARTUP_S
-    assert seconds("WatchdogSec") >= 5 * max(guardian.WATCHDOG_S, laststop.ROUND_S)
+    assert seconds("WatchdogSec") >= 5 * max(guardian.WATCHDOG_S, lastline.ROUND_S)
 
 
 def test_the_service_is_never_given_up() -> None:
