@@ -76,9 +76,9 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("G6", "steps that come late"),
     Entry("G7", "clock jump, suspended machine", "ages are monotonic: the wall clock may jump as it likes"),
     Entry("G8", "disk full, log blocked", "charging goes on, and `status` says it; a lost list of latched faults, "
-          "`service/kept.py`, holds every bay"),
+          "`service/store.py`, holds every bay"),
     Entry("G9", "two services", "`link/serial.py` (lock of the port), `service/control.py` (socket): the second ends"),
-    Entry("G10", "power lost in mid-charge", "`service/kept.py`: a charge that nobody ended is not resumed"),
+    Entry("G10", "power lost in mid-charge", "`service/store.py`: a charge that nobody ended is not resumed"),
     Entry("P1", "bad policy", "`config/`: refused with every error's line; `run` does not start"),
     Entry("P2", "policy changed while charging", "read anew on SIGHUP, taken over by a bay when it stands by"),
     Entry("P3", "policy of another battery or charger", "`config/station_rules.py`: station and policy must agree"),
