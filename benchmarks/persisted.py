@@ -1,6 +1,6 @@
 """What it costs to keep: from a change to its being on the disk, and of the control loop's time.
 
-    python -m benchmarks.persisted [DIRECTORY]     default: the present one; the disk is what is measured
+python -m benchmarks.persisted [DIRECTORY]     default: the present one; the disk is what is measured
 """
 
 import sys

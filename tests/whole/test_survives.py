@@ -144,6 +144,24 @@ def test_a_disk_that_hangs_delays_no_stop_and_is_named_at_the_end(station: Stati
     assert "ended in mid-charge" in reason, "the disk knows of its beginning, and of no end"
 
 
+def test_a_disk_that_does_not_tell_the_past_holds_every_bay_after_the_stops(station: Station) -> None:
+    plant, healthy = station
+    charging(plant, healthy.start(), 1, 2)
+    healthy.kill_all()
+    service = Service(healthy.directory, json.loads(healthy.file.read_text()), ("-m", "tests.whole.worn", "now-read"))
+    try:
+        service.start()
+        bays = service.wait("IDLE", ["bay-1", "bay-2"])
+        assert all("does not answer: nobody knows which faults were latched" in bay["reason"] for bay in bays.values())
+        assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
+        service.signal(signal.SIGTERM)
+        assert service.ended() == 1
+        assert "NOT kept: " in service.log().splitlines()[-1]
+    finally:
+        service.close()
+    assert {entry["running"] for entry in kept(healthy).values()} == {True}, "what was there was left alone"
+
+
 def test_a_charger_that_the_station_file_has_lost_is_stopped_by_the_next_start(station: Station) -> None:
     plant, service = station
     charging(plant, service.start(), 1, 2)

@@ -1,7 +1,7 @@
 """The unchanged service on a disk that hangs from SIGUSR1 on: `python -m tests.whole.worn CALL [FD] STATION`.
 
-CALL is the call of the kernel's that does not return any more, for the store and for the journal. Without FD it is the
-guardian, and starts itself as its controller.
+CALL is the call of the kernel's that does not return any more, for the store and for the journal; with "now-" before it
+it never does. Without FD it is the guardian, and starts itself as its controller.
 """
 
 import os
@@ -18,7 +18,9 @@ class Worn:
     """`os`, but for one call."""
 
     def __init__(self, call: str) -> None:
-        self._call = call
+        self._call = call.removeprefix("now-")
+        if self._call != call:
+            ARMED.set()
 
     def __getattr__(self, name: str) -> object:
         if name == self._call and ARMED.is_set():
