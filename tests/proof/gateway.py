@@ -23,7 +23,8 @@ from orchestrator.config.shipped import shipped_dir
 from orchestrator.config.station import Station
 from orchestrator.errors import ServiceError
 from orchestrator.link import can as can_module
-from orchestrator.service import control, controller, estop, guardian, holder
+from orchestrator.link import holder
+from orchestrator.service import boot, control, controller, estop, guardian, witness
 from tests.proof.virtual_can import BusWire, Driver
 from tests.proof.virtual_disk import Disk
 from tests.proof.virtual_kernel import ROOT, Kernel
@@ -33,13 +34,14 @@ from tests.proof.virtual_rig import Nature, VirtualRig
 from tests.proof.virtual_time import Time
 
 SMALL_AH, SMALL_RISE_S = 0.15, 24.0
+PYTHON = ("/usr/bin/python3", "-P", "-m")
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10
 JOURNAL, SOCKET = f"{ROOT}journal", f"{ROOT}socket"
 #: What is changed in the shipped policy for a bay whose charges are to be seen to their end.
 SMALL = {"max_ah: 44 ": f"max_ah: {SMALL_AH} ", "within_min: 5 ": f"within_min: {SMALL_RISE_S / 60} "}
 #: What is asked of a control socket is answered within this, or not at all.
-ANSWER_S = 5.0
+ANSWER_S, POLL_S = 5.0, 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +156,7 @@ class Gateway:
         self.service: Process | None = None  #: the guardian of the present life
         self.controller: Process | None = None
         self.on_end: Callable[[Process], None] = lambda _: None
+        self.boots = 1
         self._battery = battery
         self._dice = Random(seed)
         self._lines: dict[int, str] = {}
@@ -176,6 +179,8 @@ class Gateway:
             control.ControlSocket: partial(Door, self),
             control.ask: self._ask,
             holder.control_socket: self._holder,
+            witness._listens: lambda _: self.door is not None,
+            boot.boot_id: lambda: f"boot {self.boots}",
             can_module._open_bus: lambda _: Driver(self.bus, self.time),
         }
         exchange(self._stack, replacements(self.kernel, self.processes), also)
@@ -209,15 +214,17 @@ class Gateway:
 
     def boot(self) -> Process:
         """`orchestrator run`, as systemd would."""
-        self.service = self._start("guardian", lambda: guardian.guard([str(self.station_file)]))
+        words = (*PYTHON, "orchestrator", "run", str(self.station_file))
+        self.service = self._start("guardian", words, lambda: guardian.guard([str(self.station_file)]))
         return self.service
 
     def estop(self, *words: str) -> Process:
         """`orchestrator estop` on the station file, or as it is told."""
-        return self._start("estop", lambda: estop.main(list(words) or [str(self.station_file)]))
+        options = list(words) or [str(self.station_file)]
+        return self._start("estop", (*PYTHON, "orchestrator", "estop", *options), lambda: estop.main(options))
 
-    def _start(self, name: str, main: Callable[[], int]) -> Process:
-        process = self.processes.new(name)
+    def _start(self, name: str, words: Sequence[str], main: Callable[[], int]) -> Process:
+        process = self.processes.new(name, *words)
         return process.run(lambda: self._ends(process, main()))
 
     def _controller(self, process: Process, command: Sequence[str]) -> Callable[[], int]:
@@ -252,6 +259,7 @@ class Gateway:
         for stream in self.kernel.output.values():
             stream.stopped = False
         self.bus.drivers.clear()
+        self.boots += 1
         return self.disk.cut(self._dice, how)
 
     # --- what is said and asked ---------------------------------------------------------------------------------------
@@ -279,7 +287,12 @@ class Gateway:
 
     def _answer(self, door: Door, asked: Asked, on_answer: Callable[[Asked], None]) -> None:
         try:
-            asked.answer = door.handler(asked.request)
+            answer = door.handler(asked.request)
+            while callable(answer):  # it comes later
+                self.time.wait(self.time.now_s + POLL_S)
+                later = answer()
+                answer = answer if later is None else later
+            asked.answer = answer
         except ServiceError as error:
             asked.error = str(error)
         asked.answered_s = self.time.now_s

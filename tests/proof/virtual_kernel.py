@@ -10,6 +10,7 @@ import fcntl
 import os
 import posixpath
 import select
+import sys
 import termios
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -30,6 +31,7 @@ from tests.proof.virtual_tty import Tty
 DESCRIPTORS = count(100_001)
 #: Everything below it is ours; other paths are the real kernel's.
 ROOT = "/virtual/"
+TIOCGEXCL = 0x80045440  #: asm-generic/ioctls.h
 STDOUT, STDERR = 1, 2
 #: A socket takes this many messages.
 BACKLOG = 200
@@ -132,6 +134,23 @@ class File:
     flags: int = 0
     at: int = 0
     owners: int = 0
+    locker: Any = None  #: the process that has locked it
+
+
+class Proc:
+    """/proc, as far as the product reads it; without processes of ours it is the real one."""
+
+    def has(self, _path: str) -> bool:
+        return False
+
+    def text(self, _path: str) -> str:
+        return ""
+
+    def listdir(self, _path: str) -> list[str]:
+        return []
+
+    def link(self, _path: str) -> str:
+        return ""
 
 
 class Kernel:
@@ -144,6 +163,7 @@ class Kernel:
         self.disk = disk or Disk(ROOT.rstrip("/"))
         self.output = {STDOUT: Stream(time), STDERR: Stream(time)}
         self.on_said: Callable[[Any, str], None] = lambda _process, _text: None
+        self.proc = Proc()
         self._open: dict[int, tuple[File, set[Any]]] = {}  # the file, and whose descriptor it is
 
     def add(self, path: str) -> Tty:
@@ -224,6 +244,8 @@ class Kernel:
         name = os.fspath(path)
         if isinstance(name, str) and (name == "/dev/tty" or "\0" in name):
             raise ValueError("embedded null byte") if "\0" in name else fails(errno.ENXIO, name)
+        if self.proc.has(name):
+            return self._new(File(name, Inode(0, bytearray(self.proc.text(name).encode())), flags))
         if not self.is_ours(name):
             return os.open(path, flags, mode, dir_fd=dir_fd)
         self.calls("open", name)
@@ -234,6 +256,8 @@ class Kernel:
             return self._new(File(name, self.disk.open(name, flags), flags))
         if not tty.present:
             raise fails(errno.ENOENT, name)
+        if tty.exclusive:
+            raise fails(errno.EBUSY, name)
         tty.opened += 1
         return self._new(File(name, tty, flags))
 
@@ -362,6 +386,8 @@ class Kernel:
 
     def listdir(self, path: Any = ".") -> list[str]:
         name = os.fspath(path)
+        if self.proc.has(name):
+            return self.proc.listdir(name)
         if not self.is_ours(name):
             return list(real("listdir")(path))
         self.calls("open", name)
@@ -389,6 +415,10 @@ class Kernel:
             raise fails(errno.ENOENT, path)
         number = sum(path.encode())
         return SimpleNamespace(st_mode=0o020600, st_size=0, st_ino=number, st_dev=2, st_rdev=number, st_nlink=1)
+
+    def readlink(self, path: Any, **_: Any) -> str:
+        name = os.fspath(path)
+        return self.proc.link(name) if self.proc.has(name) else str(real("readlink")(path))
 
     def exists(self, path: Any) -> bool:
         try:
@@ -459,9 +489,13 @@ class Kernel:
             raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY))
         return what
 
-    def ioctl(self, fd: int, *_: object) -> int:
-        self._tty(fd)
+    def ioctl(self, fd: int, request: int = 0, argument: Any = 0, *_: object) -> int:
+        tty = self._tty(fd)
         self.calls("ioctl", self.file(fd).path)
+        if request in (termios.TIOCEXCL, termios.TIOCNXCL):
+            tty.exclusive = request == termios.TIOCEXCL
+        elif request == TIOCGEXCL:
+            argument[:4] = int(tty.exclusive).to_bytes(4, sys.byteorder)
         return 0
 
     def flock(self, fd: int, operation: int) -> None:
@@ -472,6 +506,7 @@ class Kernel:
             what.lock = None if what.lock is file else what.lock
             return
         self.calls("flock", file.path)
+        file.locker = self.me
         while what.lock not in (None, file):
             if operation & fcntl.LOCK_NB:
                 raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
@@ -505,7 +540,7 @@ class Kernel:
         fake_os = SimpleNamespace(**vars(os))
         for name in (
             "open", "close", "read", "write", "pipe", "fsync", "ftruncate", "lseek", "rename", "unlink", "mkdir",
-            "makedirs", "listdir", "stat", "fstat", "isatty",
+            "makedirs", "listdir", "stat", "fstat", "isatty", "readlink",
         ):  # fmt: skip
             setattr(fake_os, name, getattr(self, name))
         fake_os.replace, fake_os.remove, fake_os.fdatasync = self.rename, self.unlink, self.fsync
@@ -518,6 +553,7 @@ class Kernel:
         fake_os.path.getsize = lambda path: self.stat(path).st_size
         fake_termios = SimpleNamespace(**vars(termios))
         fake_termios.tcgetattr, fake_termios.tcsetattr = self.tcgetattr, self.tcsetattr
+        fake_termios.tcflow = lambda fd, _action: self._tty_call("tcflow", fd) and None
         fake_termios.tcflush, fake_termios.tcdrain = self.tcflush, lambda fd: self._tty_call("tcdrain", fd) and None
         fake_select = SimpleNamespace(**vars(select))
         fake_select.select, fake_select.poll = self.select, lambda: Poll(self)

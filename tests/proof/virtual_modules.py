@@ -155,13 +155,18 @@ class Output(io.TextIOBase):
 
 
 class _Sys:
-    """`sys` with other streams."""
+    """`sys` with other streams, and of these others again for each process that exchanges them."""
 
     def __init__(self, kernel: Kernel) -> None:
-        self.stdout, self.stderr = Output(kernel, 1), Output(kernel, 2)
+        self.__dict__.update(_kernel=kernel, _usual={"stdout": Output(kernel, 1), "stderr": Output(kernel, 2)}, _own={})
 
     def __getattr__(self, name: str) -> Any:
+        if name in self._usual:
+            return self._own.get((self._kernel.me, name), self._usual[name])
         return getattr(sys, name)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        self._own[self._kernel.me, name] = value
 
 
 class _Queues:

@@ -9,14 +9,14 @@ import os
 import select
 import signal
 import socket
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import count
 from math import inf
 from types import SimpleNamespace
 from typing import Any, Self
 
-from tests.proof.virtual_kernel import BACKLOG, Death, File, Kernel, Poll, Socket
+from tests.proof.virtual_kernel import BACKLOG, Death, File, Kernel, Poll, Proc, Socket
 from tests.proof.virtual_time import Runner, StuckError
 
 PIDS = count(5000)
@@ -30,8 +30,9 @@ class Exit(BaseException):
 class Process:
     """One process: its threads are the runners that name it."""
 
-    def __init__(self, name: str, kernel: Kernel) -> None:
-        self.name, self.pid = name, next(PIDS)
+    def __init__(self, name: str, kernel: Kernel, words: Sequence[str] = ()) -> None:
+        self.name, self.pid, self.words = name, next(PIDS), tuple(words)
+        self.parent = 1
         self.frozen = False
         self.waiting: list[Runner] = []  #: threads that are to go on when it is thawed
         self.handlers: dict[int, Any] = {}
@@ -117,10 +118,11 @@ class Processes:
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
         self.all: dict[int, Process] = {}
+        kernel.proc = VirtualProc(self)
         self.on_spawn: Callable[[Process, Sequence[str]], Callable[[], object]] = lambda *_: lambda: 127
 
-    def new(self, name: str) -> Process:
-        process = Process(name, self.kernel)
+    def new(self, name: str, *words: str) -> Process:
+        process = Process(name, self.kernel, words)
         self.all[process.pid] = process
         return process
 
@@ -129,6 +131,7 @@ class Processes:
     def extend_os(self, fake_os: SimpleNamespace) -> None:
         fake_os.posix_spawn, fake_os.pidfd_open, fake_os.waitid = self._spawn, self._pidfd_open, self._waitid
         fake_os.getpid = lambda: self.kernel.me.pid if self.kernel.me is not None else os.getpid()
+        fake_os.getppid = lambda: self.kernel.me.parent if self.kernel.me is not None else os.getppid()
         fake_os._exit = self._exit
 
     def _exit(self, status: int) -> None:
@@ -136,7 +139,8 @@ class Processes:
         self.kernel.time.wait(inf)
 
     def _spawn(self, _path: str, command: Sequence[str], _environ: Mapping[str, str], **_: object) -> int:
-        child = self.new("controller")
+        child = self.new("controller", *command)
+        child.parent = self.kernel.me.pid
         child.handlers = {
             number: handler for number, handler in self.kernel.me.handlers.items() if handler is signal.SIG_IGN
         }
@@ -285,3 +289,51 @@ class Link:
         for fd in fds:
             self._kernel.close(fd)
         return data
+
+
+class VirtualProc(Proc):
+    """/proc of these processes: who they are, what they have open, what is locked. One that is dying has no words."""
+
+    def __init__(self, processes: Processes) -> None:
+        self._processes = processes
+
+    def has(self, path: str) -> bool:
+        return path.startswith("/proc") and not path.startswith("/proc/sys")
+
+    def text(self, path: str) -> str:
+        if path == "/proc/locks":
+            return "".join(self._locks())
+        process = self._process(path)
+        name = path.rsplit("/", 1)[-1]
+        if name == "cmdline":
+            return "".join(f"{word}\0" for word in process.words) if process.status is None else ""
+        return process.name if name == "comm" else ""
+
+    def listdir(self, path: str) -> list[str]:
+        if path == "/proc":
+            return [str(process.pid) for process in self._processes.all.values() if not process.dead]
+        return [str(fd) for fd in self._files(self._process(path))]
+
+    def link(self, path: str) -> str:
+        if path.endswith("/cwd"):
+            return "/virtual"
+        return self._processes.kernel.file(int(path.rsplit("/", 1)[-1])).path
+
+    def _process(self, path: str) -> Process:
+        process = self._processes.all.get(int(path.split("/")[2]))
+        if process is None or process.dead:
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
+        return process
+
+    def _files(self, process: Process) -> list[int]:
+        return [fd for fd, (_, owners) in self._processes.kernel._open.items() if process in owners]
+
+    def _locks(self) -> Iterator[str]:
+        kernel = self._processes.kernel
+        for name, tty in kernel.ttys.items():
+            if tty.lock is not None and tty.present:
+                at = kernel.stat(name)
+                locker = getattr(tty.lock, "locker", None)
+                pid = locker.pid if locker is not None else 0
+                device = f"{os.major(at.st_dev):02x}:{os.minor(at.st_dev):02x}"
+                yield f"1: FLOCK ADVISORY WRITE {pid} {device}:{at.st_ino} 0 EOF\n"

@@ -45,6 +45,7 @@ class Tty:
     listener: Callable[[bytes], None] = lambda _: None
     on_written: Callable[[bytes], None] = lambda _: None  #: what a process of ours wrote, heard or not
     on_delivered: Callable[[int], None] = lambda _: None  #: so many bytes have come in
+    exclusive: bool = False  #: TIOCEXCL: whoever opens it is refused
     opened: int = 0  #: how many open files
     lock: object = None  #: the open file that has it locked, or a stranger
     news: Waiting = field(init=False)
@@ -81,7 +82,7 @@ class Tty:
     def plug(self) -> None:
         """A new device, which nobody has set up or locked."""
         if not self.present:
-            self.present, self.attributes = True, fresh_attributes()
+            self.present, self.attributes, self.exclusive = True, fresh_attributes(), False
 
     # --- other programs -----------------------------------------------------------------------------------------------
 
