@@ -4,8 +4,6 @@ Nothing is judged here but the plainest words of the charger. The memory knows s
 that the next step, if it does not raise, goes on from there.
 """
 
-from dataclasses import replace
-
 from orchestrator.core.contactor import closes
 from orchestrator.core.latches import shown
 from orchestrator.core.machine import UNVERIFIED
@@ -15,8 +13,7 @@ from orchestrator.core.safestop import OBEY_STOP_S
 from orchestrator.model import STOP, Decision, Request, Snapshot, State
 
 FAULT = "internal"
-#: Less of it is an answer to what a stop has just ended; the BMU is not asked, since it may be what cannot be judged.
-ANSWERS = "could not be judged: a defect of this software; its charger is being stopped"
+ANSWERS = "this is a defect of the software; the charger is being stopped"
 
 
 def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tuple[Decision, Memory]:
@@ -44,6 +41,9 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
         else f"stopping: {FAULT}: {error}"
     )
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
-    decision = Decision(memory.state, memory.reason, STOP, faults=shown(memory.faults), alarm=out,
-                        closed=memory.closed, answer=f"this bay {ANSWERS}" if refused else "")  # fmt: skip
-    return replace(decision, session=memory.session), memory
+    answer = f"internal error: {error}; {ANSWERS}" if refused else ""
+    decision = Decision(
+        memory.state, memory.reason, STOP, faults=shown(memory.faults), alarm=out, closed=memory.closed,
+        session=memory.session, answer=answer,
+    )  # fmt: skip
+    return decision, memory

@@ -20,8 +20,9 @@ ORDER_S = 0.05
 TRANSFER_S = 0.2  #: a longer transfer that stood still for so long has ended
 #: How long a request of ours lets a request, or a longer transfer, of others go first. Many nodes have room for one.
 POLITE_S, POLITE_TRANSFER_S = 0.05, 0.2
-SAY_S = 1.0  #: what they do is said once a second at most; more than reading at once
+SAY_S = 1.0  #: how often something new is said of them, unless it weighs more
 MOST_OPEN = 256  #: requests that are remembered
+_READS, _WRITES, _COMMANDS = range(3)  # how much what they do weighs
 _OUT_OF_STEP = (0x0503, 0x0504)  #: upper half of an abort code: the protocol was not kept, whatever the object is
 _AHEAD = 4  #: segments of a block that may be lost to us alone
 
@@ -56,12 +57,12 @@ class OtherMasters:
     __slots__ = (
         "_going",
         "_going_s",
-        "_grave_s",
         "_open",
         "_polite_s",
         "_segment",
         "_transfer",
         "_transfer_s",
+        "_weight",
         "_writing",
         "said",
         "said_s",
@@ -70,7 +71,7 @@ class OtherMasters:
     def __init__(self) -> None:
         self.said = ""  #: what another master was last seen to do, for a person
         self.said_s = -inf  #: when
-        self._grave_s = -inf
+        self._weight = _READS
         self._open: deque[Open] = deque(maxlen=MOST_OPEN)
         self._transfer: Key | None = None  # of their longer transfer
         self._transfer_s = -inf  # when its newest frame came
@@ -98,6 +99,10 @@ class OtherMasters:
     def clear(self) -> None:
         """The node booted: nothing is answered any more."""
         self._open.clear()
+        self._forget_transfer()
+
+    def _forget_transfer(self) -> None:
+        """Nothing of a longer transfer comes any more."""
         self._going = False
         self._end()
 
@@ -125,7 +130,7 @@ class OtherMasters:
         writes = request.ask in (Ask.WRITE, Ask.BLOCK_WRITE)
         self._open.append(Open(key, writes, now_s))
         place = f"0x{request.index:04X}" + (f":{request.sub:02X}" if request.sub else "")
-        self._say(f"another CANopen master {_VERBS[request.ask]} {place}", now_s, grave=writes)
+        self._say(f"another CANopen master {_VERBS[request.ask]} {place}", now_s, _WRITES if writes else _READS)
         return request
 
     def commanded(self, command: int, now_s: float, *, everybody: bool) -> None:
@@ -133,14 +138,12 @@ class OtherMasters:
         deed = _NMT_DEEDS.get(command)
         if deed:
             whom = "all nodes" if everybody else "this node"
-            self._say(f"another CANopen master has {deed.format(whom)} (NMT)", now_s, grave=True)
+            self._say(f"another CANopen master has {deed.format(whom)} (NMT)", now_s, _COMMANDS)
 
-    def _say(self, text: str, now_s: float, *, grave: bool) -> None:
-        """Reading is said when nothing more than that was said within SAY_S, and nothing at all more often."""
-        if grave or now_s >= max(self.said_s, self._grave_s) + SAY_S:
-            self.said, self.said_s = text, now_s
-            if grave:
-                self._grave_s = now_s
+    def _say(self, text: str, now_s: float, weight: int) -> None:
+        """What weighs more is said at once, all else when what was said has stood for SAY_S."""
+        if weight > self._weight or now_s >= self.said_s + SAY_S:
+            self.said, self.said_s, self._weight = text, now_s, weight
 
     # --- what is answered -----------------------------------------------------------------------------------------
 
@@ -228,7 +231,7 @@ class OtherMasters:
         while self._open and now_s - self._open[0].t_s > FORGET_S:
             self._open.popleft()
         if self._going and now_s - self._going_s > FORGET_S:
-            self._going = False
+            self._forget_transfer()
         if self._transfer is not None and now_s - self._transfer_s > TRANSFER_S:
             self._end()
 

@@ -17,8 +17,19 @@ from orchestrator.model import ENERGISED, Decision
 Outline = tuple[object, ...]
 
 
+#: What the memory carries that changes only when something happens.
+EVENTFUL = (
+    "since_s", "resets", "hold", "paused", "stop_reason", "full_pct", "boots", "resumed", "ran", "order", "limit",
+    "limit_before", "closed", "charge_step", "exchange", "reached_s", "raise_s", "taper_s", "qualified_s", "runs_s",
+    "stopping_s", "verified_s", "unverified", "left_s", "returned_s", "reverts", "confirmed", "ready", "intends",
+)  # fmt: skip
+#: What it sums up, as long as there is anything to sum up.
+SUMS = ("idle_s", "search_s", "wake_s")
+
+
 def outline(decision: Decision, memory: Memory) -> Outline:
     """All that changes only when something happens; equal outlines, and nothing has happened in between."""
+    witnessed, session = memory.witnessed, memory.session
     return (
         decision.state,
         decision.command,
@@ -26,41 +37,11 @@ def outline(decision: Decision, memory: Memory) -> Outline:
         decision.step,
         decision.alarm,
         decision.closed,
-        memory.since_s,
-        memory.resets,
-        memory.hold,
-        memory.paused,
-        memory.stop_reason,
-        memory.full_pct,
-        memory.boots,
-        memory.resumed,
-        memory.ran,
-        memory.order,
-        memory.limit,
-        memory.limit_before,
-        memory.closed,
-        memory.charge_step,
-        memory.exchange,
-        memory.session.rise_v if memory.session is not None else None,
-        memory.reached_s,
-        memory.raise_s,
-        memory.taper_s,
-        memory.qualified_s,
-        memory.idle_s > 0,
-        memory.search_s > 0,
-        memory.wake_s > 0,
-        memory.runs_s,
-        memory.stopping_s,
-        memory.verified_s,
-        memory.unverified,
-        memory.left_s,
-        memory.returned_s,
-        memory.reverts,
-        memory.confirmed,
-        memory.ready,
-        memory.intends,
-        memory.witnessed.stop_s,
-        memory.witnessed.proved,
+        *(getattr(memory, name) for name in EVENTFUL),
+        *(getattr(memory, name) > 0 for name in SUMS),
+        session.rise_v if session is not None else None,
+        witnessed.stop_s,
+        witnessed.proved,
         tuple((name, f.present, f.raised_s, f.clean_s, f.latched, f.strikes) for name, f in memory.faults.items()),
     )
 

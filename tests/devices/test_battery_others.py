@@ -239,6 +239,7 @@ def test_what_is_written_in_blocks_is_not_taken_for_requests() -> None:
     said = bench.link.other_master
     other_asks(bench, bytes.fromhex("2b17100088130000"))
     assert bench.link.other_master == said == "another CANopen master writes 0x1F50:01"
+    bench.answer_reads(1.1, WORDS)
     other_asks(bench, bytes.fromhex("80501f0100000000"))
     other_asks(bench, bytes.fromhex("2b17100088130000"))
     assert bench.link.other_master == "another CANopen master writes 0x1017"
@@ -271,6 +272,14 @@ def test_who_gave_an_nmt_command_is_said_and_kept_over_the_boot_up(data: str, wo
     bench.node.on_nmt(bytes.fromhex(data), bench.now_s)
     bench.hear(HEARTBEAT, "00")
     assert bench.link.other_master == words
+
+
+def test_however_much_they_do_is_news_once_a_second() -> None:
+    bench = online()
+    changes = bench.changes
+    for number in range(1000):
+        other_asks(bench, write_request(0x2000 + number, 0, 1, 1), read_request(0x3000 + number, 0))
+    assert bench.changes - changes <= 2
 
 
 def test_reading_does_not_hide_what_is_graver() -> None:

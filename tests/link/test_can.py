@@ -251,6 +251,14 @@ def test_a_bus_that_cannot_be_opened_says_why(settings: dict[str, object], words
     bus.close()
 
 
+def test_a_bit_timing_is_made_of_what_the_station_file_says(channel: str) -> None:
+    timing = {"f_clock": 8_000_000, "brp": 1, "tseg1": 13, "tseg2": 2, "sjw": 1}
+    bus, _ = opened({"interface": "virtual", "channel": channel, "timing": timing})
+    bus.close()
+    with pytest.raises(LinkError, match="tseg1"):
+        opened({"interface": "virtual", "channel": channel, "timing": {"f_clock": 8_000_000, "brp": 1}})
+
+
 def test_a_closed_bus_neither_sends_nor_receives(channel: str) -> None:
     bus = CanBus("can0", {"interface": "virtual", "channel": channel}, [0x10])
     with pytest.raises(LinkError, match="is not open"):

@@ -147,15 +147,19 @@ def test_a_charger_that_does_not_obey_is_cut_off(bench: Bench, line: Line) -> No
     assert (status["alarm"], status["contactor"]) == (True, {"closed": False, "problem": ""})
 
 
-def test_an_exception_of_our_own_opens_it(bench: Bench, line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_exception_of_our_own_that_stays_opens_it_once_the_stop_has_had_its_time(
+    bench: Bench, line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def broken(*_: object) -> None:
         raise ZeroDivisionError
 
     bench.charging()
     monkeypatch.setattr(bay_module, "step", broken)
     bench.step()
-    assert not line.closed
     assert bench.charger.orders[-1][0] == STOP
+    assert line.closed, "a charger that obeys is without current before it opens"
+    bench.step(16)
+    assert not line.closed
 
 
 def test_a_line_that_fails_stops_the_charge_and_is_told(bench: Bench, line: Line) -> None:

@@ -35,7 +35,7 @@ class Scene:
     heard: list[tuple[float, str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.bus = BusWire(self.time, Calls())
+        self.bus = BusWire(self.time, Calls(self.time))
         set_scheduler(AsyncScheduler(self.time))
         for cob_id in (0x090, 0x590, 0x710, 0x7E4):
             self.bus.subscribe(cob_id, self, self._hear)

@@ -13,7 +13,7 @@ from orchestrator.core.step import step
 from orchestrator.model import Decision, Request, State
 from orchestrator.workbench import simulation
 from orchestrator.workbench.devices import TICK_S
-from orchestrator.workbench.leap import outline
+from orchestrator.workbench.leap import EVENTFUL, SUMS, outline
 from orchestrator.workbench.processes import cores
 from orchestrator.workbench.simulation import Run, Simulation, simulate
 from tests.workbench.scenarios import battery, scenario
@@ -115,7 +115,7 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
 
 def test_an_outline_has_all_of_the_memory_that_is_no_measurement() -> None:
     """A field that is new in the memory must be told here or there."""
-    told = set(outline.__code__.co_names) & set(vars(Memory()))
+    told = {*EVENTFUL, *SUMS, *outline.__code__.co_names} & set(vars(Memory()))
     measured = {"state", "reason", "faults", "session", "counted_t_s", "last_s", "resume_s", "order_s", "tries", "step",
                 "sample", "sample_before", "warmth", "limit_s", "charge", "peak", "still", "looked_s"}  # fmt: skip
     assert told | measured == set(vars(Memory()))

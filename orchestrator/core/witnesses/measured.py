@@ -1,7 +1,10 @@
 """Volts and amps of charger and BMU side by side, and which of the two is likelier wrong."""
 
+from statistics import fmean
+
 from orchestrator.core.cells import chemistry
 from orchestrator.core.facts import Facts
+from orchestrator.model import ChargeMode
 
 #: A pack under charge may lose this to the vehicle that it sits in before it counts as back-feed.
 BACK_FEED_A = 0.5
@@ -9,6 +12,8 @@ BACK_FEED_A = 0.5
 #: not measured any more. The charger's are judged above this current; at rest by its volts alone.
 STILL_S, STILL_ABOVE_A = 60.0, 1.0
 MOVED_V, MOVED_A = 0.2, 0.5
+#: In these a charger may switch its current on and off by itself.
+PULSES = (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)
 #: A BMU that counts must have moved a figure when this share of a whole charge has flowed.
 MOVED_SHARE = 0.02
 
@@ -28,25 +33,35 @@ def volts_disagree(f: Facts) -> str | None:
     if f.volts is None or f.pack_v is None or not f.connected:
         return None
     limits = f.rules.policy.faults
-    if abs(f.volts - f.pack_v) <= max(limits.volts_differ_v, limits.volts_differ_pct / 100 * f.pack_v):
+    volts, pack_v = _steady(f, "charger_v", f.volts), _steady(f, "pack_v", f.pack_v)
+    if abs(volts - pack_v) <= max(limits.volts_differ_v, limits.volts_differ_pct / 100 * pack_v):
         return None
-    text = f"the charger reads {f.volts:.2f} V, the BMU {f.pack_v:.2f} V: not the same battery, or a bad connection"
-    return text + _likelier_wrong(_fits_soc(f, f.volts), _fits_soc(f, f.pack_v), "the pack's SOC")
+    text = f"the charger reads {volts:.2f} V, the BMU {pack_v:.2f} V: not the same battery, or a bad connection"
+    return text + _likelier_wrong(_fits_soc(f, volts), _fits_soc(f, pack_v), "the pack's SOC")
 
 
 def amps_disagree(f: Facts) -> str | None:
     """FAULTS B16."""
     if f.amps is None or f.pack_a is None:
         return None
-    tolerance_a = max(f.rules.policy.faults.amps_differ_a, f.rules.policy.faults.amps_differ_pct / 100 * f.amps)
-    if abs(f.amps - f.pack_a) <= tolerance_a:
+    amps, pack_a = _steady(f, "charger_a", f.amps), _steady(f, "pack_a", f.pack_a)
+    tolerance_a = max(f.rules.policy.faults.amps_differ_a, f.rules.policy.faults.amps_differ_pct / 100 * amps)
+    if abs(amps - pack_a) <= tolerance_a:
         return None
-    text = f"the charger reads {f.amps:.2f} A, the BMU {f.pack_a:.2f} A"
+    text = f"the charger reads {amps:.2f} A, the BMU {pack_a:.2f} A"
     step = f.memory.step
     if step is None:
         return text
-    charger_fits, bmu_fits = (abs(amps - step.current_a) <= tolerance_a for amps in (f.amps, f.pack_a))
+    charger_fits, bmu_fits = (abs(seen_a - step.current_a) <= tolerance_a for seen_a in (amps, pack_a))
     return text + _likelier_wrong(charger_fits, bmu_fits, f"the step that was set ({step.current_a:g} A)")
+
+
+def _steady(f: Facts, name: str, now: float) -> float:
+    """The value; of a charger that wakes a pack with pulses its mean of the last seconds: a BMU that is late by half a
+    pulse would else contradict it all the time."""
+    if f.reading is None or f.reading.charge_mode not in PULSES:
+        return now
+    return fmean([getattr(sample, name) for sample in f.memory.witnessed.trail] or [now])
 
 
 def _fits_soc(f: Facts, volts: float) -> bool:
