@@ -117,9 +117,9 @@ def charge_begins_qualified(taken: Taken) -> str | None:
 
 
 def rest_is_verified(taken: Taken) -> str | None:
-    """A state of standby is entered only with a reading, asked for after a stop was sent, that shows it.
+    """A state of standby is entered only with a reading, asked for after the state's first stop, that shows it.
 
-    And only if the BMU sees no current.
+    And only if the BMU sees no current. A stop that is repeated meanwhile takes no proof away.
     """
     found = taken.before.state is not State.STARTING and taken.after.state is State.OFFLINE  # it was there
     if taken.before.state not in UNPROVED or not (found or taken.after.state in STANDBY) or taken.move.restart:
@@ -127,7 +127,9 @@ def rest_is_verified(taken: Taken) -> str | None:
     amps = taken.snapshot.battery.current_a
     if amps is not None and taken.now_s - amps.t_s <= FAST_S and amps.value > BMU_SEES_A:
         return f"{taken.after.state} while the BMU sees {amps.value:.1f} A"
-    reading, sent_s = taken.snapshot.charger, taken.snapshot.charger_link.stop_sent_s
+    reading, sent_s = taken.snapshot.charger, taken.after.witnessed.stop_s
+    if sent_s is not None and taken.before.since_s is not None and sent_s < taken.before.since_s:
+        return f"{taken.after.state} after a stop that was sent before {taken.before.state}"
     if reading is None or sent_s is None or reading.t_s < sent_s:
         return f"{taken.after.state} without a status from after the stop"
     if reading.operation is not Operation.STOPPED or reading.current_a > 0.5 or taken.now_s - reading.t_s > CHARGER_S:

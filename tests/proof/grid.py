@@ -14,7 +14,7 @@ from typing import Any
 from unittest.mock import patch
 
 from orchestrator.config.load import load_policy
-from orchestrator.core import latches
+from orchestrator.core import latches, safestop
 from orchestrator.core.faults import FAULTS, Row
 from orchestrator.model import STOP, Action, ControlMode, Effect, Request, State
 from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
@@ -41,8 +41,9 @@ STOP_WITHIN_S = {Phase.IDLE: 0.01, Phase.IN_FLIGHT: 0.125, Phase.HALF: 0.125}
 FRAME_S = 0.01
 #: A status request, and half a reply to it.
 POLL, HALF_REPLY = 0x01, 14
-#: A stop is proved within this; then the operator's is given as much.
+#: A stop is proved within this; then the operator's is given as much. Who has not obeyed is believed only later.
 SETTLE_S = 3.5
+BELIEVED_S = safestop.LASTS_S + SETTLE_S
 REACH_S = 30.0
 
 
@@ -136,7 +137,9 @@ class Run:
         self.wrong = self.ended.wrong
         self.forced = ""
         self._acts = list(SITUATIONS[cell.state].acts)
-        self._armed = self._injected = self._standing = False
+        self._armed = self._injected = False
+        self._ordered = False  # the step before had the charger stopped
+        self._standing = False  # a stop had been ordered before the fault was raised
         self._raised_s: float | None = None
         self._stopped_s: float | None = None
         self._heard = 0
@@ -185,6 +188,8 @@ class Run:
                 self._when_idle()
         if self._raised_s is None and self._injected and any(x.id == self.cell.row.id for x in decision.faults):
             self._raised_s = self.time.now_s
+            self._standing = self._standing or self._ordered
+        self._ordered = decision.command == STOP
 
     def _act(self, name: str) -> None:
         if name in set(Request):
@@ -261,7 +266,8 @@ class Run:
         self.rig.inject(lambda rig: INJECTIONS["heal"].happen(rig, None))
         self.rig.bmu.port.faults.delay_s = ANSWER_S
         self.world.ask(Request.STOP)
-        self.time.call_later(SETTLE_S, self.world.end)
+        unbelieved = decision.state is State.UNCONTROLLABLE
+        self.time.call_later(BELIEVED_S if unbelieved else SETTLE_S, self.world.end)
 
     def _judge_stop(self) -> None:
         if self._standing:

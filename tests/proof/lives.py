@@ -309,11 +309,11 @@ class Player:
         """What a CANopen tool or another device does on the bus, as everybody may."""
         node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
         {
-            "master": lambda: self._repeat(400, 0.013, lambda: bus.from_driver(0x600 + node, _read(0x6000))),
-            "reads all": lambda: self._repeat(40, 0.03, lambda: bus.from_driver(0x600 + node, _read(0x1018))),
-            "abort": lambda: self._repeat(99, 0.03, lambda: bus.send(0x580 + node, ABORT)),
+            "master": lambda: self._repeat(400, 0.013, lambda: bus.send(0x600 + node, _read(0x6000))),
+            "reads all": lambda: self._repeat(40, 0.03, lambda: bus.send(0x600 + node, _read(0x1018))),
+            "abort": lambda: self._repeat(99, 0.03, lambda: bus.send(0x600 + node, REFUSED)),
             "fd": lambda: bus.subscribe(0x600 + node, self, self._answer_fd),
-            "heartbeat": lambda: bus.from_driver(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
+            "heartbeat": lambda: bus.send(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
             "flood": lambda: self._repeat(400, 0.002, lambda: bus.send(0x123, bytes(8))),
         }[hazard.detail]()
 
@@ -363,8 +363,8 @@ def _fd(cob_id: int) -> can.Message:
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_fd=True)
 
 
-#: Somebody has tried to write the heartbeat's time as it may not be written.
-ABORT = b"\x80\x17\x10\x00\x02\x00\x01\x06"
+#: Somebody tries to write a measurement, and the BMU refuses it.
+REFUSED = b"\x2b\x00\x60\x00\x01\x00\x00\x00"
 
 
 def entries(script: Script) -> list[Entry]:

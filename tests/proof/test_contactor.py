@@ -79,10 +79,10 @@ def test_a_charger_that_was_out_of_control_can_charge_again(control: ControlMode
         8.0: deafens,
         9.0: asks(Request.STOP),
         20.0: mends,
-        25.0: asks(Request.RESET),
-        26.0: asks(Request.START),
+        35.0: asks(Request.RESET),  # it has stood by for 10 s
+        36.0: asks(Request.START),
     }
-    assert played(happenings, 40.0, 20.0, control) == [
+    assert played(happenings, 50.0, 20.0, control) == [
         (S.STARTING, False),
         (S.OFFLINE, True),
         (S.IDLE, True),

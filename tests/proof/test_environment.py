@@ -1,11 +1,14 @@
 """The environment's campaign in its short form, and the judge: nothing is found here, and each bug that is put in."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
-from orchestrator.service.kept import Kept
 
-from orchestrator.service import kept, laststop
+from orchestrator.core.persisted import Persisted
+from orchestrator.service import lastline, loading
+from orchestrator.service.past import Entry
+from orchestrator.service.stateformat import Stamp
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.environment import play, smallest
 from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
@@ -50,12 +53,18 @@ def scene(*hazards: Hazard, end_s: float = BEGIN_S + 16, bays: tuple[Bay, ...] =
 
 
 def forgets(patch: Patch) -> None:
-    patch.setattr(kept.Kept, "of", classmethod(lambda _cls, _memory: Kept()))
+    decode = loading.decode
+
+    def nothing(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
+        run, entries = decode(data, now)
+        return run, [replace(entry, persisted=Persisted()) for entry in entries]
+
+    patch.setattr(loading, "decode", nothing)
 
 
 def one_port_only(patch: Patch) -> None:
-    write = laststop._Line.write
-    patch.setattr(laststop._Line, "write", lambda line, frame: write(line, frame) if line.name[-1] == "1" else None)
+    write = lastline.LastLine.write
+    patch.setattr(lastline.LastLine, "write", lambda line, frame: write(line, frame) if line.name[-1] == "1" else None)
 
 
 KILLED = (Hazard(BEGIN_S, "kill both"), Hazard(BEGIN_S + 2, "boot"))
