@@ -94,7 +94,8 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("G7", "clock jump, suspended machine", "ages are monotonic: the wall clock may jump as it likes"),
     Entry("G8", "disk full, log blocked", "charging goes on, and `status` says it; a lost list of latched faults, "
           "`service/store.py`, holds every bay"),
-    Entry("G9", "two services", "`link/serial.py` (lock of the port), `service/socketfile.py` (socket), `service/store.py` (state): the second ends"),
+    Entry("G9", "two services", "`link/serial.py` (lock of the port), `service/socketfile.py` (socket), "
+          "`service/store.py` (state): the second ends"),
     Entry("G10", "power lost in mid-charge", "`core/persisted.py`: a charge that nobody ended is not resumed"),
     Entry("P1", "bad policy", "`config/`: refused with every error's line; `run` does not start"),
     Entry("P2", "policy changed while charging", "read anew on SIGHUP, taken over by a bay when it stands by"),
