@@ -228,6 +228,7 @@ class Player:
         for rig in self._rigs(hazard):
             rig.bay.falsify[hazard.detail] = partial(self._more, hazard.value or 0.0)
             rig.apart_v = (hazard.value or 0.0) if hazard.detail == "voltage_v" else 0.0
+            rig.frozen = False  # not in all of its words
 
     def _more(self, more: float, true: float) -> float:
         return true + (more if self.time.now_s % 3.0 < 2.75 else 0.0)
@@ -258,6 +259,7 @@ class Player:
             lie = Lie(0, max(1, int(every)), inf if int(every) else 1)
             rig.bay.falsify[name] = _liar(lie, how, getattr(rig.bay.readout(), name), hazard.value or 0.0)
             rig.steady = int(every) == 1
+            rig.frozen = False  # not in all of its words
 
     def _slow(self, hazard: Hazard) -> None:
         """detail: CALL:port|diskNAME:LASTS[:ERRNO]; value: seconds, FOR_EVER."""
