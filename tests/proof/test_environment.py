@@ -1,11 +1,12 @@
 """The environment's campaign in its short form, and the judge: nothing is found here, and each bug that is put in."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
-from orchestrator.service.kept import Kept
 
-from orchestrator.service import kept, laststop
+from orchestrator.core import persisted
+from orchestrator.service import lastline
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.environment import play, smallest
 from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
@@ -14,13 +15,9 @@ from tests.proof.scenes import SCENES
 
 #: Scenes and random scripts that are played each time; `make campaign` plays all, and a thousand.
 SHORT: tuple[str | int, ...] = (
-    "answers stolen",
-    "obeys once",
-    "a port that closes never",
-    "settings take for ever",
-    0,
-    3,
-)
+    "nothing happens", "another speed, then killed", "locked by a stranger", "charging, then the disk is torn",
+    "crossed cables, hot", "says standby now and then", "half dead adapter, estop", "stopped while it ends", 0, 3, 43,
+)  # fmt: skip
 Patch = pytest.MonkeyPatch
 
 
@@ -50,12 +47,13 @@ def scene(*hazards: Hazard, end_s: float = BEGIN_S + 16, bays: tuple[Bay, ...] =
 
 
 def forgets(patch: Patch) -> None:
-    patch.setattr(kept.Kept, "of", classmethod(lambda _cls, _memory: Kept()))
+    memory = persisted.Persisted.memory
+    patch.setattr(persisted.Persisted, "memory", lambda kept, now_s: memory(replace(kept, running=False), now_s))
 
 
 def one_port_only(patch: Patch) -> None:
-    write = laststop._Line.write
-    patch.setattr(laststop._Line, "write", lambda line, frame: write(line, frame) if line.name[-1] == "1" else None)
+    write = lastline.LastLine.write
+    patch.setattr(lastline.LastLine, "write", lambda one, frame: write(one, frame) if one.name[-1] == "1" else None)
 
 
 KILLED = (Hazard(BEGIN_S, "kill both"), Hazard(BEGIN_S + 2, "boot"))
