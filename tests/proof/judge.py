@@ -225,7 +225,8 @@ class Judge:
 
     def find(self, charger: int, name: str, text: str) -> None:
         if not any(f" {name}: " in line for line in self.wrong):
-            self.wrong.append(f"t = {self.time.now_s - self.began_s:.2f} s, charger {charger + 1}, {name}: {text}")
+            whose = f"charger {charger + 1}" if charger >= 0 else "the service"
+            self.wrong.append(f"t = {self.time.now_s - self.began_s:.2f} s, {whose}, {name}: {text}")
 
     # --- what comes over the wires ------------------------------------------------------------------------------------
 
