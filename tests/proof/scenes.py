@@ -138,7 +138,7 @@ SCENES: dict[str, Script] = {
         h(0, "fault", 0, None, "charger_cut_off"), h(8, "kill both"), h(9, "boot"), end_s=T + 24
     ),
     # 12. Others on the bus.
-    **{f"on the bus: {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
+    **{f"on the bus, {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
     "a temperature that is forged": _scene(
         h(0, "bus", 1, None, "forged"), h(1, "fault", 1, 60.0, "over_temperature"), end_s=T + 16
     ),
