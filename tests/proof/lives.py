@@ -150,7 +150,9 @@ class Player:
     def _kill(self, _: Hazard) -> None:
         if self.gateway.alive(self.gateway.controller):
             self.judge.dies("the controller was killed")
-            self.judge.meant(KILLED_S, "the controller was killed")
+            # One that has a thread in a driver does not die at once, but falls silent.
+            hangs = self.gateway.controller is not None and self.gateway.controller.hangs
+            self.judge.meant(FROZEN_S if hangs else KILLED_S, "the controller was killed")
             self.gateway.signal(self.gateway.controller, signal.SIGKILL)
 
     def _kill_guardian(self, _: Hazard) -> None:
