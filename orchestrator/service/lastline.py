@@ -250,7 +250,7 @@ def _lock(fd: int, name: str) -> None:
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        if holder(name).ours:
+        if holder(name, (os.getpid(),)).ours:  # we have it open ourselves, and hold nothing
             raise OSError(HELD) from None
 
 

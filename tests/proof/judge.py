@@ -69,6 +69,7 @@ class Charger:
     stopped_s: float = 0.0  #: when a stop was last understood at its port
     looked_s: float = 1000.0
     charged_ah: float = 0.0
+    thawed: tuple[float, float] = (0.0, 0.0)  #: Ah and volts when its BMU was last seen to move
     precharged_s: float = 0.0
     onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
 
@@ -134,8 +135,19 @@ def _cold(_: "Judge", charger: Charger) -> bool:
     return charger.rig.bay.pack.temperature_c < -0.2 and _temperature_honest(charger)
 
 
-def _frozen(_: "Judge", charger: Charger) -> bool:
-    return "voltage_v" in charger.rig.bay.falsify and charger.rig.frozen
+def _frozen(judge: "Judge", charger: Charger) -> bool:
+    """Its BMU stands still, and enough has gone in since to be sure of that: 1 Ah, or 0.3 V more."""
+    rig = charger.rig
+    if not rig.frozen:
+        charger.thawed = charger.charged_ah, rig.bay.charger.voltage_v
+    ah, volts = charger.thawed
+    return rig.frozen and (charger.charged_ah - ah > 1.0 or abs(rig.bay.charger.voltage_v - volts) > 0.3)
+
+
+def _another(_: "Judge", charger: Charger) -> bool:
+    """A pack that says it is nearly empty may be a deeply discharged one of the right kind: nobody can tell."""
+    pack = charger.rig.bay.pack
+    return pack.cells != 13 and pack.soc > 0.1 and not charger.rig.bay.falsify
 
 
 def _too_much(judge: "Judge", charger: Charger) -> bool:
@@ -152,10 +164,10 @@ REASONS: tuple[Reason, ...] = (
     Reason("over-voltage", LINE_S, lambda _, c: _volts(c)),
     Reason("over-current", LINE_S, _too_much),
     Reason("BMU silent", LINE_S, lambda _, c: c.rig.bmu.port.faults.mute),
-    Reason("another pack", LINE_S + 3.0, lambda _, c: c.rig.bay.pack.cells != 13 and not c.rig.bay.falsify),
+    Reason("another pack", LINE_S + 3.0, _another),
     Reason("collapsed", LINE_S, lambda _, c: c.rig.bay.pack.bias_v < -8.0 and c.honest(Kind.VOLTAGE, "voltage_v")),
     Reason("crossed", 9.0, _crossed),
-    Reason("BMU frozen", 65.0, _frozen),
+    Reason("BMU frozen", 62.0, _frozen),
     Reason("apart, most of the time", 20.0, lambda _, c: c.rig.apart_v > 1.2),
     Reason("status word", LINE_S, lambda _, c: "status" in c.rig.bay.falsify and _trips(c)),
 )
@@ -213,7 +225,8 @@ class Judge:
 
     def find(self, charger: int, name: str, text: str) -> None:
         if not any(f" {name}: " in line for line in self.wrong):
-            self.wrong.append(f"t = {self.time.now_s - self.began_s:.2f} s, charger {charger + 1}, {name}: {text}")
+            whose = f"charger {charger + 1}" if charger >= 0 else "the service"
+            self.wrong.append(f"t = {self.time.now_s - self.began_s:.2f} s, {whose}, {name}: {text}")
 
     # --- what comes over the wires ------------------------------------------------------------------------------------
 
@@ -347,9 +360,9 @@ class Judge:
         """Limits of a charge hold over restarts."""
         for charger, bay in zip(self.chargers, self.script.bays, strict=True):
             dt_s, charger.looked_s = now_s - charger.looked_s, now_s
+            charger.charged_ah += charger.current_a * dt_s / 3600
             if not bay.small:
                 continue
-            charger.charged_ah += charger.current_a * dt_s / 3600
             charger.precharged_s += dt_s * (charger.flows and charger.rig.bay.pack.leaky)
             if charger.charged_ah > SMALL_AH * 1.2:
                 self.find(charger.number, "limits", f"{charger.charged_ah:.3f} Ah went in, {SMALL_AH:g} are allowed")
@@ -371,9 +384,8 @@ class Judge:
     def _reach(self, charger: Charger, now_s: float) -> None:
         tty, wire = charger.rig.tty, charger.rig.wire
         name = port_name(charger.number)
-        troubled = any(
-            trouble.place == name and now_s < trouble.until_s for trouble in self.gateway.kernel.calls.troubles
-        )
+        troubles = (one for one in self.gateway.kernel.calls.troubles if one.place == name)
+        troubled = any(now_s < one.until_s + one.delay_s for one in troubles)
         if not tty.present or tty.stalled or tty.stolen or wire.mute_rx or troubled:
             charger.deaf_s = now_s
 

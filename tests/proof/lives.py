@@ -150,7 +150,9 @@ class Player:
     def _kill(self, _: Hazard) -> None:
         if self.gateway.alive(self.gateway.controller):
             self.judge.dies("the controller was killed")
-            self.judge.meant(KILLED_S, "the controller was killed")
+            # One that has a thread in a driver does not die at once, but falls silent.
+            hangs = self.gateway.controller is not None and self.gateway.controller.hangs
+            self.judge.meant(FROZEN_S if hangs else KILLED_S, "the controller was killed")
             self.gateway.signal(self.gateway.controller, signal.SIGKILL)
 
     def _kill_guardian(self, _: Hazard) -> None:
@@ -228,6 +230,7 @@ class Player:
         for rig in self._rigs(hazard):
             rig.bay.falsify[hazard.detail] = partial(self._more, hazard.value or 0.0)
             rig.apart_v = (hazard.value or 0.0) if hazard.detail == "voltage_v" else 0.0
+            rig.frozen = False  # not in all of its words
 
     def _more(self, more: float, true: float) -> float:
         return true + (more if self.time.now_s % 3.0 < 2.75 else 0.0)
@@ -258,6 +261,7 @@ class Player:
             lie = Lie(0, max(1, int(every)), inf if int(every) else 1)
             rig.bay.falsify[name] = _liar(lie, how, getattr(rig.bay.readout(), name), hazard.value or 0.0)
             rig.steady = int(every) == 1
+            rig.frozen = False  # not in all of its words
 
     def _slow(self, hazard: Hazard) -> None:
         """detail: CALL:port|diskNAME:LASTS[:ERRNO]; value: seconds, FOR_EVER."""

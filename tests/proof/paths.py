@@ -7,23 +7,23 @@ from tests.proof.script import BaySetup, Happening, Script
 NEVER_MADE = NEVER
 
 HALF = BaySetup(line="perfect")
-#: Qualifies at 1.3 s, charges from 3.3 s, is full at 11.0 s, verified at 11.4 s.
+#: Qualifies at 2.2 s, charges from 4.6 s, is full at 13.0 s, verified at 13.9 s.
 NEARLY_FULL = BaySetup("demo", soc_pct=93.0)
 
 
 def _script(setup: BaySetup, *happenings: tuple[float, str] | tuple[float, str, float]) -> Script:
     befalls = tuple(Happening(one[0], 0, one[1], one[2] if len(one) > 2 else None) for one in happenings)
     last_s = befalls[-1].t_s
-    return Script(0, (setup,), befalls, last_s + 12.0, last_s + 4.0)
+    return Script(0, (setup,), befalls, last_s + 22.0, last_s + 14.0)
 
 
 #: What they lead through → how.
 PATHS: dict[str, Script] = {
-    "FULL → OFFLINE → FULL": _script(NEARLY_FULL, (12.0, "charger_cut_off"), (16.0, "heal")),
-    "FULL → QUALIFYING → FULL": _script(NEARLY_FULL, (12.0, "implausible_soc", 50.0), (13.0, "heal")),
-    "FULL → SUSPENDED → FULL": _script(NEARLY_FULL, (12.0, "pause"), (13.0, "start")),
-    "FULL → IDLE → FULL": _script(NEARLY_FULL, (12.0, "stop"), (13.0, "start")),
-    "UNCONTROLLABLE → FULL": _script(NEARLY_FULL, (11.0, "charger_cut_off"), (16.0, "heal")),
+    "FULL → OFFLINE → FULL": _script(NEARLY_FULL, (15.0, "charger_cut_off"), (19.0, "heal")),
+    "FULL → QUALIFYING → FULL": _script(NEARLY_FULL, (15.0, "implausible_soc", 50.0), (16.0, "heal")),
+    "FULL → SUSPENDED → FULL": _script(NEARLY_FULL, (15.0, "pause"), (16.0, "start")),
+    "FULL → IDLE → FULL": _script(NEARLY_FULL, (15.0, "stop"), (16.0, "start")),
+    "UNCONTROLLABLE → FULL": _script(NEARLY_FULL, (13.1, "charger_cut_off"), (18.0, "heal")),
     "UNCONTROLLABLE → OFFLINE": _script(
         HALF, (8.0, "bmu_silent"), (8.0, "charger_cut_off"), (14.0, "heal"), (14.0, "bmu_silent")
     ),
@@ -32,9 +32,9 @@ PATHS: dict[str, Script] = {
     "STARTING → UNCONTROLLABLE": _script(BaySetup(running=True), (0.0, "ignore_stop")),
     "STARTING → SUSPENDED": _script(HALF, (0.0, "charger_cut_off"), (1.5, "pause"), (2.0, "heal")),
     "QUALIFYING → IDLE → OFFLINE → TRIPPED → IDLE": _script(
-        HALF, (2.0, "stop"), (3.0, "charger_cut_off"), (6.0, "heal"), (6.0, "status_bits"), (9.0, "heal"),
-        (15.0, "reset")
+        HALF, (3.0, "stop"), (4.0, "charger_cut_off"), (7.0, "heal"), (7.0, "status_bits"), (10.0, "heal"),
+        (16.0, "reset")
     ),
-    "QUALIFYING → OFFLINE": _script(HALF, (2.0, "bmu_reboot")),
+    "QUALIFYING → OFFLINE": _script(HALF, (3.0, "bmu_reboot")),
     "SUSPENDED → OFFLINE": _script(HALF, (5.0, "pause"), (7.0, "charger_cut_off")),
 }  # fmt: skip

@@ -23,6 +23,7 @@ def h(t_s: float, what: str, bay: int = -1, value: float | None = None, detail: 
 
 
 SCENES: dict[str, Script] = {
+    "nothing happens": _scene(end_s=T + 8),
     # 1. The line is not ours alone.
     "another speed": _scene(h(0, "settings", 0, float(termios.B115200)), h(4, "ask", 0, None, "stop")),
     "a getty": _scene(h(0, "getty", 1, float(termios.B9600))),
@@ -124,7 +125,9 @@ SCENES: dict[str, Script] = {
     # 8. Not the battery that is meant.
     "a pack of 36 V": _scene(bays=(Bay(cells=10, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
     "a pack that collapses": _scene(h(0, "fault", 1, None, "pack_collapsed")),
-    "a BMU that is frozen": _scene(h(0, "fault", 1, None, "bmu_frozen"), end_s=T + 76),
+    "a BMU that is frozen": _scene(
+        h(0, "fault", 1, None, "bmu_frozen"), bays=(Bay(), Bay(soc_pct=80.0), Bay()), end_s=T + 400
+    ),
     "ports swapped in the file": _scene(h(0, "term"), h(4, "edit", 0, None, "swap"), h(4.2, "boot"), end_s=T + 36),
     # 9. Our own exception.
     "a BMU that reads 0.00 V": _scene(
@@ -135,7 +138,7 @@ SCENES: dict[str, Script] = {
         h(0, "fault", 0, None, "charger_cut_off"), h(8, "kill both"), h(9, "boot"), end_s=T + 24
     ),
     # 12. Others on the bus.
-    **{f"on the bus: {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
+    **{f"on the bus, {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
     "a temperature that is forged": _scene(
         h(0, "bus", 1, None, "forged"), h(1, "fault", 1, 60.0, "over_temperature"), end_s=T + 16
     ),

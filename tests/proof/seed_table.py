@@ -25,47 +25,62 @@ def seed(name: str, kind: str, about: str, file: str, old: str, new: str, likely
 
 
 SEEDS: tuple[Seed, ...] = (
+    # 1. The line is not ours alone.
     seed(
-        "estop leaves the line as it is", "line", "whoever opens a port for a stop does not set it up",
-        f"{SERVICE}laststop.py",
-        "        termios.tcsetattr(fd, termios.TCSANOW, _SETTINGS)\n",
-        "",
+        "estop leaves the line as it is", "line", "whoever stops last does not look at the line's settings",
+        f"{SERVICE}lastline.py",
+        "return self._fd is not None and bool(settings.restore(self._fd))",
+        "return False",
     ),
     seed(
+        "nobody else's lock is passed", "line", "a port that a stranger has locked is left alone at the end",
+        f"{SERVICE}lastline.py",
+        "        if holder(name, (os.getpid(),)).ours:",
+        "        if True:",
+    ),
+    # 2. What must survive is not on disk.
+    seed(
         "a running charge is not kept", "disk", "it is not written down that a charger may be running",
-        f"{SERVICE}kept.py",
-        "return cls(memory.state in RUNNING, ",
-        "return cls(False, ",
+        f"{CORE}persisted.py",
+        "running=memory.state in RUNNING or memory.intends or memory.unverified,",
+        "running=False,",
+    ),
+    seed(
+        "who ran is not held", "disk", "a charge that a crash has ended goes on by itself after the restart",
+        f"{CORE}persisted.py",
+        "        if self.running:\n",
+        "        if False:\n",
     ),
     seed(
         "a hold is not kept", "disk", "an operator's stop is forgotten with a restart",
-        f"{SERVICE}kept.py",
-        "memory.hold, memory.paused, waiting)",
-        '"", memory.paused, waiting)',
+        f"{CORE}persisted.py",
+        "            hold=memory.hold,\n            paused=memory.paused,\n            faults=faults,",
+        '            hold="",\n            paused=memory.paused,\n            faults=faults,',
     ),
     seed(
         "latches are not kept", "disk", "a fault that waits for a person is forgotten with a restart",
-        f"{SERVICE}kept.py",
-        "memory.hold, memory.paused, waiting)",
-        "memory.hold, memory.paused, {})",
+        f"{CORE}persisted.py",
+        "            if fault.raised_s is not None or fault.strikes\n",
+        "            if False\n",
     ),
     seed(
-        "what is kept is written late", "disk", "what must survive is gathered for 30 s before it is written",
-        f"{SERVICE}journal.py",
-        "GATHER_S = 0.5",
-        "GATHER_S = 30.0",
+        "the directory is not synchronised", "disk", "after the rename the directory is not brought to the disk",
+        f"{SERVICE}disk.py",
+        "    os.replace(fresh, path)\n    sync_directory(path.parent)",
+        "    os.replace(fresh, path)",
     ),
+    seed(
+        "the file is not synchronised", "disk", "a file is renamed before its bytes are on the disk",
+        f"{SERVICE}disk.py",
+        "            data = data[os.write(fd, data) :]\n        os.fsync(fd)",
+        "            data = data[os.write(fd, data) :]",
+    ),
+    # Stops.
     seed(
         "a hung controller is left alone", "stop", "the guardian waits ten times as long for a heartbeat",
         f"{SERVICE}guardian.py",
         "SILENCE_S = 0.5",
         "SILENCE_S = 5.0",
-    ),
-    seed(
-        "the first port only", "stop", "the guardian sends the stop to one port only",
-        f"{SERVICE}laststop.py",
-        "            for line in doubtful:\n                line.write(frame)",
-        "            for line in doubtful[:1]:\n                line.write(frame)",
     ),
     seed(
         "an opened port goes on", "stop", "a port that was opened does not begin with a stop",

@@ -47,7 +47,7 @@ PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider")
 PROOFS: Mapping[str, Proof] = {
     "environment": Proof(
         "scenes and random trouble over lives of the gateway",
-        ("-m", "tests.proof.environment", "--names", "--until-found", "--runs", "400", "--minutes", "2"), 200.0,
+        ("-m", "tests.proof.environment", "--names", "--until-found", "--runs", "200", "--minutes", "2.5"), 240.0,
     ),
     "scripts": Proof("random fault scripts", ("-m", "tests.proof.campaign", "--scripts", "120"), 120.0),
     "calls": Proof("every call of a charge made to fail", (*PYTEST, "tests/proof/test_nth_call.py"), 120.0),

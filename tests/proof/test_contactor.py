@@ -95,5 +95,5 @@ def test_a_charger_that_was_out_of_control_can_charge_again(control: ControlMode
         (S.QUALIFYING, True),
         (S.CHARGING, True),
         (S.STOPPING, True),
-        (S.IDLE, True),
+        (S.SUSPENDED, True),
     ]

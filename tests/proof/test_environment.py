@@ -5,10 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core.persisted import Persisted
-from orchestrator.service import lastline, loading
-from orchestrator.service.past import Entry
-from orchestrator.service.stateformat import Stamp
+from orchestrator.core import persisted
+from orchestrator.service import lastline
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.environment import play, smallest
 from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
@@ -17,13 +15,9 @@ from tests.proof.scenes import SCENES
 
 #: Scenes and random scripts that are played each time; `make campaign` plays all, and a thousand.
 SHORT: tuple[str | int, ...] = (
-    "answers stolen",
-    "obeys once",
-    "a port that closes never",
-    "settings take for ever",
-    0,
-    3,
-)
+    "nothing happens", "another speed, then killed", "locked by a stranger", "charging, then the disk is torn",
+    "crossed cables, hot", "says standby now and then", "half dead adapter, estop", "stopped while it ends", 0, 3, 58,
+)  # fmt: skip
 Patch = pytest.MonkeyPatch
 
 
@@ -53,18 +47,13 @@ def scene(*hazards: Hazard, end_s: float = BEGIN_S + 16, bays: tuple[Bay, ...] =
 
 
 def forgets(patch: Patch) -> None:
-    decode = loading.decode
-
-    def nothing(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
-        run, entries = decode(data, now)
-        return run, [replace(entry, persisted=Persisted()) for entry in entries]
-
-    patch.setattr(loading, "decode", nothing)
+    memory = persisted.Persisted.memory
+    patch.setattr(persisted.Persisted, "memory", lambda kept, now_s: memory(replace(kept, running=False), now_s))
 
 
 def one_port_only(patch: Patch) -> None:
     write = lastline.LastLine.write
-    patch.setattr(lastline.LastLine, "write", lambda line, frame: write(line, frame) if line.name[-1] == "1" else None)
+    patch.setattr(lastline.LastLine, "write", lambda one, frame: write(one, frame) if one.name[-1] == "1" else None)
 
 
 KILLED = (Hazard(BEGIN_S, "kill both"), Hazard(BEGIN_S + 2, "boot"))

@@ -67,6 +67,11 @@ class Process:
         if not interruptible:
             self._busy_until_s = max(self._busy_until_s, until_s)
 
+    @property
+    def hangs(self) -> bool:
+        """A thread is in a call that nothing can interrupt."""
+        return self._busy_until_s > self._kernel.time.now_s
+
     def end(self, status: int) -> None:
         """It ends with this status, or −signal: not by a thread of its own."""
         if self.status is not None:
@@ -74,7 +79,7 @@ class Process:
         self.status = status
         time = self._kernel.time
         time.kill(self)
-        if self._busy_until_s > time.now_s and status < 0:
+        if self.hangs and status < 0:
             if self._busy_until_s < inf:
                 time.call_at(self._busy_until_s, self._bury)
         else:
