@@ -239,6 +239,7 @@ class Player:
         """A plug that has contact for `value` s, and then none for as long."""
         for rig in self._rigs(hazard):
             rig.bay.connected = not rig.bay.connected
+            rig.bmu.port.faults.mute = not rig.bay.connected
         self.time.call_later(hazard.value or 1.0, self._loose, hazard)
 
     def _heal(self, hazard: Hazard) -> None:

@@ -49,6 +49,20 @@ SCENES: dict[str, Script] = {
     "stopped, then no power": _scene(
         h(0, "ask", 1, None, "stop"), h(3, "power", detail="nothing more"), h(5, "boot"), end_s=T + 20
     ),
+    "stopped, then no power at once": _scene(
+        h(0, "slow", -1, 5.0, "fsync:disk:60"),
+        h(0.5, "ask", 1, None, "stop"),
+        h(1.5, "power", detail="nothing more"),
+        h(3, "boot"),
+        end_s=T + 20,
+    ),  # fmt: skip
+    "tripped, then no power": _scene(
+        h(0, "fault", 0, None, "status_bits"),
+        h(5, "power", detail="nothing more"),
+        h(6, "heal", 0),
+        h(7, "boot"),
+        end_s=T + 30,
+    ),  # fmt: skip
     "charging, then no power": _scene(h(0, "power", detail="nothing more"), h(3, "boot"), end_s=T + 20),
     "charging, then the disk is torn": _scene(h(0, "power", detail="some of it, torn"), h(3, "boot"), end_s=T + 20),
     "tripped, taken out, put back": _scene(
@@ -68,6 +82,7 @@ SCENES: dict[str, Script] = {
     "file edited, then both killed": _scene(h(0, "edit", 1, None, "remove"), h(1, "kill both"), end_s=T + 10),
     # 3. Two reasons in one field.
     "stopped while it ends": _scene(h(0, "term"), h(0.2, "ask", 0, None, "stop"), h(4, "boot"), end_s=T + 20),
+    "restarted in order": _scene(h(0, "term"), h(5, "boot"), end_s=T + 5 + 2 * BEGIN_S + 2),
     # 4. Verified by one witness, in one sample.
     "says standby": _scene(
         h(0, "fault", 0, None, "says_standby"), h(0, "fault", 0, None, "ignore_stop"), h(1, "ask", 0, None, "stop")
@@ -82,6 +97,9 @@ SCENES: dict[str, Script] = {
         h(0, "fault", 1, None, "says_standby_now_and_then"), h(0, "fault", 1, None, "ignore_stop"), h(1, "term")
     ),
     "runs again": _scene(h(0, "fault", 2, None, "runs_again"), h(1, "ask", 2, None, "stop"), end_s=T + 24),
+    "stopped by other means": _scene(
+        h(0, "fault", 0, None, "stopped_elsewhere"), bays=(Bay(soc_pct=82.0), Bay(), Bay()), end_s=T + 20
+    ),
     "crossed cables": _scene(bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=40.0),
     "crossed cables, hot": _scene(
         h(0, "fault", 0, 60.0, "over_temperature"), bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=T + 14
@@ -94,6 +112,7 @@ SCENES: dict[str, Script] = {
         end_s=T + 26,
     ),
     # 5. One port delays another.
+    "frozen": _scene(h(0, "freeze")),
     "half dead adapter, killed": _scene(
         h(0, "slow", 0, 5.0, "open:port:60"), h(0.1, "fault", 0, None, "port_gone"), h(0.5, "heal", 0), h(1.5, "kill")
     ),
@@ -111,6 +130,12 @@ SCENES: dict[str, Script] = {
         bays=(Bay(small=True), Bay(), Bay()),
         end_s=100.0,
     ),
+    "ampere-hours over silences": _scene(
+        Hazard(45.0, "fault", 0, None, "bmu_silent"),
+        Hazard(49.0, "heal", 0),
+        bays=(Bay(small=True), Bay(), Bay()),
+        end_s=130.0,
+    ),  # fmt: skip
     "precharge over restarts": _scene(
         Hazard(1.0, "fault", 0, None, "precharge_no_rise"),
         *(one for t_s in (17.0, 37.0, 57.0, 77.0) for one in (Hazard(t_s, "term"), Hazard(t_s + 5, "boot"))),
@@ -122,8 +147,10 @@ SCENES: dict[str, Script] = {
         h(0, "fault", 0, None, "limit_reverts"), bays=(Bay(temperature_c=8.0), Bay(), Bay()), end_s=T + 26
     ),
     "apart for most of the time": _scene(h(0, "comes", 0, 2.0, "voltage_v"), end_s=T + 30),
+    "loose plug": _scene(h(0, "loose", 0, 6.0), end_s=T + 90),
     # 8. Not the battery that is meant.
     "a pack of 36 V": _scene(bays=(Bay(cells=10, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
+    "a pack of 24 V": _scene(bays=(Bay(cells=7), Bay(), Bay()), end_s=30.0),
     "a pack that collapses": _scene(h(0, "fault", 1, None, "pack_collapsed")),
     "a BMU that is frozen": _scene(
         h(0, "fault", 1, None, "bmu_frozen"), bays=(Bay(), Bay(soc_pct=80.0), Bay()), end_s=T + 400

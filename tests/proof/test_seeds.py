@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.proof.scenes import SCENES
 from tests.proof.seed_table import SEEDS, Seed
 from tests.proof.seeds import PROOFS, ROOT, Result, apply, page
 
@@ -31,7 +32,13 @@ def test_names_are_unique_and_proofs_exist() -> None:
     assert {seed.likely for seed in SEEDS} <= set(PROOFS)
 
 
+@pytest.mark.parametrize("seed", SEEDS, ids=lambda seed: seed.name)
+def test_what_comes_first_is_there(seed: Seed) -> None:
+    for where in seed.where:
+        assert where in SCENES if seed.likely == "environment" else (ROOT / where.partition("::")[0]).exists()
+
+
 def test_the_page_names_what_nobody_found() -> None:
-    text = "\n".join(page([Result(SEEDS[0], "scripts", 3.0, 4.0), Result(SEEDS[1], "", 0.0, 100.0)]))
+    text = "\n".join(page([Result(SEEDS[0], "scripts", "seed 7", 3.0, 4.0), Result(SEEDS[1], "", "", 0.0, 100.0)]))
     assert "1 of 2 are found" in text
     assert "**nothing**" in text

@@ -1,0 +1,73 @@
+"""What a status must say, or must not: held against the plant, which the service knows by its witnesses only."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tests.proof.judge import Charger, Judge
+
+#: What another program does to a port is told within this.
+TOLD_S = 3.0
+#: A charger that may run, and is not heard, is an alarm this long after the start.
+UNHEARD_S = 6.0
+#: Who stands by with less than this is not full; with more than that it is not deeply discharged.
+FULL_SOC, DEEP_SOC = 0.86, 0.3
+LINE_FAULTS = frozenset({"line_taken_over", "line_changed"})
+#: The charges of a station begin this far apart.
+APART_S = 1.0
+#: A plug that loses its contact again and again makes a charge begin no more often than this within a script.
+LOOSE_STARTS = 4
+
+Finding = tuple[str, str]  #: the invariant, what was seen
+
+
+@dataclass(slots=True)
+class Told:
+    """What is remembered of one charger from status to status."""
+
+    line_s: float = 0.0  #: when a change of its line was last told
+    locked_s: float | None = None  #: since when a stranger has its port
+    starts: list[float] = field(default_factory=list)  #: when a frame has switched it on
+
+
+def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterator[Finding]:
+    """What is wrong with what the status says of a bay."""
+    now_s, told, shown = judge.time.now_s, charger.told, f"{bay['state']}: {bay['reason']}"
+    if bay["state"] == "UNCONTROLLABLE" and not bay["reason"].startswith("CUT THE MAINS"):
+        yield "what to do", f"out of control is not told with what to do first: {bay['reason']!r}"
+    if bay["state"] == "FULL" and charger.rig.bay.pack.soc < FULL_SOC and _honest(charger):
+        yield "full", f"the pack has {charger.rig.bay.pack.soc:.0%}, and the status says {shown}"
+    if "deeply discharged" in shown and charger.rig.bay.pack.soc > DEEP_SOC and _honest(charger):
+        yield "what it is", f"the pack has {charger.rig.bay.pack.soc:.0%}, and the status says {shown}"
+    if judge.booted_s is None:
+        return
+    if LINE_FAULTS & {fault["id"] for fault in bay["faults"]}:
+        told.line_s = now_s
+    tty, up_s = charger.rig.tty, judge.booted_s + TOLD_S
+    reached = tty.present and charger.deaf_s < tty.changed_s - TOLD_S and tty.lock is not charger.rig.wire
+    if reached and up_s < tty.changed_s < now_s - TOLD_S and told.line_s < tty.changed_s:
+        yield "not told", f"another program has set its port up otherwise, and the status says {shown}"
+    locked = tty.lock is charger.rig.wire and tty.present
+    told.locked_s = (told.locked_s or now_s) if locked else None
+    if told.locked_s is not None and now_s - max(told.locked_s, judge.booted_s) > 2 * TOLD_S and not bay["alarm"]:
+        yield "not told", f"another program has its port, nobody is alarmed, and the status says {shown}"
+    if charger.flows and "died" in charger.waits and now_s - judge.booted_s > UNHEARD_S and not bay["alarm"]:
+        yield "nobody is told", f"it runs since the last life, nobody is alarmed, and the status says {shown}"
+
+
+def starts(judge: "Judge", charger: "Charger") -> Iterator[Finding]:
+    """A frame has switched a charger on."""
+    now_s = judge.time.now_s
+    for other in judge.chargers:
+        if other is not charger and other.told.starts and now_s - other.told.starts[-1] < APART_S:
+            yield "one after the other", f"it begins {now_s - other.told.starts[-1]:.2f} s after another bay"
+    charger.told.starts.append(now_s)
+    loose = any(one.what == "loose" and one.bay in (-1, charger.number) for one in judge.script.hazards)
+    if loose and len(charger.told.starts) > LOOSE_STARTS:
+        yield "loose plug", f"with a loose plug it has begun {len(charger.told.starts)} charges"
+
+
+def _honest(charger: "Charger") -> bool:
+    wire, bay = charger.rig.wire, charger.rig.bay
+    return not (wire.lies or wire.liars or bay.falsify)
