@@ -28,6 +28,7 @@ class Told:
 
     line_s: float = 0.0  #: when a change of its line was last told
     locked_s: float | None = None  #: since when a stranger has its port
+    ran_s: float = 0.0  #: when RUN was last written to its port
     starts: list[float] = field(default_factory=list)  #: when a frame has switched it on
 
 
@@ -52,8 +53,10 @@ def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterat
     told.locked_s = (told.locked_s or now_s) if locked else None
     if told.locked_s is not None and now_s - max(told.locked_s, judge.booted_s) > 2 * TOLD_S and not bay["alarm"]:
         yield "not told", f"another program has its port, nobody is alarmed, and the status says {shown}"
-    if charger.flows and "died" in charger.waits and now_s - judge.booted_s > UNHEARD_S and not bay["alarm"]:
+    if _runs_on(judge, charger) and now_s - judge.booted_s > UNHEARD_S and not bay["alarm"]:
         yield "nobody is told", f"it runs since the last life, nobody is alarmed, and the status says {shown}"
+    if any(fault["id"] == "internal" for fault in bay["faults"]):
+        yield "exception", shown
 
 
 def starts(judge: "Judge", charger: "Charger") -> Iterator[Finding]:
@@ -66,6 +69,13 @@ def starts(judge: "Judge", charger: "Charger") -> Iterator[Finding]:
     loose = any(one.what == "loose" and one.bay in (-1, charger.number) for one in judge.script.hazards)
     if loose and len(charger.told.starts) > LOOSE_STARTS:
         yield "loose plug", f"with a loose plug it has begun {len(charger.told.starts)} charges"
+
+
+def _runs_on(judge: "Judge", charger: "Charger") -> bool:
+    """We have had it run in a former life, and it has not understood a stop since. A bad disk may have lost that."""
+    ours = charger.stopped_s < charger.told.ran_s < (judge.booted_s or 0.0)
+    bad_disk = any(one.what == "slow" and ":disk" in one.detail for one in judge.script.hazards)
+    return charger.flows and ours and not bad_disk
 
 
 def _honest(charger: "Charger") -> bool:

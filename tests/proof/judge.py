@@ -176,7 +176,7 @@ REASONS: tuple[Reason, ...] = (
 
 
 #: Somebody reads or writes on bus and line as everybody may: no reason to stop.
-HARMLESS = ("boot", "tool", "term")
+HARMLESS = ("boot", "tool", "term", "stderr")
 #: After the last start every bay charges within this.
 GOES_ON_S = 2 * BEGIN_S
 
@@ -240,6 +240,7 @@ class Judge:
             charger.meant, charger.meant_s = "stop", self.time.now_s
         elif OPERATION_1 in data:
             charger.meant, charger.meant_s = "run", self.time.now_s
+            charger.told.ran_s = self.time.now_s
         if limit := LIMIT.search(data):
             charger.limit = limit[1][0]
 

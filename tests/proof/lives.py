@@ -364,7 +364,7 @@ def _read(index: int) -> bytes:
 
 
 def _fd(cob_id: int) -> can.Message:
-    data = b"\x43\x04\x60\x00\x58\x02\x00\x00" + bytes(56)  # looks like 60.0 °C
+    data = b"\x43\x04\x60\x00\x58\x02\x00\x00"  # looks like 60.0 °C
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_fd=True)
 
 

@@ -43,26 +43,28 @@ SCENES: dict[str, Script] = {
         systemd=False,
         end_s=50.0,
     ),
+    "standard error is not read": _scene(Hazard(1.0, "stderr", value=1), end_s=34.0),
     "disk full": _scene(
         Hazard(1.0, "slow", -1, 0.0, "write:disk:22:ENOSPC"), h(4, "kill both"), h(8, "boot"), systemd=False, end_s=50.0
     ),
     "stopped, then no power": _scene(
         h(0, "ask", 1, None, "stop"), h(3, "power", detail="nothing more"), h(5, "boot"), end_s=T + 20
     ),
-    "stopped, then no power at once": _scene(
-        h(0, "slow", -1, 5.0, "fsync:disk:60"),
-        h(0.5, "ask", 1, None, "stop"),
-        h(1.5, "power", detail="nothing more"),
-        h(3, "boot"),
-        end_s=T + 20,
+    "stopped at rest, then no power at once": _scene(
+        Hazard(3.5, "slow", -1, 5.0, "fsync:disk:60"),
+        Hazard(4.0, "ask", 2, None, "stop"),
+        Hazard(5.5, "power", detail="nothing more"),
+        Hazard(7.0, "boot"),
+        end_s=40.0,
     ),  # fmt: skip
-    "tripped, then no power": _scene(
-        h(0, "fault", 0, None, "status_bits"),
-        h(5, "power", detail="nothing more"),
-        h(6, "heal", 0),
-        h(7, "boot"),
-        end_s=T + 30,
-    ),  # fmt: skip
+    "tripped at rest, then no power": _scene(
+        Hazard(1.0, "fault", 2, None, "status_bits"),
+        Hazard(8.0, "power", detail="nothing more"),
+        Hazard(9.0, "heal", 2),
+        Hazard(10.0, "boot"),
+        bays=(Bay(soc_pct=99.0), Bay(soc_pct=99.0), Bay()),
+        end_s=45.0,
+    ),
     "charging, then no power": _scene(h(0, "power", detail="nothing more"), h(3, "boot"), end_s=T + 20),
     "charging, then the disk is torn": _scene(h(0, "power", detail="some of it, torn"), h(3, "boot"), end_s=T + 20),
     "tripped, taken out, put back": _scene(
@@ -131,8 +133,8 @@ SCENES: dict[str, Script] = {
         end_s=100.0,
     ),
     "ampere-hours over silences": _scene(
-        Hazard(45.0, "fault", 0, None, "bmu_silent"),
-        Hazard(49.0, "heal", 0),
+        Hazard(30.0, "fault", 0, None, "bmu_silent"),
+        Hazard(34.0, "heal", 0),
         bays=(Bay(small=True), Bay(), Bay()),
         end_s=130.0,
     ),  # fmt: skip
@@ -151,6 +153,7 @@ SCENES: dict[str, Script] = {
     # 8. Not the battery that is meant.
     "a pack of 36 V": _scene(bays=(Bay(cells=10, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
     "a pack of 24 V": _scene(bays=(Bay(cells=7), Bay(), Bay()), end_s=30.0),
+    "hot": _scene(h(0, "fault", 0, None, "over_temperature")),
     "a pack that collapses": _scene(h(0, "fault", 1, None, "pack_collapsed")),
     "a BMU that is frozen": _scene(
         h(0, "fault", 1, None, "bmu_frozen"), bays=(Bay(), Bay(soc_pct=80.0), Bay()), end_s=T + 400
@@ -164,6 +167,13 @@ SCENES: dict[str, Script] = {
     "cut off, then killed": _scene(
         h(0, "fault", 0, None, "charger_cut_off"), h(8, "kill both"), h(9, "boot"), end_s=T + 24
     ),
+    "cut off and not heard, then killed": _scene(
+        h(0, "fault", 0, None, "charger_cut_off"),
+        h(0, "fault", 0, None, "bmu_silent"),
+        h(8, "kill both"),
+        h(9, "boot"),
+        end_s=T + 24,
+    ),  # fmt: skip
     # 12. Others on the bus.
     **{f"on the bus, {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
     "a temperature that is forged": _scene(
