@@ -37,6 +37,7 @@ class Grant:
     voltage_v: float  #: the higher one of charger and pack
     temperature_c: float  #: of the pack
     current_limit: int | None  #: the step that the charger showed last
+    kept: bool = True  #: it is on disk that this charger may be running, so that a restart would know
 
 
 def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
@@ -54,7 +55,8 @@ def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
     if not all(t_s <= now_s < end_s for t_s, end_s in lifetimes):
         return None
     expires_s = min(end_s for _, end_s in lifetimes)
-    return Grant(expires_s, max(charger.voltage_v, volts.value), temperature.value, charger.current_limit)
+    highest_v = max(charger.voltage_v, volts.value)
+    return Grant(expires_s, highest_v, temperature.value, charger.current_limit, kept=snapshot.running_kept)
 
 
 def permit(command: Command, evidence: Grant | None, now_s: float, charger: ChargerConfig, limits: Limits) -> str:
@@ -69,6 +71,8 @@ def permit(command: Command, evidence: Grant | None, now_s: float, charger: Char
         return f"{action} {value} is no order for a charger in {charger.control.name.lower()} mode"
     if evidence is None:
         return f"{action}: no fresh reading of charger, pack voltage and pack temperature"
+    if not evidence.kept:
+        return f"{action}: it is not on disk that this charger may be running"
     if not now_s < evidence.expires_s:
         return f"{action}: the readings that it rests on are {now_s - evidence.expires_s:.1f} s too old"
     if not evidence.voltage_v <= limits.voltage_v:

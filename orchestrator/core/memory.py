@@ -48,6 +48,7 @@ class Memory:
     paused: bool = False  #: the operator paused the bay
     stopping_s: float | None = None  #: since when a stop has been tried that was not proved to last …
     verified_s: float | None = None  #: … and when standby was last proved
+    returns: int = 0  #: how often the charger has run again since that stop began
     left_s: float | None = None  #: when the battery left in mid-charge; None: it did not, or that is dealt with
     returned_s: float | None = None  #: when a battery came back so soon that only its plug can have been loose
     reverts: tuple[float, ...] = ()  #: when a setting that the charger had confirmed went back by itself

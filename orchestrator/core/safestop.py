@@ -41,8 +41,9 @@ def follow_stop(f: Facts, before: State) -> None:
             memory.verified_s, memory.unverified = f.now_s, False
     elif before not in UNVERIFIED and memory.state in UNVERIFIED:
         lasted_s = f.now_s - memory.verified_s if memory.verified_s is not None else LASTS_S
-        runs_again = (f.runs or f.unordered) and lasted_s < LASTS_S
-        if not runs_again or memory.stopping_s is None:
+        runs_again = (f.runs or f.unordered) and lasted_s < LASTS_S and memory.stopping_s is not None
+        memory.returns = memory.returns + 1 if runs_again else 0
+        if not runs_again:
             memory.stopping_s = f.now_s
 
 
@@ -50,6 +51,15 @@ def proved_to_last(f: Facts) -> bool:
     """The charger, which did not obey before, has stood by for long enough to be believed."""
     proof = f.memory.witnessed.proof
     return f.stopped and f.charger.online and f.now_s - proof[0] >= LASTS_S
+
+
+def _runs_again(f: Facts) -> bool:
+    """It was stopped before, in vain. One reply alone may be a stray measurement: a second one, or a second return, is
+    none."""
+    since_s, stopping_s, reading = f.memory.since_s, f.memory.stopping_s, f.reading
+    if since_s is None or stopping_s is None or f.now_s - stopping_s < OBEY_STOP_S:
+        return False
+    return f.memory.returns > 1 or f.unordered or (f.runs and reading is not None and reading.t_s > since_s)
 
 
 def gives_up(f: Facts) -> bool:
@@ -60,9 +70,7 @@ def gives_up(f: Facts) -> bool:
     """
     memory = f.memory
     if memory.state is State.STOPPING:
-        return f.state_s >= OBEY_STOP_S or (
-            memory.stopping_s is not None and f.now_s - memory.stopping_s >= OBEY_STOP_S
-        )
+        return f.state_s >= OBEY_STOP_S or _runs_again(f)
     if memory.state is not State.STARTING:
         return False
     if f.unordered and f.state_s >= OBEY_STOP_S:

@@ -142,7 +142,8 @@ class ChargerPort:
                 self._once()
             except Exception as error:  # noqa: BLE001 - a thread that dies here is a charger that nobody stops
                 self._broken(error)
-        self._drop_line()
+        line, self._line = self._line, None
+        self._let_go(line)
 
     def _finished(self) -> bool:
         if self._close_by_s is None:
@@ -278,18 +279,18 @@ class ChargerPort:
 
     def _broken(self, error: Exception) -> None:
         """A port that failed is closed and opened again. After anything else the charger is stopped and polled on."""
-        locked_by = self._view[1].locked_by
+        line, locked_by = None, self._view[1].locked_by
         if isinstance(error, LinkError):
             problem, locked_by = str(error), ""
-            self._drop_line()
+            line, self._line = self._line, None
         else:
             problem = f"internal: {type(error).__name__}: {error}"
             self._restart()
         with suppress(Exception):  # it may be `on_change` itself that fails
             self._publish(online=False, problem=problem, locked_by=locked_by)
+        self._let_go(line)  # last: a driver may take its time, and nobody must take the port for well meanwhile
 
-    def _drop_line(self) -> None:
-        line, self._line = self._line, None
+    def _let_go(self, line: Line | None) -> None:
         if line is not None:
             self._open_at_s = max(self._open_at_s, self._clock() + LET_GO_S)
             with suppress(Exception):  # whatever its close has to say, the line is not used any more

@@ -18,7 +18,7 @@ class Console:
     """`say` never waits. From `start` to `close`, whoever prints to `sys.stderr` says it here, too."""
 
     def __init__(self, fd: int = FD) -> None:
-        self._fd = fd
+        self._fd = fd if sys.__stderr__ is not None else None  # started without: by now that may be a charger's port
         self._said: deque[str] = deque()
         self._left_out = 0
         self._lock = threading.Lock()  # guards the lines; nobody writes with it
@@ -55,8 +55,9 @@ class Console:
             self._wake.clear()
             ended = self._ended
             while text := self._next():
-                with suppress(OSError):  # nobody has to listen
-                    _write(self._fd, f"{text}\n".encode(errors="backslashreplace"))
+                if self._fd is not None:
+                    with suppress(OSError):  # nobody has to listen
+                        _write(self._fd, f"{text}\n".encode(errors="backslashreplace"))
             if ended:
                 return
 

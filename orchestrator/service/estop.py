@@ -137,8 +137,10 @@ class EmergencyStop:
         for together in stations():
             journals = []
             for station in together:
+                before = len(self._bays)
                 journals.append(self._take(station))
-                self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has no such
+                if journals[-1] or len(self._bays) > before:
+                    self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has none
             if self._bays or any(journals):
                 return journals
         return []

@@ -75,6 +75,8 @@ def _charger(config: ChargerConfig, show: Show) -> bool:
         return False
     dialogue = Dialogue()
     try:
+        if stranger := line.locked_by():
+            show(f"charger on {config.port}: {stranger} has locked this port, and may take its answers")
         for _ in REQUESTS:
             reading, exchange = _ask(line, dialogue)
             if reading is not None:

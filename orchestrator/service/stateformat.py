@@ -37,9 +37,10 @@ class Stamp:
 
 
 def encode(stamp: Stamp, run: int, entries: Sequence[Entry]) -> bytes:
-    """The file's bytes."""
+    """The file's bytes, one entry a line."""
     head = {"format": FORMAT, "written": stamp.wall_s, "clock_s": stamp.clock_s, "boot": stamp.boot, "run": run}
-    return (json.dumps({**head, "entries": [_entry(entry) for entry in entries]}, indent=1) + "\n").encode()
+    lines = ",\n".join(json.dumps(_entry(entry)) for entry in entries)
+    return f'{json.dumps(head)[:-1]}, "entries": [\n{lines}\n]}}\n'.encode()
 
 
 def _entry(entry: Entry) -> dict[str, object]:

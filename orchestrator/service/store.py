@@ -12,7 +12,7 @@ overwritten. Where the disk does not answer in time, nothing is written at all, 
 import os
 import threading
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.core.persisted import Persisted
@@ -38,6 +38,8 @@ class _Put:
     persisted: Persisted
     at_s: float
     run: int
+    gist: object
+    counters: object
 
 
 class Store:
@@ -62,6 +64,7 @@ class Store:
         self._clock, self._wall, self._boot, self._on_kept = clock, wall, boot, on_kept
         self._lock = threading.Lock()  # guards what follows; nobody waits for a disk with it
         self._table: dict[Place, _Put] = {}
+        self._gists: dict[Place, object] = {}  # as they were last written
         self._disk: dict[Place, Persisted] = {}  # without what a write under way may turn round
         self._revision, self.kept_revision = 1, 0  # the file is written once at the start
         self._pending_s: float | None = None  # since when a change has been waiting for the disk …
@@ -107,10 +110,10 @@ class Store:
         """Remember this from now on. The revision that keeps it: `kept_revision` comes to it."""
         now_s = self._clock()
         with self._lock:
-            old = self._table[place].persisted
-            self._table[place] = _Put(persisted, now_s, self._table[place].run)
-            if persisted.gist == old.gist:
-                self._counted = self._counted or _counters(persisted) != _counters(old)
+            old = self._table[place]
+            new = self._table[place] = _put(persisted, now_s, old.run)
+            if new.gist == old.gist:
+                self._counted = self._counted or new.counters != old.counters
                 return self._revision
             self._revision += 1
             if self._pending_s is None:
@@ -185,7 +188,7 @@ class Store:
 
     def _begin(self, entries: Sequence[Entry]) -> None:
         now_s = self._clock()
-        self._table = {entry.place: _Put(entry.persisted, now_s, entry.run) for entry in entries}
+        self._table = {entry.place: _put(entry.persisted, now_s, entry.run) for entry in entries}
         self._pending_s = now_s
 
     def _load(self) -> Sequence[Entry]:
@@ -227,7 +230,7 @@ class Store:
         with self._lock:
             revision, table, self._counted = self._revision, dict(self._table), False
             self._later_s = None
-            changed = {place for place, put in table.items() if _gist(self._disk.get(place)) != put.persisted.gist}
+            changed = {place for place, put in table.items() if self._gists.get(place) != put.gist}
             self._disk = {
                 place: one for place, one in self._disk.items() if one.running is table[place].persisted.running
             }
@@ -249,6 +252,7 @@ class Store:
             return
         with self._lock:
             self._disk = {place: put.persisted for place, put in table.items()}
+            self._gists = {place: put.gist for place, put in table.items()}
             self.kept_revision, self._pending_s = revision, self._later_s
             self._problem, self._written_s = "", stamp.clock_s
         self._on_kept(changed)
@@ -270,11 +274,7 @@ def _said(error: OSError, path: Path) -> str:
     return f"{error.filename or path}: {error.strerror or error}"
 
 
-def _gist(persisted: Persisted | None) -> object:
-    return persisted and persisted.gist
-
-
-def _counters(persisted: Persisted) -> object:
-    """What changes all the time while current flows."""
-    session = persisted.session and replace(persisted.session, started_s=0.0)
-    return session, persisted.soc and persisted.soc[1]
+def _put(persisted: Persisted, now_s: float, run: int) -> _Put:
+    session, soc = persisted.session, persisted.soc
+    counters = (session and (session.elapsed_s, session.charged_ah), soc and soc[1])  # they change while current flows
+    return _Put(persisted, now_s, run, persisted.gist, counters)

@@ -63,7 +63,9 @@ class Service:
                 self._seen = time.monotonic(), dict(self._bays())
             except (ServiceError, LookupError, TypeError, ValueError) as error:
                 if not self.told.is_set():
-                    self.said = f"the service has not taken the stop ({error}): nobody holds its bays"
+                    silent = str(error).startswith("no service answers")
+                    why = "it does not answer" if silent else error
+                    self.said = f"the service has not taken the stop ({why}): nobody holds its bays"
             time.sleep(LOOK_S)
 
     def _hold(self) -> bool:

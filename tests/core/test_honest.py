@@ -1,4 +1,4 @@
-"""Honest devices: a BMU that is late and coarse, a charger that pulses and tapers, a line that loses frames."""
+"""Honest devices as they are: a BMU that is late and coarse, a charger that pulses and tapers, a poor line."""
 
 from collections import deque
 from collections.abc import Callable

@@ -25,7 +25,7 @@ every_state = pytest.mark.parametrize("state", State)
 
 def answers(world: World, pattern: str) -> None:
     """Reply by reply: `0` shows standby, `1` shows that it runs and delivers; until the bay is out of control."""
-    end_s = world.now_s + 4.5
+    end_s = world.now_s + 10.0
     for shown in cycle(pattern):
         world.shows = {"operation": Operation(int(shown)), "current_a": 14.0 if shown == "1" else 0.0}
         world.tick()
@@ -34,7 +34,7 @@ def answers(world: World, pattern: str) -> None:
 
 
 @pytest.mark.parametrize("pattern", ["1", "01", "10", "001", "010", "100", "0001", "000001", "0011", "00000000001"])
-def test_a_charger_that_says_now_this_and_now_that_is_out_of_control_in_three_seconds(pattern: str) -> None:
+def test_a_charger_that_says_now_this_and_now_that_is_out_of_control(pattern: str) -> None:
     world = charging()
     world.pack_amps = 0.0  # the BMU is no help
     world.ask(Request.STOP)
@@ -43,7 +43,9 @@ def test_a_charger_that_says_now_this_and_now_that_is_out_of_control_in_three_se
     assert world.is_in(State.UNCONTROLLABLE), world.decision
     assert world.decision.alarm
     assert world.decision.command == STOP
-    assert 3.0 <= world.now_s - stopped_s <= 4.0
+    # A single reply among others may be a stray measurement; the second of its kind is none.
+    most_s = 4.0 if "11" in pattern + pattern[0] or len(pattern) < 3 else 4.0 + 2 * len(pattern) * TICK_S
+    assert 3.0 <= world.now_s - stopped_s <= most_s
     assert world.decision.reason.startswith("CUT THE MAINS of this charger (/dev/ttyX)")
     for shown in cycle(pattern):  # and it stays so, as long as the charger does
         world.shows["operation"] = Operation(int(shown))

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 
 import pytest
 
@@ -553,8 +554,11 @@ def test_a_stop_goes_out_at_the_right_speed_whatever_the_port_was_set_to(
     bench.port.order(SET_STEP_2, good())
     wait_until(lambda: hard_of_hearing.orders[-1:] == [STEP_2])
     stty(pty.path, "115200", "echo")
+    ordered_s = time.monotonic()
     bench.port.order(STOP)
     wait_until(lambda: hard_of_hearing.orders[-2:] == [REST_STOP, OPERATION_STOP])
+    stop_s = next(at_s for at_s, frame in hard_of_hearing.frames if at_s > ordered_s and frame == REST_STOP)
+    assert stop_s - ordered_s < 0.4, "not the one that is repeated after 500 ms"
     assert bench.link.taken_over == "115200 baud, echo on"
     assert bench.link.taken_over_t_s is not None
     assert time.monotonic() - bench.link.taken_over_t_s < 5
@@ -658,6 +662,23 @@ def test_a_line_that_cannot_even_be_closed_does_not_end_the_thread(pty: Pty, cha
         bench.wait_online()
         pty.unplug()
         bench.wait_problem("no such port")
+        pty.plug()
+        bench.wait_online()
+
+
+def test_a_close_that_hangs_is_no_line_that_is_well(pty: Pty, charger: FakeCharger) -> None:
+    goes_on = Event()
+
+    class Stuck(SerialLine):
+        def close(self) -> None:
+            goes_on.wait(30)
+            super().close()
+
+    with running(pty.path, open_line=lambda: Stuck.open(pty.path)) as bench:
+        bench.wait_online()
+        pty.unplug()
+        bench.wait_problem("unplugged")
+        goes_on.set()
         pty.plug()
         bench.wait_online()
 

@@ -94,7 +94,8 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("G7", "clock jump, suspended machine", "ages are monotonic: the wall clock may jump as it likes"),
     Entry("G8", "disk full, log blocked", "charging goes on, and `status` says it; a lost list of latched faults, "
           "`service/store.py`, holds every bay"),
-    Entry("G9", "two services", "`link/serial.py` (lock of the port), `service/control.py` (socket): the second ends"),
+    Entry("G9", "two services", "`link/serial.py` (lock of the port), `service/socketfile.py` (socket), "
+          "`service/store.py` (state): the second ends"),
     Entry("G10", "power lost in mid-charge", "`core/persisted.py`: a charge that nobody ended is not resumed"),
     Entry("P1", "bad policy", "`config/`: refused with every error's line; `run` does not start"),
     Entry("P2", "policy changed while charging", "read anew on SIGHUP, taken over by a bay when it stands by"),
@@ -103,7 +104,7 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("P5", "start while latched or unknown", "`core/operator.py`: refused, and the cause named"),
     Entry("P6", "resets without a remedy", "`core/operator.py`: the fourth within an hour is refused, with the time"),
     Entry("P7", "control socket: strangers, floods",
-          "`service/control.py`: owner and root only, bounded; a stop goes first; who is turned away is said"),
+          "`service/control.py`: owner and root only; stops first, 256 clients at once; who is turned away is said"),
     Entry("P8", "pairing not proved", "`service/starts.py`: charges of one station begin one after another"),
     Entry("P9", "not kept", "`service/store.py`: what must survive and is not on disk after 2 s lets no charge begin"),
     Entry("P10", "bay without its past", "`service/past.py`: held; a person starts it"),

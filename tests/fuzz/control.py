@@ -3,6 +3,7 @@
 import json
 import re
 import socket
+import sys
 from collections.abc import Mapping
 from selectors import EVENT_READ
 from time import monotonic
@@ -54,6 +55,7 @@ def _service() -> tuple[Supervisor, Loop]:
     (directory / "station.yaml").write_text(STATION.replace("&", bays), encoding="utf-8")
     ours, _theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     supervisor = Supervisor(load_station(directory / "station.yaml"), GuardianLink(ours.detach()))
+    supervisor._store.kept_revision = sys.maxsize  # the disk takes everything at once
     loop = Loop(supervisor)
     supervisor._wake = loop  # type: ignore[assignment]  # no more is needed of a queue
     return supervisor, loop

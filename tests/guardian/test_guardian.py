@@ -787,10 +787,10 @@ def test_a_line_that_is_given_back_is_free(tmp_path: Path, contactor: Contactor)
         for _ in range(2):  # the second one takes the first one's place
             guardian.send(CONTACTOR + b"bay-1", contactor.writer)
         guardian.beat()
-        assert guardian.files == before + 1
+        wait_until(lambda: guardian.files == before + 1)
         guardian.send(CONTACTOR + b"bay-1")
         guardian.beat()
-        assert guardian.files == before
+        wait_until(lambda: guardian.files == before)
         guardian.link.close()
         assert guardian.ended() == 0
         assert contactor.opened() == 0

@@ -247,3 +247,10 @@ def test_the_evidence_may_be_bad_news() -> None:
     found = grant(replace(FRESH, battery=hot), NOW_S)
     assert found is not None
     assert passing(found) == STOPS
+
+
+def test_nothing_but_a_stop_passes_before_it_is_on_disk_that_the_charger_may_run() -> None:
+    assert passing(replace(GOOD, kept=False)) == STOPS
+    assert permit(RUN, replace(GOOD, kept=False), NOW_S, MANUAL, LIMITS) == (
+        "run: it is not on disk that this charger may be running"
+    )

@@ -87,6 +87,21 @@ def test_one_that_takes_nothing_right_now_is_waited_for(pipe: Pipe) -> None:
     assert not console._thread.is_alive()
 
 
+def test_a_service_that_was_started_without_it_writes_into_nothing_else(
+    pipe: Pipe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What has its number by then may be a charger's port."""
+    reader, writer = pipe
+    monkeypatch.setattr(sys, "__stderr__", None)
+    console = Console(writer)
+    console.start()
+    console.say("bay-1: IDLE")
+    console.close()
+    os.set_blocking(reader, False)
+    with pytest.raises(BlockingIOError):
+        os.read(reader, 1)
+
+
 def test_whoever_prints_waits_for_no_reader_either(pipe: Pipe) -> None:
     """A traceback of a library's thread, say."""
     reader, writer = pipe

@@ -18,6 +18,7 @@ from orchestrator.service.compare_maps import comparison
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.probe import probe
 from orchestrator.sim.client import PlantProcess
+from tests.link.strangers import holding
 from tests.sim.wires import on_bus, udp_keys
 from tests.whole.station import Document, orchestrator, station_document
 
@@ -66,6 +67,13 @@ def _other_site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     site = Site(tmp_path_factory.mktemp("other"), "--soc", "50", "--layout", "first-low", "--automatic")
     yield site
     site.plant.close()
+
+
+def test_a_port_that_a_stranger_has_locked_is_probed_and_told(site: Site) -> None:
+    with holding(str(site.plant.bays[0]["port"])) as stranger:
+        status, shown = site.probe()
+    assert status == 0
+    assert f"(pid {stranger.pid}) has locked this port, and may take its answers" in shown
 
 
 def set_map(name: str) -> Callable[[Document], None]:

@@ -1,14 +1,18 @@
 """A policy that is changed while a bay charges: read anew when asked, in force at the next standby, never half."""
 
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 from orchestrator.config.load import load_station
 from orchestrator.config.shipped import shipped_dir
+from orchestrator.config.station import Station
 from orchestrator.model import Request, State
 from orchestrator.service.reload import Reload
 from tests.service.bench import Bench
+from tests.waiting import wait_until
 
 STATION = """\
 station: test
@@ -86,6 +90,40 @@ def test_what_stands_by_takes_it_over_at_once(site: Site) -> None:
     site.bench.step()
     assert site.policy["sha256"] != before
     assert any("is in force" in line for line in site.bench.said)
+
+
+def test_many_hangups_are_one_thread_and_one_more_reading(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disk hangs while it is asked for again and again: nobody waits, nothing piles up."""
+    readings, go = [], threading.Event()
+
+    def hanging(file: Path) -> Station:
+        readings.append(file)
+        go.wait()
+        return load_station(file)
+
+    monkeypatch.setattr("orchestrator.service.reload.load_station", hanging)
+    before = threading.active_count()
+    site.reload.start()
+    site.reload.ask()
+    wait_until(lambda: len(readings) == 1, what="the first reading")
+    began_s = time.monotonic()
+    for _ in range(1000):
+        site.reload.ask()
+    assert time.monotonic() - began_s < 1
+    assert threading.active_count() == before + 1
+    go.set()
+    wait_until(lambda: len(site.said) == 2, what="what came of it")
+    assert len(readings) == 2
+
+
+def test_a_reading_that_fails_in_our_own_code_is_not_the_last(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as broken_world:
+        broken_world.setattr("orchestrator.service.reload.load_station", lambda _: 1 / 0)
+        site.reload.start()
+        site.reload.ask()
+        wait_until(lambda: "reload failed, every policy stays as it is: ZeroDivisionError" in "".join(site.said))
+    site.reload.ask()
+    wait_until(lambda: "bay-1: reload: policy" in "".join(site.said), what="the next one")
 
 
 def test_a_comment_changes_the_lines_that_reasons_name(site: Site) -> None:

@@ -138,10 +138,11 @@ def test_since_is_the_wall_clock() -> None:
 
 def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
     station = load_station(shipped_dir() / Path("configs/stations/one-bay.yaml"))
-    assert station_status(station, [], "disk full") == {
+    stray = {"bay": "bay-9", "port": "/dev/x", "state": "STOPPING", "verified": False, "problem": ""}
+    assert station_status(station, [], "disk full", "worn", [stray]) == {
         "station": "depot-1",
         "bays": [],
-        "strays": [],
+        "strays": [stray],
         "journal": {"problem": "disk full"},
-        "persisted": {"problem": ""},
+        "persisted": {"problem": "worn"},
     }

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -109,6 +110,56 @@ def test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one(station: Station) -
     assert service.ended() == 1
     assert service.log().splitlines()[-1] == f"ended: NOT kept: {journal / 'persisted.json'}: No space left on device"
     assert (plant.state(1)["operation"], plant.state(2)["operation"]) == (0, 0)
+
+
+@pytest.mark.parametrize("call", ["fsync", "write"])
+def test_a_disk_that_hangs_delays_no_stop_and_is_named_at_the_end(station: Station, call: str) -> None:
+    """A worn SD card. The charger stops at once, who asked is told that it is not kept, and the end has an end."""
+    plant, healthy = station
+    service = Service(healthy.directory, json.loads(healthy.file.read_text()), ("-m", "tests.whole.worn", call))
+    try:
+        charging(plant, service.start(), 1, 2)
+        os.kill(service.controller, signal.SIGUSR1)
+        began_s = time.monotonic()
+        answers: list[str] = []
+        asking = threading.Thread(target=lambda: answers.append(service.ask("stop", "bay-1")["bay-1"]))
+        asking.start()
+        wait_until(lambda: plant.state(1)["operation"] == 0, 2, "the stop")
+        assert time.monotonic() - began_s < 1
+        asking.join()
+        assert answers[0].startswith("done, but not kept: a restart would forget what changes: ")
+        wait_until(lambda: "unkept" in [fault["id"] for fault in service.bay("bay-2")["faults"]], what="the fault")
+        assert service.bay("bay-2")["state"] == "CHARGING", "what is under way goes on"
+        began_s = time.monotonic()
+        service.signal(signal.SIGTERM)
+        assert service.ended() == 1
+        assert time.monotonic() - began_s < 9
+        assert "ended: NOT kept: " in service.log()
+        assert service.log().splitlines()[-1].endswith("is not written within 2.5 s: its disk hangs")
+        assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
+    finally:
+        service.close()
+    healthy.start()
+    reason = healthy.wait("IDLE")["bay-1"]["reason"]
+    assert "ended in mid-charge" in reason, "the disk knows of its beginning, and of no end"
+
+
+def test_a_disk_that_does_not_tell_the_past_holds_every_bay_after_the_stops(station: Station) -> None:
+    plant, healthy = station
+    charging(plant, healthy.start(), 1, 2)
+    healthy.kill_all()
+    service = Service(healthy.directory, json.loads(healthy.file.read_text()), ("-m", "tests.whole.worn", "now-read"))
+    try:
+        service.start()
+        bays = service.wait("IDLE", ["bay-1", "bay-2"])
+        assert all("does not answer: nobody knows which faults were latched" in bay["reason"] for bay in bays.values())
+        assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
+        service.signal(signal.SIGTERM)
+        assert service.ended() == 1
+        assert "NOT kept: " in service.log().splitlines()[-1]
+    finally:
+        service.close()
+    assert {entry["running"] for entry in kept(healthy).values()} == {True}, "what was there was left alone"
 
 
 def test_a_charger_that_the_station_file_has_lost_is_stopped_by_the_next_start(station: Station) -> None:

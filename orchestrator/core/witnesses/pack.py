@@ -41,7 +41,7 @@ def collapsed(f: Facts) -> str | None:
         return None
     rule, pack, source = f.rules.policy.precharge, f.rules.policy.pack, f.rules.policy.source
     floor_v, at = (rule.below_v, "precharge.below_v") if rule is not None else (pack.voltage_v.low, "pack.voltage_v")
-    if f.rules.manual and f.pack_v < floor_v * (1 - MARGIN):
+    if f.rules.manual and f.pack_v < floor_v * (1 - MARGIN) and f.volts < floor_v:
         return f"the pack has sunk to {f.pack_v:.2f} V while it is charged, below {floor_v:g} V ({source.at(at)})"
     for sample in f.memory.witnessed.trail:
         fell_v, charger_fell_v = sample.pack_v - f.pack_v, sample.charger_v - f.volts

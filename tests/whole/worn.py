@@ -1,0 +1,37 @@
+"""The unchanged service on a disk that hangs from SIGUSR1 on: `python -m tests.whole.worn CALL [FD] STATION`.
+
+CALL is the call of the kernel's that does not return any more, for the store and for the journal; with "now-" before it
+it never does. Without FD it is the guardian, and starts itself as its controller.
+"""
+
+import os
+import signal
+import sys
+import threading
+
+from orchestrator.service import controller, disk, guardian, loading, rotating
+
+ARMED = threading.Event()
+
+
+class Worn:
+    """`os`, but for one call."""
+
+    def __init__(self, call: str) -> None:
+        self._call = call.removeprefix("now-")
+        if self._call != call:
+            ARMED.set()
+
+    def __getattr__(self, name: str) -> object:
+        if name == self._call and ARMED.is_set():
+            threading.Event().wait()
+        return getattr(os, name)
+
+
+if __name__ == "__main__":
+    call, *arguments = sys.argv[1:]
+    if len(arguments) == 1:
+        sys.exit(guardian.guard(arguments, ("-m", "tests.whole.worn", call)))
+    disk.os = loading.os = rotating.os = Worn(call)  # type: ignore[attr-defined,assignment]  # their whole disk
+    signal.signal(signal.SIGUSR1, lambda *_: ARMED.set())
+    sys.exit(controller.main(int(arguments[0]), arguments[1]))
