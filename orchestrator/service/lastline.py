@@ -218,7 +218,8 @@ class LastLine:
             fd, self._fd = self._fd, None
             if self.why == STALLED:
                 drop_port(fd)
-            else:
+                return
+            with suppress(OSError):  # it is closed, whatever its driver says to that
                 os.close(fd)
 
 

@@ -12,6 +12,7 @@ overwritten. Where the disk does not answer in time, nothing is written at all, 
 import os
 import threading
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -262,9 +263,10 @@ class Store:
 
     def _give_up_ownership(self) -> None:
         """At the end; or somebody has removed the directory and the lock in it, and it has to be locked anew."""
-        if self._descriptor is not None:
-            os.close(self._descriptor)
-            self._descriptor = None
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            with suppress(OSError):  # it is closed, whatever the file system says to that
+                os.close(descriptor)
 
     def _stamp(self) -> Stamp:
         return Stamp(self._wall(), self._clock(), self._boot)

@@ -49,17 +49,17 @@ def test_a_station_becomes_one_frozen_object() -> None:
 
 
 def test_paths_are_relative_to_the_station_file() -> None:
-    _write("site/policies/mine.yaml", POLICY)
-    _write("site/maps/mine.yaml", MAP)
+    _write("s/policies/mine.yaml", POLICY)
+    _write("s/maps/mine.yaml", MAP)
     text = STATION.replace("policy: li-ion-48v", "policy: ../policies/mine.yaml").replace(
         "map: tabos", "map: ../maps/mine.yaml"
     )
-    station = load_station(_write("site/stations/x.yaml", text.replace("/dev/ttyS1", "./charger-1")))
-    assert station.control.socket == Path("site/stations/run/orchestrator.sock")
-    assert station.journal.directory == Path("site/stations/run/journal")
-    assert station.bays[0].charger.port == "site/stations/charger-1"
-    assert station.bays[0].policy.source.file == "site/policies/mine.yaml"
-    assert station.bays[0].battery.map.source.file == "site/maps/mine.yaml"
+    station = load_station(_write("s/stations/x.yaml", text.replace("/dev/ttyS1", "./charger-1")))
+    assert station.control.socket == Path("s/stations/run/orchestrator.sock")
+    assert station.journal.directory == Path("s/stations/run/journal")
+    assert station.bays[0].charger.port == "s/stations/charger-1"
+    assert station.bays[0].policy.source.file == "s/policies/mine.yaml"
+    assert station.bays[0].battery.map.source.file == "s/maps/mine.yaml"
 
 
 def test_what_several_bays_name_is_read_once() -> None:

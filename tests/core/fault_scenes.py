@@ -165,7 +165,8 @@ def still(**moved: float) -> Act:
     """The charger goes on saying what it says now, whatever moves."""
 
     def act(world: World) -> None:
-        world.shows |= {"voltage_v": world.reading.voltage_v, "current_a": world.reading.current_a}  # type: ignore[union-attr]  # it has been read
+        if world.reading is not None:
+            world.shows |= {"voltage_v": world.reading.voltage_v, "current_a": world.reading.current_a}
         world.values.update(moved)
 
     return act

@@ -7,7 +7,7 @@ the controller that it starts; `estop` is the real one; what they keep is on a d
 
 import json
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -308,7 +308,7 @@ class Gateway:
             raise ServiceError(asked.error or "no answer")
         return {"ok": True, **asked.answer}
 
-    def _holder(self, port: str) -> str:
-        """The control socket of the service that has this port locked."""
-        tty = self.kernel.ttys.get(port)
-        return SOCKET if tty is not None and tty.lock is not None and self.door is not None else ""
+    def _holder(self, ports: Iterable[str]) -> str:
+        """The control socket of the service that has one of these ports locked."""
+        locked = any((tty := self.kernel.ttys.get(port)) is not None and tty.lock is not None for port in ports)
+        return SOCKET if locked and self.door is not None else ""

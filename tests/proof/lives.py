@@ -260,7 +260,9 @@ class Player:
         for rig in self._rigs(hazard):
             rig.catch_up()
             lie = Lie(0, max(1, int(every)), inf if int(every) else 1)
-            rig.bay.falsify[name] = _liar(lie, how, getattr(rig.bay.readout(), name), hazard.value or 0.0)
+            value = hazard.value or 0.0
+            told = int(value) if name == "status" else value  # a word of bits
+            rig.bay.falsify[name] = _liar(lie, how, getattr(rig.bay.readout(), name), told)
             rig.steady = int(every) == 1
             rig.frozen = False  # not in all of its words
 

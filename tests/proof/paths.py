@@ -36,5 +36,6 @@ PATHS: dict[str, Script] = {
         (16.0, "reset")
     ),
     "QUALIFYING → OFFLINE": _script(HALF, (3.0, "bmu_reboot")),
+    "IDLE → SUSPENDED": _script(BaySetup(soc_pct=99.0, line="perfect"), (4.0, "pause")),
     "SUSPENDED → OFFLINE": _script(HALF, (5.0, "pause"), (7.0, "charger_cut_off")),
 }  # fmt: skip

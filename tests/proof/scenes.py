@@ -47,6 +47,7 @@ SCENES: dict[str, Script] = {
     "disk full": _scene(
         Hazard(1.0, "slow", -1, 0.0, "write:disk:22:ENOSPC"), h(4, "kill both"), h(8, "boot"), systemd=False, end_s=50.0
     ),
+    "the lock cannot be closed": _scene(h(0, "slow", -1, 0.0, "close:disklock:60:EIO"), h(0.5, "term"), end_s=T + 6),
     "stopped, then no power": _scene(
         h(0, "ask", 1, None, "stop"), h(3, "power", detail="nothing more"), h(5, "boot"), end_s=T + 20
     ),
@@ -124,6 +125,9 @@ SCENES: dict[str, Script] = {
     "a port that closes never": _scene(h(0, "slow", 0, FOR_EVER, "close:port:60"), h(0.5, "kill")),
     "a port that closes slowly": _scene(
         h(0, "slow", 0, 5.0, "close:port:60"), h(0.5, "fault", 0, None, "port_gone"), h(1.5, "heal", 0), end_s=T + 16
+    ),
+    "a port whose closing fails": _scene(
+        h(0, "slow", 0, 0.0, "close:port:60:EIO"), h(0.1, "fault", 0, None, "port_gone"), h(1, "heal", 0), h(3, "kill")
     ),
     "settings take for ever": _scene(h(0, "slow", 0, FOR_EVER, "tcsetattr:port:60"), h(0.5, "kill")),
     # 6. Limits that a restart forgets.

@@ -40,8 +40,9 @@ STRENGTHS: dict[str, tuple[float, ...]] = {
     "emergency": (float(0x1000), float(0x4210)),
     "illegal_value": (0.0, 255.0),
 }
-#: A charge begins within this, and what follows a fault is seen within that.
-BEGIN_S, SEE_S = 7.0, 9.0
+#: A charge begins within this, and what follows a fault is seen within that. Once all faults are gone, standby is
+#: believed again within this, also of a charger that has not obeyed.
+BEGIN_S, SEE_S, END_S = 7.0, 9.0, 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +103,7 @@ class Script:
             seed=seed,
             bays=bays,
             happenings=happenings,
-            end_s=round(last_s + (8.0 if heals else 0.0), 3),
+            end_s=round(last_s + (END_S if heals else 0.0), 3),
             heal_s=round(last_s, 3) if heals else None,
             sweep_s=dice.choices((0.05, 0.1, 0.3), (1, 3, 3))[0],
             tpdo_s=dice.choice((None, None, None, 0.1)),

@@ -16,7 +16,8 @@ from tests.proof.scenes import SCENES
 #: Scenes and random scripts that are played each time; `make campaign` plays all, and a thousand.
 SHORT: tuple[str | int, ...] = (
     "nothing happens", "another speed, then killed", "locked by a stranger", "charging, then the disk is torn",
-    "crossed cables, hot", "says standby now and then", "half dead adapter, estop", "stopped while it ends", 0, 3, 58,
+    "crossed cables, hot", "says standby now and then", "half dead adapter, estop", "stopped while it ends",
+    "the lock cannot be closed", "a port whose closing fails", 0, 3, 58,
 )  # fmt: skip
 Patch = pytest.MonkeyPatch
 

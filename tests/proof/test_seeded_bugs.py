@@ -15,6 +15,7 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.model import ChargeMode, Effect, Precharge, Request, State
 from orchestrator.workbench.endings import ENDINGS, reaches, settles
@@ -153,6 +154,21 @@ def wakes_with_the_wrong_function(patch: Patch) -> None:
     patch.setitem(step_module.SETPOINTS, State.PRECHARGE_PULSE, (ChargeMode.PRECHARGE, Precharge.OFF))
 
 
+def nobody_believes_the_bmu(patch: Patch) -> None:
+    patch.setattr(Facts, "unordered", property(lambda f: False))
+
+
+def written_down(change: Callable[[Persisted], Persisted]) -> Callable[[Patch], None]:
+    """What a restart begins with is this."""
+    of = Persisted.of
+    return lambda patch: patch.setattr(Persisted, "of", lambda memory, now_s: change(of(memory, now_s)))
+
+
+def counts_anew(persisted: Persisted) -> Persisted:
+    session = persisted.session
+    return replace(persisted, session=session and replace(session, energised_s=0.0, charged_ah=0.0))
+
+
 def never_full(patch: Patch) -> None:
     patch.setattr(course_module, "finished", lambda f: None)
 
@@ -173,6 +189,9 @@ BUGS: dict[str, Callable[[Patch], None]] = {
     "temperature limit": without("over_temperature", "under_temperature", "hot_trip"),
     "standing stop": nothing_must_stop,
     "alarm": silent_alarm,
+    "unordered": nobody_believes_the_bmu,
+    "death": written_down(lambda persisted: replace(persisted, running=False)),
+    "counters": written_down(counts_anew),
     "in time": never_gives_up,
     "precharge": without("precharge_too_long", "precharge_no_rise"),
     "hours": without("time_limit"),
@@ -198,7 +217,7 @@ def test_the_bug_is_caught(name: str, monkeypatch: Patch) -> None:
     if name in {rule.name for rule in PROPERTIES} | {"no exception"}:
         explorer.run(until=name)
     else:
-        explorer.run(most=120)
+        explorer.run(most=400)
         reaches(explorer, [ending for ending in ENDINGS if ending.name == name])
         settles(explorer) if name == "no livelock" else None
     assert name in explorer.found, f"not seen; seen: {list(explorer.found)}"

@@ -26,7 +26,7 @@ def test_a_signal_stops_the_chargers_and_ends_well(tmp_path: Path, number: signa
         assert (truth["operation"], truth["current_a"], truth["run"]) == (0, 0, False)
         assert service.log().splitlines()[-1] == "ended: every charger stands by, verified"
         assert not service.socket.exists()
-        assert service.path_of("bay-1")[-3:] == ["CHARGING", "STOPPING", "IDLE"]
+        assert service.path_of("bay-1")[-3:] == ["CHARGING", "STOPPING", "SUSPENDED"]
         assert service.journal("bay-1", "session")[-1]["event"] == "end"
 
 

@@ -31,6 +31,7 @@ class Case:
 
 CASES = (
     Case("bmu_reboot", "SUSPENDED", "bmu_rebooted"),  # goes on after 20 s, so it is looked at first
+    Case("line_taken_over", "SUSPENDED", "line_taken_over", SILENCE_S),  # so does this
     Case("reverse_polarity", "TRIPPED", "reverse_polarity"),
     Case("error_stop", "TRIPPED", "error_stop"),
     Case("system_stop", "IDLE", "system_stop"),
@@ -48,7 +49,13 @@ CASES = (
     Case("over_voltage", "TRIPPED", "over_voltage", instead="status_trip"),  # the BMU may say it first
     Case("over_current", "TRIPPED", "over_current"),
     Case("volts_disagree", "TRIPPED", "volts_disagree", 3 + AT_ONCE_S),
-    Case("amps_disagree", "TRIPPED", "amps_disagree", 5 + AT_ONCE_S),
+    # The BMU goes on seeing 3 A that nobody ordered: nobody can know that it is the one that is wrong.
+    Case("amps_disagree", "UNCONTROLLABLE", "amps_disagree", 5 + AT_ONCE_S),
+    Case("says_standby", "IDLE", "stopped_by_itself"),
+    Case("says_standby_now_and_then", "IDLE", "stopped_by_itself", SILENCE_S),
+    Case("stopped_elsewhere", "IDLE", "stopped_by_itself"),
+    Case("pack_collapsed", "TRIPPED", "pack_collapsed"),
+    Case("another_pack", "TRIPPED", "pack_collapsed", instead="volts_disagree"),  # in mid-charge its volts fall first
     Case("status_bits", "TRIPPED", "status_trip"),
     Case("emergency", "IDLE", "emergency"),
     Case("rogue_run", "TRIPPED", "rogue_run", 2 + AT_ONCE_S, before="stopped"),
@@ -70,7 +77,8 @@ STOPPED_BY = "stopped by the operator; start to go on"
 
 
 def leisurely(document: Document) -> None:
-    """One emulator serves them all; it must not become the slow device that is found."""
+    """One emulator serves them all; it must not become the slow device that is found. All of them begin at once."""
+    document["stagger_s"] = 0
     for bay in document["bays"]:
         bay["battery"]["sweep_s"] = 0.2
 
@@ -120,8 +128,11 @@ def named(service: Service, case: Case) -> bool:
 
 def test_every_fault_is_tried() -> None:
     # A sensor that goes on saying the temperature of now cannot be told from a pack that keeps it; a charger that goes
-    # on saying its volts and amps takes a minute to be found out (tests/core); a SOC that jumps stops nothing.
-    assert {case.name for case in CASES} == set(FAULTS) - {"heal", "frozen_temperature", "frozen_charger", "soc_jump"}
+    # on saying its volts and amps takes a minute to be found out (tests/core), as a BMU does; a SOC that jumps stops
+    # nothing. The others need a second act: another start, a lower limit, a second stop (tests/proof/scenes.py).
+    later = {"port_locked", "limit_reverts", "runs_again", "obeys_once"}
+    slow = {"frozen_temperature", "frozen_charger", "bmu_frozen", "soc_jump"}
+    assert {case.name for case in CASES} == set(FAULTS) - {"heal"} - slow - later
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

@@ -90,7 +90,7 @@ def test_a_reader_that_stands_still_delays_neither_the_stop_nor_what_is_kept(sta
     service.signal(signal.SIGTERM)
     assert service.ended() == 0
     assert time.monotonic() - began_s < 8
-    assert service.path_of("bay-2")[-2:] == ["STOPPING", "IDLE"], "the journal is whole"
+    assert service.path_of("bay-2")[-2:] == ["STOPPING", "SUSPENDED"], "the journal is whole"
     os.close(reader)
     os.close(writer)
     service.start()

@@ -76,7 +76,7 @@ def test_the_same_rules_decide_the_same_bit_for_bit(journal: Path, capsys: pytes
 def test_a_core_that_decides_otherwise_is_seen(
     journal: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(course, "QUALIFY_S", 2.1)
+    monkeypatch.setattr(course, "QUALIFY_S", 2.5)
     assert main(["replay", str(journal)]) == 1
     assert "the journal says ['transition', {'from': 'QUALIFYING'" in capsys.readouterr().out
 
