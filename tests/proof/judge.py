@@ -483,7 +483,9 @@ class Judge:
     def _judge_claim(self, process: str, text: str) -> None:
         for charger in self.chargers:
             entry = self.entry(charger)
-            named = port_name(charger.number) in text or (entry is not None and re.search(rf"\b{entry.name}\b", text))
+            named = port_name(charger.number) in text
+            if entry is not None and not any(port_name(one.number) in text for one in self.chargers):
+                named = re.search(rf"\b{entry.name}\b", text) is not None  # else it may have another bay's name by now
             if not (named or "every charger" in text) or charger.current_a < SEEN_A or entry is None:
                 continue
             alone = process == "guardian" or self.gateway.door is None  # who has the charger's word only
