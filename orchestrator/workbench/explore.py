@@ -15,6 +15,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
+from orchestrator.core.witnesses.standby import UNORDERED_S
 from orchestrator.model import ENERGISED, Decision, Snapshot, State
 from orchestrator.workbench.properties import Property
 from orchestrator.workbench.story import BEGIN_S, Counterexample, Move, Taken
@@ -63,6 +64,7 @@ def gist(memory: Memory) -> tuple[object, ...]:
         memory.state in WAITS and bool(witnessed.proof),
         memory.unverified,
         memory.intends,
+        not energised and (witnessed.sees, witnessed.unordered_s >= UNORDERED_S),
     )
 
 

@@ -30,6 +30,7 @@ SMALL_BATTERIES = (
     "healthy", "full", "absent", "silent", "takes nothing", "old temperature", "implausible SOC",
     "voltage_v just below", "temperature_c at 45", "temperature_c at 55", "beyond the station's voltage",
     "hotter than the station allows", "measured differently", "deeply discharged",
+    "another current than the charger's",
 )  # fmt: skip
 #: The table leads there, and nothing can.
 NEVER = {(State.STARTING, State.FULL): "a service that has just started knows of no battery that it has charged full"}

@@ -150,6 +150,13 @@ def _another(_: "Judge", charger: Charger) -> bool:
     return pack.cells != 13 and pack.soc > 0.1 and not charger.rig.bay.falsify
 
 
+def _collapsed(_: "Judge", charger: Charger) -> bool:
+    """A nearly empty pack that has collapsed at rest looks like a deeply discharged one, and is precharged as such."""
+    pack, precharged = charger.rig.bay.pack, charger.rig.bay.charger.mode is ChargeMode.PRECHARGE
+    known = pack.soc > 0.1 or not precharged
+    return pack.bias_v < -8.0 and known and charger.honest(Kind.VOLTAGE, "voltage_v")
+
+
 def _too_much(judge: "Judge", charger: Charger) -> bool:
     entry = judge.entry(charger)
     limit_a = (entry.limit_a if entry else 15.0) * 1.1 + 0.8
@@ -165,7 +172,7 @@ REASONS: tuple[Reason, ...] = (
     Reason("over-current", LINE_S, _too_much),
     Reason("BMU silent", LINE_S, lambda _, c: c.rig.bmu.port.faults.mute),
     Reason("another pack", LINE_S + 3.0, _another),
-    Reason("collapsed", LINE_S, lambda _, c: c.rig.bay.pack.bias_v < -8.0 and c.honest(Kind.VOLTAGE, "voltage_v")),
+    Reason("collapsed", LINE_S, _collapsed),
     Reason("crossed", 9.0, _crossed),
     Reason("BMU frozen", 62.0, _frozen),
     Reason("apart, most of the time", 20.0, lambda _, c: c.rig.apart_v > 1.2),
@@ -476,7 +483,9 @@ class Judge:
     def _judge_claim(self, process: str, text: str) -> None:
         for charger in self.chargers:
             entry = self.entry(charger)
-            named = port_name(charger.number) in text or (entry is not None and re.search(rf"\b{entry.name}\b", text))
+            named = port_name(charger.number) in text
+            if entry is not None and not any(port_name(one.number) in text for one in self.chargers):
+                named = re.search(rf"\b{entry.name}\b", text) is not None  # else it may have another bay's name by now
             if not (named or "every charger" in text) or charger.current_a < SEEN_A or entry is None:
                 continue
             alone = process == "guardian" or self.gateway.door is None  # who has the charger's word only
