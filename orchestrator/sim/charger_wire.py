@@ -8,6 +8,7 @@ import tty
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from termios import tcgetattr
 
 from orchestrator.sim.charger import Charger
 from orchestrator.sim.charger_frames import (
@@ -117,7 +118,7 @@ class ChargerWire:
 
     def set_speed(self, speed: int) -> None:
         """Another program sets the port to this speed, one of `termios.B…`."""
-        settings = termios.tcgetattr(self._slave)
+        settings = tcgetattr(self._slave)
         settings[4] = settings[5] = speed
         termios.tcsetattr(self._slave, termios.TCSANOW, settings)
 
@@ -139,7 +140,7 @@ class ChargerWire:
     @property
     def is_clear(self) -> bool:
         """Whether the port's settings are the charger's; else both hear garbage."""
-        return is_clear(termios.tcgetattr(self._slave))
+        return is_clear(tcgetattr(self._slave))
 
     # --- hearing ---
 

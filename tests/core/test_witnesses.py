@@ -465,6 +465,20 @@ def test_a_bmu_that_stands_still_is_found_by_what_goes_in() -> None:
     assert "Ah went in" in world.decision.reason
 
 
+def test_a_frozen_bmu_is_no_witness_of_the_current_that_it_goes_on_telling() -> None:
+    world = charging()
+    world.counts, world.pack_amps = False, 14.0
+    world.until(State.STOPPING, 300.0)
+    assert "every word" in world.decision.reason
+    world.run(60)
+    assert world.is_in(State.SUSPENDED), "the charger stands by, and nobody else can tell"
+    assert "bmu_frozen" in world.raised, "for as long as its words stand still"
+    world.counts, world.pack_amps = True, None
+    world.values["temperature_c"] = 20.1
+    world.run(30)
+    assert "bmu_frozen" not in world.raised
+
+
 def test_a_bmu_that_moves_in_one_word_is_not_frozen() -> None:
     world = charging()
     world.counts = False

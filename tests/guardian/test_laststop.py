@@ -261,15 +261,6 @@ def test_no_descriptor_is_left_open(tmp_path: Path) -> None:
         assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
-def test_a_port_that_a_service_holds_is_left_to_it(tmp_path: Path) -> None:
-    with running_chargers(tmp_path) as (bench,):
-        fcntl.flock(bench.fd, fcntl.LOCK_EX)
-        assert stop_all({bench.name: None}, 0.1) == {bench.name: HELD}
-        assert bench.stops == 0
-        assert bench.runs
-        assert stop_all({bench.name: None}, 3.0, leave_held=False) == {bench.name: ""}
-
-
 def test_a_file_that_is_no_port_is_not_written_to(tmp_path: Path) -> None:
     file = tmp_path / "station.yaml"
     file.write_text("station: depot-1\n")

@@ -27,7 +27,7 @@ def test_a_signal_stops_the_chargers_and_ends_well(tmp_path: Path, number: signa
         assert service.log().splitlines()[-1] == "ended: every charger stands by, verified"
         assert not service.socket.exists()
         assert service.path_of("bay-1")[-3:] == ["CHARGING", "STOPPING", "SUSPENDED"]
-        assert service.journal("bay-1", "session")[-1]["event"] == "end"
+        assert service.journal("bay-1", "session")[-1]["event"] == "begin", "the charge goes on with the next run"
 
 
 def test_a_charger_that_does_not_stop_makes_the_end_a_bad_one(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from orchestrator.core.drain import drained
-from orchestrator.core.witnesses.standby import UNORDERED_MOST_S, sees_current
+from orchestrator.core.witnesses.standby import FROZEN, UNORDERED_MOST_S, sees_current
 
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
@@ -104,14 +104,15 @@ def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
 
 
 def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
+    """Watched while a charge goes in; what was found frozen stays so, at rest too, until a word changes."""
     session, battery = f.memory.session, f.snapshot.battery
-    if f.volts is None or session is None or not f.energised or f.pack_v is None:
-        return None
     words = tuple(
         value.value if (value := getattr(battery, name)) is not None else None for name in type(battery).__slots__
     )
     if frozen is not None and frozen.words == words:
-        return frozen
+        return frozen if f.energised or FROZEN in f.raised else None
+    if f.volts is None or session is None or not f.energised or f.pack_v is None:
+        return None
     return Frozen(f.now_s, words, f.volts, session.charged_ah)
 
 

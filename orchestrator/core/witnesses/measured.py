@@ -4,6 +4,7 @@ from statistics import fmean
 
 from orchestrator.core.cells import chemistry
 from orchestrator.core.facts import Facts
+from orchestrator.core.witnesses.standby import FROZEN
 from orchestrator.model import ChargeMode
 
 #: A pack under charge may lose this to the vehicle that it sits in before it counts as back-feed.
@@ -109,6 +110,8 @@ def charger_frozen_at_rest(f: Facts) -> str | None:
 def bmu_frozen(f: Facts) -> str | None:
     """FAULTS B23, the mirror of `charger_frozen`: every word of the BMU stands still, though a charge goes in."""
     frozen, session = f.memory.witnessed.frozen, f.memory.session
+    if frozen is not None and FROZEN in f.raised:
+        return f"the BMU has said the same in every word for {f.now_s - frozen.t_s:.0f} s: its values are frozen"
     if frozen is None or session is None or f.volts is None or f.now_s - frozen.t_s < STILL_S:
         return None
     moved_v, moved_ah = abs(f.volts - frozen.charger_v), session.charged_ah - frozen.charged_ah

@@ -15,10 +15,13 @@ CHARGING_A = 1.0
 #: forgotten again within half a minute.
 UNORDERED_S, UNORDERED_MOST_S = 2.0, 6.0
 
+#: The fault of a BMU that has been found frozen.
+FROZEN = "bmu_frozen"
+
 
 def sees_current(f: "Facts") -> bool:
-    """The BMU says, freshly, that current flows into its pack."""
-    return f.pack_a is not None and f.pack_a > CHARGING_A
+    """The BMU says, freshly, that current flows into its pack. One that is known to be frozen is no witness."""
+    return f.pack_a is not None and f.pack_a > CHARGING_A and FROZEN not in f.raised
 
 
 def proved(f: "Facts") -> bool:
