@@ -54,7 +54,7 @@ LINES: tuple[Seed, ...] = (
     part(
         "settings are not compared each second", "line",
         "what another program has set shows only once an answer is missing",
-        ("tests/devices/test_charger_port.py",),
+        ("tests/devices/test_charger_port.py::test_what_does_no_harm_at_once_is_set_right_within_a_second",),
         (f"{DEVICES}charger.py", "+ LOOK_S\n        self._found(self._restored(line))\n", "+ LOOK_S\n"),
     ),
     scene(
@@ -79,7 +79,7 @@ LINES: tuple[Seed, ...] = (
     ),
     hostile(
         "a stranger's lock is respected at the end", "line", "estop --leave-held leaves alone what a stranger has locked",
-        ("tests/guardian/test_laststop.py",),
+        ("tests/guardian/test_laststop.py::test_a_strangers_lock_keeps_no_stop_away",),
         (f"{SERVICE}lastline.py", "        if holder(name, (os.getpid(),)).ours:", "        if True:"),
     ),
 )  # fmt: skip
@@ -123,7 +123,7 @@ DISK: tuple[Seed, ...] = (
     hostile(
         "an end that has kept nothing is a good one", "disk",
         "the service ends with 0 though the disk has not taken what the next start must know",
-        ("tests/whole/test_survives.py",),
+        ("tests/whole/test_survives.py::test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one",),
         (f"{SERVICE}supervisor.py", "        unkept = self._store.close(KEEP_S)\n",
          '        self._store.close(KEEP_S)\n        unkept = ""\n'),
     ),
@@ -144,9 +144,9 @@ DISK: tuple[Seed, ...] = (
         ("tripped, taken out, put back", "tripped at rest, then no power"),
         (f"{CORE}persisted.py", "            if fault.raised_s is not None or fault.strikes\n", "            if False\n"),
     ),
-    scene(
+    part(
         "a fault is no reason to write", "disk", "a fault that latches is written down with the next counters only",
-        ("tripped at rest, then no power",),
+        ("tests/core/test_persisted.py",),
         (f"{CORE}persisted.py", "return self.running, self.hold, self.paused, faults, resets,",
          "return self.running, self.hold, self.paused, resets,"),
     ),
@@ -189,13 +189,13 @@ DISK: tuple[Seed, ...] = (
     ),
     hostile(
         "a start ignores ports in hand", "disk", "a charger that the station file has lost runs on under the next service",
-        ("tests/whole/test_survives.py",),
+        ("tests/whole/test_survives.py::test_a_charger_that_the_station_file_has_lost_is_stopped_by_the_next_start",),
         (f"{SERVICE}store.py", "            running = [place for place, put in self._table.items() if put.persisted.running]",
          "            running: list[Place] = []"),
     ),
     hostile(
         "two services keep their state in one place", "disk", "the directory of the persisted state is not locked",
-        ("tests/whole/test_survives.py",),
+        ("tests/whole/test_survives.py::test_a_second_service_on_the_same_journal_ends_with_a_sentence",),
         (f"{SERVICE}disk.py", "        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)\n", "        fcntl.flock(fd, 0)\n"),
     ),
 )  # fmt: skip
@@ -248,7 +248,7 @@ WITNESSES: tuple[Seed, ...] = (
     ),
     hostile(
         "estop does not ask the BMU", "witness", "estop takes the service's charger at its word, whatever the BMU sees",
-        ("tests/guardian/test_emergency.py",),
+        ("tests/guardian/test_emergency.py::test_both_witnesses_have_to_agree",),
         (f"{SERVICE}witness.py", ' if battery["online"] and bmu_a > BMU_STANDBY_A else ""', ' if False else ""'),
     ),
 )  # fmt: skip
@@ -267,7 +267,7 @@ PORTS: tuple[Seed, ...] = (
     ),
     hostile(
         "a hung driver holds the others up", "ports", "the guardian writes its first stops one after another, in one thread",
-        ("tests/guardian/test_laststop.py",),
+        ("tests/guardian/test_laststop.py::test_a_driver_that_hangs_delays_no_other_port",),
         (f"{SERVICE}laststop.py", "                sweeper.join(STUCK_S)\n", "                sweeper.join()\n"),
     ),
     scene(
@@ -277,7 +277,7 @@ PORTS: tuple[Seed, ...] = (
     ),
     part(
         "an opened port goes on", "ports", "a port that was opened does not begin with a stop",
-        ("tests/devices/test_charger_port.py",),
+        ("tests/devices/test_charger_port.py::test_an_opened_port_stops_the_whole_charger_before_it_asks_anything",),
         (f"{DEVICES}schedule.py",
          "        self.order: Command | None = STOP  #: the standing order\n        self._urgent = True",
          "        self.order: Command | None = None  #: the standing order\n        self._urgent = False"),
@@ -460,12 +460,12 @@ WORDS: tuple[Seed, ...] = (
     ),
     hostile(
         "a stop that is not verified is a success", "words", "orchestrator stop ends with 0 whatever becomes of the stop",
-        ("tests/whole/test_operator.py",),
+        ("tests/whole/test_operator.py::test_a_stop_that_is_not_obeyed_begins_with_what_to_do",),
         ("orchestrator/cli.py", "        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), ", '        unverified, then = dict[str, str](), '),
     ),
     hostile(
         "estop finds no station by itself", "words", "estop without arguments knows the file of this folder only",
-        ("tests/guardian/test_emergency.py",),
+        ("tests/guardian/test_emergency.py::test_else_those_of_the_services_that_run",),
         (f"{SERVICE}inhand.py", "    for place in PLACES:\n        yield _existing([place])\n    yield _existing(",
          "    yield _existing([PLACES[0]])\n    return\n    yield _existing("),
     ),
@@ -476,7 +476,7 @@ WORDS: tuple[Seed, ...] = (
     ),
     hostile(
         "a success reads like a failure", "words", "an estop without a service ends with a complaint",
-        ("tests/guardian/test_emergency.py",),
+        ("tests/guardian/test_estop.py::test_ports_without_a_service",),
         (f"{SERVICE}witness.py", "        if not found and not _listens(self._named):\n", "        if False:\n"),
     ),
 )  # fmt: skip
@@ -515,13 +515,13 @@ SURROUNDINGS: tuple[Seed, ...] = (
     hostile(
         "a file in the working directory is imported", "surroundings",
         "serial.py in the working directory is run by the controller, which drives the chargers",
-        ("tests/guardian/test_emergency.py", "tests/test_surroundings.py"),
+        ("tests/guardian/test_emergency.py::test_a_file_of_the_working_directory_is_not_imported_by_the_controller", "tests/test_surroundings.py",),
         (f"{SERVICE}guardian.py", 'CONTROLLER = ("-P", "-m",', 'CONTROLLER = ("-m",'),
         ("orchestrator/__main__.py", '    os.environ["PYTHONSAFEPATH"] = "1"\n', ""),
     ),
     hostile(
         "clients are served one after another", "surroundings", "an idle client at the control socket holds up a stop",
-        ("tests/service/test_control.py",),
+        ("tests/service/test_control.py::test_one_who_says_nothing_holds_nobody_up_and_is_sent_away", "tests/service/test_control.py::test_idle_clients_do_not_count_however_many_they_are",),
         (f"{SERVICE}client.py", "        connection.settimeout(0)\n", "        connection.settimeout(CLIENT_S)\n"),
     ),
     hostile(
@@ -533,7 +533,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
     ),
     hostile(
         "a poor terminal makes a traceback", "surroundings", "what a Latin-1 terminal cannot show ends a verb with a traceback",
-        ("tests/test_surroundings.py",),
+        ("tests/test_surroundings.py::test_no_terminal_is_too_poor",),
         ("orchestrator/__main__.py", '        stream.reconfigure(errors="backslashreplace")', '        stream.reconfigure(errors="strict")'),
     ),
     part(
