@@ -57,7 +57,7 @@ SCENES: dict[str, Script] = {
         Hazard(5.5, "power", detail="nothing more"),
         Hazard(7.0, "boot"),
         end_s=40.0,
-    ),  # fmt: skip
+    ),
     "tripped at rest, then no power": _scene(
         Hazard(1.0, "fault", 2, None, "status_bits"),
         Hazard(8.0, "power", detail="nothing more"),
@@ -141,7 +141,7 @@ SCENES: dict[str, Script] = {
         Hazard(34.0, "heal", 0),
         bays=(Bay(small=True), Bay(), Bay()),
         end_s=130.0,
-    ),  # fmt: skip
+    ),
     "precharge over restarts": _scene(
         Hazard(1.0, "fault", 0, None, "precharge_no_rise"),
         *(one for t_s in (17.0, 37.0, 57.0, 77.0) for one in (Hazard(t_s, "term"), Hazard(t_s + 5, "boot"))),
@@ -177,7 +177,7 @@ SCENES: dict[str, Script] = {
         h(8, "kill both"),
         h(9, "boot"),
         end_s=T + 24,
-    ),  # fmt: skip
+    ),
     # 12. Others on the bus.
     **{f"on the bus, {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
     "a temperature that is forged": _scene(

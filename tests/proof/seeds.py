@@ -36,7 +36,7 @@ SEED_S = 180.0
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """One of the proofs: its command, and how long it may take here. `usual` is what it looks at if nothing is named."""
+    """One of the proofs: its command, and how long it may take. `usual` is what it looks at if nothing is named."""
 
     about: str
     sees: str
@@ -52,7 +52,7 @@ class Proof:
         return [*self.command, *(named or self.usual)]
 
 
-PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider")
+PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60")
 #: Random scripts that are played after the scenes, for what no scene finds.
 RUNS = "40"
 PROOFS: Mapping[str, Proof] = {
@@ -60,36 +60,56 @@ PROOFS: Mapping[str, Proof] = {
         "scenes, then random trouble with lines, disk, bus and people, over several lives of the gateway",
         "the whole service in virtual time, held against wire and plant: what flows, who is told, what a restart keeps",
         "the kernel's own processes, sockets and signals; drivers; what only a second guard hides",
-        ("-m", "tests.proof.environment", "--names", "--until-found"), 300.0, ("--runs", RUNS), "--only",
+        ("-m", "tests.proof.environment", "--names", "--until-found"),
+        300.0,
+        ("--runs", RUNS),
+        "--only",
     ),
     "hostile": Proof(
         "real processes, pseudo terminals, sockets and disks among hostile ones",
-        "what virtual time replaces: signals, killed and frozen processes, drivers that hang, imports, terminals, clients",
+        "what virtual time replaces: signals, killed and frozen processes, drivers that hang, imports, clients",
         "rare interleavings: it is as slow as the world",
-        PYTEST, 300.0,
-        ("tests/guardian", "tests/whole/test_survives.py", "tests/whole/test_operator.py", "tests/whole/test_others.py",
-         "tests/service/test_control.py", "tests/test_surroundings.py"),
+        PYTEST,
+        300.0,
+        (
+            "tests/guardian",
+            "tests/whole/test_survives.py",
+            "tests/whole/test_operator.py",
+            "tests/whole/test_others.py",
+            "tests/service/test_control.py",
+            "tests/test_surroundings.py",
+        ),
     ),
     "parts": Proof(
         "the tests of single parts",
         "a guard behind which another one stands, so that the whole station is safe without it",
         "how parts work together",
-        PYTEST, 300.0,
+        PYTEST,
+        300.0,
         ("tests/core", "tests/devices", "tests/link", "tests/service", "tests/workbench", "tests/config"),
     ),
     "scripts": Proof(
-        "random fault scripts on a station", "faults of chargers and BMUs in combinations that nobody thought of",
-        "whoever else is on the machine, and restarts", ("-m", "tests.proof.campaign", "--scripts", "120"), 120.0,
+        "random fault scripts on a station",
+        "faults of chargers and BMUs in combinations that nobody thought of",
+        "whoever else is on the machine, and restarts",
+        ("-m", "tests.proof.campaign", "--scripts", "120"),
+        120.0,
     ),
     "calls": Proof(
-        "every call of a charge made to fail in turn", "an error that nobody expects, wherever it comes",
-        "what hangs, and what is wrong without an error", (*PYTEST, "tests/proof/test_nth_call.py"), 120.0,
+        "every call of a charge made to fail in turn",
+        "an error that nobody expects, wherever it comes",
+        "what hangs, and what is wrong without an error",
+        (*PYTEST, "tests/proof/test_nth_call.py"),
+        120.0,
     ),
     "core": Proof(
-        "everything that the core can come to", "each state under each input: what may follow, and that all ends at rest",
-        "everything outside of the core", (*PYTEST, "tests/proof/test_explore.py"), 120.0,
+        "everything that the core can come to",
+        "each state under each input: what may follow, and that all ends at rest",
+        "everything outside of the core",
+        (*PYTEST, "tests/proof/test_explore.py"),
+        120.0,
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,8 +217,8 @@ def page(results: Sequence[Result]) -> Iterator[str]:
     yield "# Which proof finds which bug"
     yield ""
     yield "Each hole that was once open is kept as a seeded bug: a small change that opens it again. `make campaign"
-    yield "ARGS=seeds` applies each of them to a copy of the package, runs the proofs until one finds it, and writes this"
-    yield "page. A bug that no proof finds is a proof to be written."
+    yield "ARGS=seeds` applies each of them to a copy of the package, runs the proofs until one finds it, and writes"
+    yield "this page. A bug that no proof finds is a proof to be written."
     yield ""
     yield f"{len(found)} of {len(results)} are found, in {mean_s:.0f} s each on average."
     yield ""
