@@ -14,8 +14,8 @@ help:  ## show this list
 demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, about a minute
 	$(BIN)/orchestrator demo $(ARGS)
 
-test: .venv/dev.stamp  ## all tests; ARGS='tests/core -k taper' chooses some
-	$(BIN)/python -m pytest $(ARGS)
+test: .venv/dev.stamp  ## all tests, three files at a time; ARGS='tests/core -k taper' chooses some
+	$(BIN)/python -m pytest -n 3 --dist loadfile $(ARGS)
 
 test-guest: .venv/dev.stamp  ## the tests that need a kernel with SocketCAN and systemd, in a User Mode Linux
 	$(BIN)/python -m tests.guest $(ARGS)

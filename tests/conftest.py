@@ -7,7 +7,15 @@ deadline: on a busy machine a slow one says nothing of the code.
 
 import signal
 
+import pytest
 from hypothesis import settings
+
+#: What takes longest begins first, so that nobody waits for it alone at the end.
+LONG = (
+    "proof/test_explore.py", "whole/test_faults.py", "proof/test_seeded_bugs.py", "workbench/test_exhaustive.py",
+    "proof/test_grid.py", "whole/test_survives.py", "proof/test_environment.py", "whole/test_operator.py",
+    "proof/test_nth_call.py", "whole/test_ends.py", "guardian/test_estop.py", "core/test_witnesses.py",
+)  # fmt: skip
 
 for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
     if signal.getsignal(number) is signal.SIG_IGN:
@@ -15,3 +23,8 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
 
 settings.register_profile("all", deadline=None)
 settings.load_profile("all")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files side by side: the longest first."""
+    items.sort(key=lambda item: next((at for at, name in enumerate(LONG) if item.path.as_posix().endswith(name)), 99))
