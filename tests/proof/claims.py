@@ -2,7 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
+
+from orchestrator.workbench.recording import read
+from orchestrator.workbench.replay import again
 
 if TYPE_CHECKING:
     from tests.proof.judge import Charger, Judge
@@ -69,6 +74,22 @@ def starts(judge: "Judge", charger: "Charger") -> Iterator[Finding]:
     loose = any(one.what == "loose" and one.bay in (-1, charger.number) for one in judge.script.hazards)
     if loose and len(charger.told.starts) > LOOSE_STARTS:
         yield "loose plug", f"with a loose plug it has begun {len(charger.told.starts)} charges"
+
+
+def record(judge: "Judge") -> Iterator[Finding]:
+    """What was recorded over all lives is decided again as it was."""
+    with TemporaryDirectory(prefix="record") as directory:
+        for path, inode in judge.gateway.disk.names.items():
+            if path.endswith(".jsonl"):
+                Path(directory, Path(path).name).write_bytes(bytes(inode.data))
+        try:
+            taken = [(bay, one) for bay, steps in read([Path(directory)]).bays.items() for one in again(steps)]
+        except Exception as error:  # noqa: BLE001 - whatever a power cut has left, it can be read
+            yield "record", f"it cannot be read: {error!r}"
+            return
+    for bay, one in taken:
+        if one.wrong:
+            yield "record", f"{bay}, {one.recorded.at_s:.3f}: {one.wrong}"
 
 
 def _runs_on(judge: "Judge", charger: "Charger") -> bool:

@@ -19,7 +19,7 @@ from typing import Any
 
 from orchestrator.model import ENERGISED, ChargeMode
 from orchestrator.sim.charger_frames import Kind
-from tests.proof.claims import Told, claims, starts
+from tests.proof.claims import Told, claims, record, starts
 from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name
 from tests.proof.hazards import BEGIN_S, Bay, Script
 from tests.proof.virtual_rig import VirtualRig
@@ -394,6 +394,8 @@ class Judge:
             for charger in self.chargers:
                 if not charger.rig.bay.charger.running:
                     self.find(charger.number, "goes on", f"something harmless has stopped it, {self._state(charger)}")
+        for name, text in record(self) if self.script.recorded else ():
+            self.find(-1, name, text)
         if not any(one.what == "power" for one in self.script.hazards):
             for path, inode in self.gateway.disk.names.items():
                 lines = bytes(inode.data).split(b"\n")[:-1] if path.endswith(".jsonl") else []

@@ -55,7 +55,7 @@ class Player:
         self.gateway = Gateway(
             [_nature(bay, number) for number, bay in enumerate(script.bays)],
             entries(script),
-            seed=script.seed, end_s=script.end_s + 30.0, **battery,
+            seed=script.seed, end_s=script.end_s + 30.0, snapshots=script.recorded, **battery,
         )  # fmt: skip
         self.time = self.gateway.time
         self._cross()

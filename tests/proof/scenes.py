@@ -13,9 +13,15 @@ THREE = (Bay(), Bay(), Bay())
 T = BEGIN_S
 
 
-def _scene(*hazards: Hazard, bays: tuple[Bay, ...] = THREE, end_s: float = 0.0, systemd: bool = True) -> Script:
+def _scene(
+    *hazards: Hazard,
+    bays: tuple[Bay, ...] = THREE,
+    end_s: float = 0.0,
+    systemd: bool = True,
+    recorded: bool = False,
+) -> Script:
     hazards = (Hazard(0.0, "boot"), *hazards)
-    return Script(1, bays, hazards, end_s or max(one.t_s for one in hazards) + 12.0, systemd)
+    return Script(1, bays, hazards, end_s or max(one.t_s for one in hazards) + 12.0, systemd, recorded=recorded)
 
 
 def h(t_s: float, what: str, bay: int = -1, value: float | None = None, detail: str = "") -> Hazard:
@@ -166,6 +172,17 @@ SCENES: dict[str, Script] = {
     # 9. Our own exception.
     "a BMU that reads 0.00 V": _scene(
         h(0, "bmu", 0, 0.0, "voltage_v:is:1"), h(0, "fault", 0, None, "ignore_stop"), end_s=T + 16
+    ),
+    # 10. The record of the accident.
+    "a record over lives": _scene(
+        h(0, "term"),
+        h(4, "boot"),
+        h(16, "kill both"),
+        h(20, "boot"),
+        h(26, "power", detail="some of it, torn"),
+        h(30, "boot"),
+        end_s=T + 36,
+        recorded=True,
     ),
     # 11. The last words.
     "cut off, then killed": _scene(

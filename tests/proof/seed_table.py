@@ -641,22 +641,22 @@ OURS: tuple[Seed, ...] = (
         ("tests/core/test_failed.py",),
         (f"{CORE}failed.py", "    if tried_s >= OBEY_STOP_S:\n", "    if False:\n"),
     ),
-    part(
+    scene(
         "a torn line ends the replay",
         "record",
         "a journal with one line that cannot be read is not replayed",
-        ("tests/workbench/test_replay.py",),
+        ("a record over lives",),
         (
             f"{WORKBENCH}recording.py",
             "        except (BaseValidationError, LookupError, TypeError, ValueError, ",
             "        except (",
         ),
     ),
-    part(
+    scene(
         "runs are one run",
         "record",
         "a restart in a journal is taken for a deviation",
-        ("tests/workbench/test_replay.py",),
+        ("a record over lives",),
         (f"{WORKBENCH}recording.py", 'BREAKS = frozenset({"run", "lost"})', 'BREAKS = frozenset({"lost"})'),
         (f"{WORKBENCH}replay.py", "if recorded.gap or recorded.memory.last_s is None:", "if recorded.gap:"),
     ),
@@ -773,6 +773,13 @@ BUS: tuple[Seed, ...] = (
             '        if period_ms == round(self._heartbeat_s * 1000):\n            return ""\n',
             '        if True:\n            return ""\n',
         ),
+    ),
+    part(
+        "a filter of the station's own is refused",
+        "bus",
+        "can_filters in the station file are refused, whatever they let through",
+        ("tests/config",),
+        ("orchestrator/config/station_rules.py", "        if passed is None:\n", "        if True:\n"),
     ),
     part(
         "the kernel filters nothing",
