@@ -18,8 +18,10 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from multiprocessing.pool import ThreadPool
 from pathlib import Path
+from threading import Lock
 
 from tests.proof.report import say
 from tests.proof.seed_table import SEEDS, Seed
@@ -30,6 +32,8 @@ PAGE = ROOT / "docs" / "proofs.md"
 COPIED = ("orchestrator", "tests")
 #: Of the seeds, at least this share must be found.
 ENOUGH = 0.95
+#: What the package itself makes the proofs find is looked for once.
+LOOKING = Lock()
 #: A seed may take this long in all, in the mean.
 SEED_S = 180.0
 
@@ -164,15 +168,16 @@ def run(words: Sequence[str], within_s: float, root: Path) -> tuple[bool, str]:
     return process.returncode != 0, said
 
 
-def known() -> dict[str, list[str]]:
-    """What the package as it is makes the proofs find, as options that leave it out."""
-    with copied(None) as root:
+@cache
+def known() -> tuple[str, ...]:
+    """What the package as it is makes the environment find, as options that leave it out; asked for where it counts."""
+    with LOOKING, copied(None) as root:
         command = ("-m", "tests.proof.environment", "--names", "--runs", RUNS)
         found, said = run(command, 600.0, root)
     names = [line.split(":")[0].split(" ", 1)[1] for line in said.splitlines() if line.startswith(("scene ", "seed "))]
     if found:
         say(f"the package itself makes {len(names)} scripts find something, and they are left out: {', '.join(names)}")
-    return {"environment": ["--skip", "|".join(names)] if names else []}
+    return ("--skip", "|".join(names)) if names else ()
 
 
 def attempts(seed: Seed) -> Iterator[tuple[str, Sequence[str]]]:
@@ -183,13 +188,14 @@ def attempts(seed: Seed) -> Iterator[tuple[str, Sequence[str]]]:
         yield name, ()
 
 
-def search(seed: Seed, skip: Mapping[str, Sequence[str]]) -> Result:
+def search(seed: Seed) -> Result:
     """Run the proofs until one finds it."""
     began_s = time.monotonic()
     with copied(seed) as root:
         for name, where in attempts(seed):
             before_s, proof = time.monotonic(), PROOFS[name]
-            found, said = run([*proof.words(where), *skip.get(name, ())], proof.within_s, root)
+            skip = known() if name == "environment" and not where else ()
+            found, said = run([*proof.words(where), *skip], proof.within_s, root)
             if found:
                 by, gist = _finding(said)
                 say(f"{seed.name}: {name}, {by}: {gist}")
@@ -249,9 +255,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=1, help="seeds at once (default: %(default)s)")
     options = parser.parse_args(argv)
     chosen = [seed for seed in SEEDS if not options.only or seed.name in options.only]
-    skip = known() if not options.only else {}
     with ThreadPool(options.workers) as pool:
-        results = pool.map(lambda seed: search(seed, skip), chosen, chunksize=1)
+        results = pool.map(search, chosen, chunksize=1)
     if not options.only:
         PAGE.write_text("\n".join(page(results)) + "\n", encoding="utf-8")
     found = sum(bool(result.proof) for result in results)

@@ -62,7 +62,7 @@ QUICK = (
 @pytest.mark.parametrize("name", QUICK)
 def test_a_seed_is_found_where_it_is_looked_for_first(name: str) -> None:
     seed = next(seed for seed in SEEDS if seed.name == name)
-    result = search(seed, {})
+    result = search(seed)
     assert result.proof == "environment"
     assert result.by.removeprefix("scene ") in seed.where
 
