@@ -51,7 +51,10 @@ def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterat
     if LINE_FAULTS & {fault["id"] for fault in bay["faults"]}:
         told.line_s = now_s
     tty, up_s = charger.rig.tty, judge.booted_s + TOLD_S
-    reached = tty.present and charger.deaf_s < tty.changed_s - TOLD_S and tty.lock is not charger.rig.wire
+    ours_alone = not any(one.what == "estop" for one in judge.script.hazards)  # that sets a port up as well
+    reached = (
+        ours_alone and tty.present and charger.deaf_s < tty.changed_s - TOLD_S and tty.lock is not charger.rig.wire
+    )
     if reached and up_s < tty.changed_s < now_s - TOLD_S and told.line_s < tty.changed_s:
         yield "not told", f"another program has set its port up otherwise, and the status says {shown}"
     locked = tty.lock is charger.rig.wire and tty.present

@@ -434,7 +434,7 @@ class Judge:
         if charger.since_s.get("no order") == now_s and charger.seen:
             charger.onsets.append(now_s)
         onsets = charger.onsets
-        if self.booted_s is None or len(onsets) < RESTARTS or onsets[0] < self.booted_s:
+        if self.booted_s is None or self.entry(charger) is None or len(onsets) < RESTARTS or onsets[0] < self.booted_s:
             return
         if now_s - onsets[0] < RESTARTS_S and charger.named_s < onsets[0] and now_s - onsets[-1] > MARGIN_S:
             self.find(charger.number, "nobody is told", f"it runs again and again by itself, {self._state(charger)}")
