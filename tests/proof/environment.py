@@ -143,6 +143,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--seed", type=int, help="only this one")
     parser.add_argument("--scene", choices=SCENES, help="only this one", metavar="NAME")
+    parser.add_argument(
+        "--only", action="append", default=[], choices=SCENES, metavar="NAME", help="these scenes and no other scripts"
+    )
     parser.add_argument("--script", type=Path, help="only the script in this file")
     parser.add_argument("--names", action="store_true", help="a line for each script that finds something, no more")
     parser.add_argument("--until-found", action="store_true", help="end with the first finding")
@@ -158,7 +161,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.seed is not None:
         return one(Script.of_seed(options.seed), f"seed {options.seed}", verbose=options.verbose)
     skipped = set(options.skip.split("|"))
-    names = [*SCENES, *range(options.first, options.first + options.runs)]
+    names = options.only or [*SCENES, *range(options.first, options.first + options.runs)]
     return many([name for name in names if str(name) not in skipped], options)
 
 

@@ -59,7 +59,7 @@ def port_name(number: int) -> str:
     return f"{ROOT}{number + 1}"
 
 
-def document(entries: Sequence[Entry], battery: dict[str, Any]) -> str:
+def document(entries: Sequence[Entry], battery: dict[str, Any], *, snapshots: bool = False) -> str:
     """The station file."""
     bays = [
         {
@@ -72,7 +72,7 @@ def document(entries: Sequence[Entry], battery: dict[str, Any]) -> str:
         for entry in entries
     ]
     can = {"can0": {"interface": "virtual", "bitrate": 250_000}}
-    journal = {"directory": JOURNAL, "snapshots": False}
+    journal = {"directory": JOURNAL, "snapshots": snapshots}
     return json.dumps(
         {"station": "virtual", "can": can, "bays": bays, "control": {"socket": SOCKET}, "journal": journal}
     )
@@ -143,7 +143,14 @@ class Gateway:
     """The station and its gateway. What changes it is for callbacks and for the main runner, not for its threads."""
 
     def __init__(
-        self, natures: Sequence[Nature], entries: Sequence[Entry], *, seed: int, end_s: float, **battery: Any
+        self,
+        natures: Sequence[Nature],
+        entries: Sequence[Entry],
+        *,
+        seed: int,
+        end_s: float,
+        snapshots: bool = False,
+        **battery: Any,
     ) -> None:
         self.time = Time(end_s)
         self.entries = list(entries)
@@ -157,7 +164,7 @@ class Gateway:
         self.controller: Process | None = None
         self.on_end: Callable[[Process], None] = lambda _: None
         self.boots = 1
-        self._battery = battery
+        self._battery, self._snapshots = battery, snapshots
         self._dice = Random(seed)
         self._lines: dict[int, str] = {}
         self._stack = ExitStack()
@@ -203,7 +210,7 @@ class Gateway:
         for usual, small in SMALL.items():
             text = text.replace(usual, small)
         self.station_file.with_name("small.yaml").write_text(text, encoding="utf-8")
-        self.station_file.write_text(document(self.entries, self._battery), encoding="utf-8")
+        self.station_file.write_text(document(self.entries, self._battery, snapshots=self._snapshots), encoding="utf-8")
 
     def _load(self, path: Any) -> Station:
         station = _loaded(str(path), Path(path).read_text(encoding="utf-8"))

@@ -44,7 +44,7 @@ class Bay:
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """One run. `systemd`: whoever ends with an error is started anew, `estop` before."""
+    """One run. `systemd`: whoever ends with an error is started anew, `estop` before. `recorded`: with snapshots."""
 
     seed: int
     bays: tuple[Bay, ...]
@@ -52,6 +52,7 @@ class Script:
     end_s: float
     systemd: bool = True
     tpdo: bool = False
+    recorded: bool = False
 
     def to_json(self) -> str:
         return json.dumps(asdict(self), separators=(",", ":"))

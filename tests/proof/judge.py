@@ -19,8 +19,9 @@ from typing import Any
 
 from orchestrator.model import ENERGISED, ChargeMode
 from orchestrator.sim.charger_frames import Kind
+from tests.proof.claims import Told, claims, record, starts
 from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name
-from tests.proof.hazards import Bay, Script
+from tests.proof.hazards import BEGIN_S, Bay, Script
 from tests.proof.virtual_rig import VirtualRig
 
 STOP, OPERATION_0 = bytes.fromhex("AFFA900410900034AFA0"), bytes.fromhex("AFFA90050290010028AFA0")
@@ -71,6 +72,7 @@ class Charger:
     charged_ah: float = 0.0
     thawed: tuple[float, float] = (0.0, 0.0)  #: Ah and volts when its BMU was last seen to move
     precharged_s: float = 0.0
+    told: Told = field(default_factory=Told)  #: what the status has said of it
     onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
 
     @property
@@ -181,7 +183,9 @@ REASONS: tuple[Reason, ...] = (
 
 
 #: Somebody reads or writes on bus and line as everybody may: no reason to stop.
-HARMLESS = ("boot", "tool")
+HARMLESS = ("boot", "tool", "term", "stderr")
+#: After the last start every bay charges within this.
+GOES_ON_S = 2 * BEGIN_S
 
 
 def _is_json(line: bytes) -> bool:
@@ -206,6 +210,7 @@ class Judge:
         self.wrong: list[str] = []
         self.chargers = [Charger(number, rig) for number, rig in enumerate(gateway.rigs)]
         self.life = list(gateway.entries)  #: what the running service has read
+        self.life_began_s: float | None = None
         self.booted_s: float | None = None  #: when the present life began; None: nobody is there
         self.status: Mapping[str, Any] | None = None
         self.status_s = 0.0
@@ -242,11 +247,14 @@ class Judge:
             charger.meant, charger.meant_s = "stop", self.time.now_s
         elif OPERATION_1 in data:
             charger.meant, charger.meant_s = "run", self.time.now_s
+            charger.told.ran_s = self.time.now_s
         if limit := LIMIT.search(data):
             charger.limit = limit[1][0]
 
     def _started(self, charger: Charger, _now_s: float) -> None:
         """A frame has switched an output on: of the charger behind this port."""
+        for name, text in starts(self, charger):
+            self.find(charger.number, name, text)
         if charger.waits:
             self.find(charger.number, "by itself", f"it was started, and waits for a person: {charger.waits}")
         if self.booted_s is None or charger.meant_s < self.booted_s:
@@ -263,6 +271,8 @@ class Judge:
             charger = self._of(bay["name"])
             if charger is None:
                 continue
+            for name, text in claims(self, charger, bay):
+                self.find(charger.number, name, text)
             if bay["alarm"]:
                 charger.named_s = self.time.now_s
             if bay["state"] == "TRIPPED":
@@ -305,7 +315,7 @@ class Judge:
 
     def boots(self) -> None:
         self.life, self.booted_s, self.frozen = list(self.gateway.entries), self.time.now_s, False
-        self.status = None
+        self.status, self.life_began_s = None, self.time.now_s
         for charger in self.chargers:
             charger.meant, charger.limit = "", 4
             charger.since_s.clear()
@@ -378,10 +388,14 @@ class Judge:
 
     def ends(self) -> None:
         """The script is over: what was harmless has stopped nobody, and the record can be read."""
-        if all(one.what in HARMLESS for one in self.script.hazards) and self.script.bays == (Bay(),) * 3:
+        harmless = all(one.what in HARMLESS for one in self.script.hazards) and self.script.bays == (Bay(),) * 3
+        began_s = self.began_s if self.life_began_s is None else self.life_began_s
+        if harmless and (self.time.now_s - began_s > GOES_ON_S or began_s == self.began_s):
             for charger in self.chargers:
                 if not charger.rig.bay.charger.running:
                     self.find(charger.number, "goes on", f"something harmless has stopped it, {self._state(charger)}")
+        for name, text in record(self) if self.script.recorded else ():
+            self.find(-1, name, text)
         if not any(one.what == "power" for one in self.script.hazards):
             for path, inode in self.gateway.disk.names.items():
                 lines = bytes(inode.data).split(b"\n")[:-1] if path.endswith(".jsonl") else []

@@ -55,7 +55,7 @@ class Player:
         self.gateway = Gateway(
             [_nature(bay, number) for number, bay in enumerate(script.bays)],
             entries(script),
-            seed=script.seed, end_s=script.end_s + 30.0, **battery,
+            seed=script.seed, end_s=script.end_s + 30.0, snapshots=script.recorded, **battery,
         )  # fmt: skip
         self.time = self.gateway.time
         self._cross()
@@ -239,6 +239,7 @@ class Player:
         """A plug that has contact for `value` s, and then none for as long."""
         for rig in self._rigs(hazard):
             rig.bay.connected = not rig.bay.connected
+            rig.bmu.port.faults.mute = not rig.bay.connected
         self.time.call_later(hazard.value or 1.0, self._loose, hazard)
 
     def _heal(self, hazard: Hazard) -> None:
@@ -365,7 +366,7 @@ def _read(index: int) -> bytes:
 
 
 def _fd(cob_id: int) -> can.Message:
-    data = b"\x43\x04\x60\x00\x58\x02\x00\x00" + bytes(56)  # looks like 60.0 °C
+    data = b"\x43\x04\x60\x00\x58\x02\x00\x00"  # looks like 60.0 °C
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_fd=True)
 
 

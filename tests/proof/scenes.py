@@ -13,9 +13,15 @@ THREE = (Bay(), Bay(), Bay())
 T = BEGIN_S
 
 
-def _scene(*hazards: Hazard, bays: tuple[Bay, ...] = THREE, end_s: float = 0.0, systemd: bool = True) -> Script:
+def _scene(
+    *hazards: Hazard,
+    bays: tuple[Bay, ...] = THREE,
+    end_s: float = 0.0,
+    systemd: bool = True,
+    recorded: bool = False,
+) -> Script:
     hazards = (Hazard(0.0, "boot"), *hazards)
-    return Script(1, bays, hazards, end_s or max(one.t_s for one in hazards) + 12.0, systemd)
+    return Script(1, bays, hazards, end_s or max(one.t_s for one in hazards) + 12.0, systemd, recorded=recorded)
 
 
 def h(t_s: float, what: str, bay: int = -1, value: float | None = None, detail: str = "") -> Hazard:
@@ -43,12 +49,28 @@ SCENES: dict[str, Script] = {
         systemd=False,
         end_s=50.0,
     ),
+    "standard error is not read": _scene(Hazard(1.0, "stderr", value=1), end_s=34.0),
     "disk full": _scene(
         Hazard(1.0, "slow", -1, 0.0, "write:disk:22:ENOSPC"), h(4, "kill both"), h(8, "boot"), systemd=False, end_s=50.0
     ),
     "the lock cannot be closed": _scene(h(0, "slow", -1, 0.0, "close:disklock:60:EIO"), h(0.5, "term"), end_s=T + 6),
     "stopped, then no power": _scene(
         h(0, "ask", 1, None, "stop"), h(3, "power", detail="nothing more"), h(5, "boot"), end_s=T + 20
+    ),
+    "stopped at rest, then no power at once": _scene(
+        Hazard(3.5, "slow", -1, 5.0, "fsync:disk:60"),
+        Hazard(4.0, "ask", 2, None, "stop"),
+        Hazard(5.5, "power", detail="nothing more"),
+        Hazard(7.0, "boot"),
+        end_s=40.0,
+    ),
+    "tripped at rest, then no power": _scene(
+        Hazard(1.0, "fault", 2, None, "status_bits"),
+        Hazard(8.0, "power", detail="nothing more"),
+        Hazard(9.0, "heal", 2),
+        Hazard(10.0, "boot"),
+        bays=(Bay(soc_pct=99.0), Bay(soc_pct=99.0), Bay()),
+        end_s=45.0,
     ),
     "charging, then no power": _scene(h(0, "power", detail="nothing more"), h(3, "boot"), end_s=T + 20),
     "charging, then the disk is torn": _scene(h(0, "power", detail="some of it, torn"), h(3, "boot"), end_s=T + 20),
@@ -69,6 +91,7 @@ SCENES: dict[str, Script] = {
     "file edited, then both killed": _scene(h(0, "edit", 1, None, "remove"), h(1, "kill both"), end_s=T + 10),
     # 3. Two reasons in one field.
     "stopped while it ends": _scene(h(0, "term"), h(0.2, "ask", 0, None, "stop"), h(4, "boot"), end_s=T + 20),
+    "restarted in order": _scene(h(0, "term"), h(5, "boot"), end_s=T + 5 + 2 * BEGIN_S + 2),
     # 4. Verified by one witness, in one sample.
     "says standby": _scene(
         h(0, "fault", 0, None, "says_standby"), h(0, "fault", 0, None, "ignore_stop"), h(1, "ask", 0, None, "stop")
@@ -83,6 +106,9 @@ SCENES: dict[str, Script] = {
         h(0, "fault", 1, None, "says_standby_now_and_then"), h(0, "fault", 1, None, "ignore_stop"), h(1, "term")
     ),
     "runs again": _scene(h(0, "fault", 2, None, "runs_again"), h(1, "ask", 2, None, "stop"), end_s=T + 24),
+    "stopped by other means": _scene(
+        h(0, "fault", 0, None, "stopped_elsewhere"), bays=(Bay(soc_pct=82.0), Bay(), Bay()), end_s=T + 20
+    ),
     "crossed cables": _scene(bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=40.0),
     "crossed cables, hot": _scene(
         h(0, "fault", 0, 60.0, "over_temperature"), bays=(Bay(cross=1), Bay(cross=0), Bay()), end_s=T + 14
@@ -95,6 +121,7 @@ SCENES: dict[str, Script] = {
         end_s=T + 26,
     ),
     # 5. One port delays another.
+    "frozen": _scene(h(0, "freeze")),
     "half dead adapter, killed": _scene(
         h(0, "slow", 0, 5.0, "open:port:60"), h(0.1, "fault", 0, None, "port_gone"), h(0.5, "heal", 0), h(1.5, "kill")
     ),
@@ -115,6 +142,12 @@ SCENES: dict[str, Script] = {
         bays=(Bay(small=True), Bay(), Bay()),
         end_s=100.0,
     ),
+    "ampere-hours over silences": _scene(
+        Hazard(30.0, "fault", 0, None, "bmu_silent"),
+        Hazard(34.0, "heal", 0),
+        bays=(Bay(small=True), Bay(), Bay()),
+        end_s=130.0,
+    ),
     "precharge over restarts": _scene(
         Hazard(1.0, "fault", 0, None, "precharge_no_rise"),
         *(one for t_s in (17.0, 37.0, 57.0, 77.0) for one in (Hazard(t_s, "term"), Hazard(t_s + 5, "boot"))),
@@ -126,8 +159,11 @@ SCENES: dict[str, Script] = {
         h(0, "fault", 0, None, "limit_reverts"), bays=(Bay(temperature_c=8.0), Bay(), Bay()), end_s=T + 26
     ),
     "apart for most of the time": _scene(h(0, "comes", 0, 2.0, "voltage_v"), end_s=T + 30),
+    "loose plug": _scene(h(0, "loose", 0, 6.0), end_s=T + 90),
     # 8. Not the battery that is meant.
     "a pack of 36 V": _scene(bays=(Bay(cells=10, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
+    "a pack of 24 V": _scene(bays=(Bay(cells=7), Bay(), Bay()), end_s=30.0),
+    "hot": _scene(h(0, "fault", 0, None, "over_temperature")),
     "a pack that collapses": _scene(h(0, "fault", 1, None, "pack_collapsed")),
     "a BMU that is frozen": _scene(
         h(0, "fault", 1, None, "bmu_frozen"), bays=(Bay(), Bay(soc_pct=80.0), Bay()), end_s=T + 400
@@ -137,9 +173,27 @@ SCENES: dict[str, Script] = {
     "a BMU that reads 0.00 V": _scene(
         h(0, "bmu", 0, 0.0, "voltage_v:is:1"), h(0, "fault", 0, None, "ignore_stop"), end_s=T + 16
     ),
+    # 10. The record of the accident.
+    "a record over lives": _scene(
+        h(0, "term"),
+        h(4, "boot"),
+        h(16, "kill both"),
+        h(20, "boot"),
+        h(26, "power", detail="some of it, torn"),
+        h(30, "boot"),
+        end_s=T + 36,
+        recorded=True,
+    ),
     # 11. The last words.
     "cut off, then killed": _scene(
         h(0, "fault", 0, None, "charger_cut_off"), h(8, "kill both"), h(9, "boot"), end_s=T + 24
+    ),
+    "cut off and not heard, then killed": _scene(
+        h(0, "fault", 0, None, "charger_cut_off"),
+        h(0, "fault", 0, None, "bmu_silent"),
+        h(8, "kill both"),
+        h(9, "boot"),
+        end_s=T + 24,
     ),
     # 12. Others on the bus.
     **{f"on the bus, {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},

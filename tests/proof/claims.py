@@ -1,0 +1,104 @@
+"""What a status must say, or must not: held against the plant, which the service knows by its witnesses only."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.workbench.recording import read
+from orchestrator.workbench.replay import again
+
+if TYPE_CHECKING:
+    from tests.proof.judge import Charger, Judge
+
+#: What another program does to a port is told within this.
+TOLD_S = 3.0
+#: A charger that may run, and is not heard, is an alarm this long after the start.
+UNHEARD_S = 6.0
+#: Who stands by with less than this is not full; with more than that it is not deeply discharged.
+FULL_SOC, DEEP_SOC = 0.86, 0.3
+LINE_FAULTS = frozenset({"line_taken_over", "line_changed"})
+#: The charges of a station begin this far apart.
+APART_S = 1.0
+#: A plug that loses its contact again and again makes a charge begin no more often than this within a script.
+LOOSE_STARTS = 4
+
+Finding = tuple[str, str]  #: the invariant, what was seen
+
+
+@dataclass(slots=True)
+class Told:
+    """What is remembered of one charger from status to status."""
+
+    line_s: float = 0.0  #: when a change of its line was last told
+    locked_s: float | None = None  #: since when a stranger has its port
+    ran_s: float = 0.0  #: when RUN was last written to its port
+    starts: list[float] = field(default_factory=list)  #: when a frame has switched it on
+
+
+def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterator[Finding]:
+    """What is wrong with what the status says of a bay."""
+    now_s, told, shown = judge.time.now_s, charger.told, f"{bay['state']}: {bay['reason']}"
+    if bay["state"] == "UNCONTROLLABLE" and not bay["reason"].startswith("CUT THE MAINS"):
+        yield "what to do", f"out of control is not told with what to do first: {bay['reason']!r}"
+    if bay["state"] == "FULL" and charger.rig.bay.pack.soc < FULL_SOC and _honest(charger):
+        yield "full", f"the pack has {charger.rig.bay.pack.soc:.0%}, and the status says {shown}"
+    if "deeply discharged" in shown and charger.rig.bay.pack.soc > DEEP_SOC and _honest(charger):
+        yield "what it is", f"the pack has {charger.rig.bay.pack.soc:.0%}, and the status says {shown}"
+    if judge.booted_s is None:
+        return
+    if LINE_FAULTS & {fault["id"] for fault in bay["faults"]}:
+        told.line_s = now_s
+    tty, up_s = charger.rig.tty, judge.booted_s + TOLD_S
+    reached = tty.present and charger.deaf_s < tty.changed_s - TOLD_S and tty.lock is not charger.rig.wire
+    if reached and up_s < tty.changed_s < now_s - TOLD_S and told.line_s < tty.changed_s:
+        yield "not told", f"another program has set its port up otherwise, and the status says {shown}"
+    locked = tty.lock is charger.rig.wire and tty.present
+    told.locked_s = (told.locked_s or now_s) if locked else None
+    if told.locked_s is not None and now_s - max(told.locked_s, judge.booted_s) > 2 * TOLD_S and not bay["alarm"]:
+        yield "not told", f"another program has its port, nobody is alarmed, and the status says {shown}"
+    if _runs_on(judge, charger) and now_s - judge.booted_s > UNHEARD_S and not bay["alarm"]:
+        yield "nobody is told", f"it runs since the last life, nobody is alarmed, and the status says {shown}"
+    if any(fault["id"] == "internal" for fault in bay["faults"]):
+        yield "exception", shown
+
+
+def starts(judge: "Judge", charger: "Charger") -> Iterator[Finding]:
+    """A frame has switched a charger on."""
+    now_s = judge.time.now_s
+    for other in judge.chargers:
+        if other is not charger and other.told.starts and now_s - other.told.starts[-1] < APART_S:
+            yield "one after the other", f"it begins {now_s - other.told.starts[-1]:.2f} s after another bay"
+    charger.told.starts.append(now_s)
+    loose = any(one.what == "loose" and one.bay in (-1, charger.number) for one in judge.script.hazards)
+    if loose and len(charger.told.starts) > LOOSE_STARTS:
+        yield "loose plug", f"with a loose plug it has begun {len(charger.told.starts)} charges"
+
+
+def record(judge: "Judge") -> Iterator[Finding]:
+    """What was recorded over all lives is decided again as it was."""
+    with TemporaryDirectory(prefix="record") as directory:
+        for path, inode in judge.gateway.disk.names.items():
+            if path.endswith(".jsonl"):
+                Path(directory, Path(path).name).write_bytes(bytes(inode.data))
+        try:
+            taken = [(bay, one) for bay, steps in read([Path(directory)]).bays.items() for one in again(steps)]
+        except Exception as error:  # noqa: BLE001 - whatever a power cut has left, it can be read
+            yield "record", f"it cannot be read: {error!r}"
+            return
+    for bay, one in taken:
+        if one.wrong:
+            yield "record", f"{bay}, {one.recorded.at_s:.3f}: {one.wrong}"
+
+
+def _runs_on(judge: "Judge", charger: "Charger") -> bool:
+    """We have had it run in a former life, and it has not understood a stop since. A bad disk may have lost that."""
+    ours = charger.stopped_s < charger.told.ran_s < (judge.booted_s or 0.0)
+    bad_disk = any(one.what == "slow" and ":disk" in one.detail for one in judge.script.hazards)
+    return charger.flows and ours and not bad_disk
+
+
+def _honest(charger: "Charger") -> bool:
+    wire, bay = charger.rig.wire, charger.rig.bay
+    return not (wire.lies or wire.liars or bay.falsify)
