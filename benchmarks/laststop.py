@@ -27,7 +27,8 @@ POLLS = 5
 STOPS_S = 5.0
 #: A bare process of the same interpreter that opens the port and writes the one frame.
 FLOOR = (
-    "import os, sys, tty; fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); tty.setraw(fd); "
+    "import os, sys, termios, tty; fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); tty.setraw(fd); "
+    "line = termios.tcgetattr(fd); line[4] = line[5] = termios.B19200; termios.tcsetattr(fd, 0, line); "
     "os.write(fd, bytes.fromhex('AFFA900410900034AFA0'))"
 )
 

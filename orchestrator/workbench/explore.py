@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from orchestrator.core.latches import effect, raised
-from orchestrator.core.machine import UNVERIFIED
+from orchestrator.core.machine import RESTING, UNVERIFIED
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
@@ -64,7 +64,7 @@ def gist(memory: Memory) -> tuple[object, ...]:
         memory.state in WAITS and bool(witnessed.proof),
         memory.unverified,
         memory.intends,
-        not energised and (witnessed.sees, witnessed.unordered_s >= UNORDERED_S),
+        memory.state in RESTING and (witnessed.sees, witnessed.unordered_s >= UNORDERED_S),
     )
 
 

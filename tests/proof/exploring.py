@@ -32,8 +32,8 @@ SMALL_BATTERIES = (
     "hotter than the station allows", "measured differently", "deeply discharged",
     "another current than the charger's",
 )  # fmt: skip
-#: The table leads there, and nothing can.
-NEVER = {(State.STARTING, State.FULL): "a service that has just started knows of no battery that it has charged full"}
+#: The table leads there, and nothing can: none, since a service that has just started may know of a full battery, too.
+NEVER: dict[tuple[State, State], str] = {}
 
 
 def rules(policy: str = "li-ion-48v", control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> Rules:
