@@ -15,7 +15,7 @@ demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, abou
 	$(BIN)/orchestrator demo $(ARGS)
 
 test: .venv/dev.stamp  ## all tests, three files at a time; ARGS='tests/core -k taper' chooses some
-	$(BIN)/python -m pytest -n 3 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-guest: .venv/dev.stamp  ## the tests that need a kernel with SocketCAN and systemd, in a User Mode Linux
 	$(BIN)/python -m tests.guest $(ARGS)

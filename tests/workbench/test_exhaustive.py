@@ -1,12 +1,15 @@
 """`check --exhaustive`: what it says of policies that break something, and of one that does not."""
 
+from multiprocessing import get_context
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.core.rules import Rules
+from orchestrator.workbench import exhaustive, processes
 from orchestrator.workbench.endings import reaches
 from orchestrator.workbench.exhaustive import bay_of, bays_in, here
 from orchestrator.workbench.explore import Explorer
@@ -53,8 +56,12 @@ def test_bays_that_differ_in_wiring_only_are_proved_once() -> None:
     assert list(bays_in("configs/maps/tabos.yaml")) == []
 
 
-def test_the_command_explores_on_every_core(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_explores_on_every_core(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The whole way, on a bay with few inputs: the same findings as in one process."""
+    monkeypatch.setattr(exhaustive, "StationInputs", SimpleNamespace(of=small))
+    monkeypatch.setattr(processes, "get_context", lambda _: get_context("fork"))  # children have those few, too
     assert main(["check", "--exhaustive", "--jobs", "2", str(ROOT / "broken" / "automatic.yaml")]) == 1
     said, told = capsys.readouterr()
     assert said.startswith(f"{ROOT}/broken/automatic.yaml, bay-1: 31 properties, 2 BROKEN; ")
