@@ -250,11 +250,7 @@ def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> di
     """
     end_s = monotonic() + timeout_s
     try:
-        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-            _connect(client, path, timeout_s)
-            client.settimeout(max(end_s - monotonic(), 0.001))
-            client.sendall(encode(request))
-            answer = json.loads(_read_line(client, end_s))
+        answer = _exchange(path, request, end_s)
     except PermissionError:
         raise NoServiceError(f"{path}: permission denied: only {owner(path)} and root may use it (sudo)") from None
     except (OSError, ValueError) as error:
@@ -267,6 +263,20 @@ def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> di
         why = answer.get("error") if isinstance(answer, dict) else f"what answers on {path} is no service of this kind"
         raise ServiceError(str(why or "the service refused"))
     return answer
+
+
+def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object:
+    """The answer of whoever listens there. A client that a busy machine kept waiting may be hung up on: it asks again."""
+    while True:
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+                _connect(client, path, left_s := max(end_s - monotonic(), 0.001))
+                client.settimeout(left_s)
+                client.sendall(encode(request))
+                return json.loads(_read_line(client, end_s))
+        except (ConnectionResetError, BrokenPipeError):
+            if request.get("verb") not in ("status", "stop", "pause") or monotonic() >= end_s:
+                raise  # what counts must not be done twice
 
 
 def _connect(client: socket.socket, path: Path, timeout_s: float) -> None:
