@@ -164,7 +164,7 @@ FAULTS: tuple[Row, ...] = (
     Row("status_limit", "B9", E.LIMIT, Clear.AUTO, battery.status_limit, ALWAYS,
         "charging goes on, on the lowest step", clean_s=10),
     Row("emergency", "B9", E.STOP, Clear.OPERATOR, battery.emergency, ALWAYS,
-        "read the BMU's error code in its manual, then start"),
+        "look the error up in the BMU's manual; once the BMU has taken it back (restart it if it does not), start"),
     Row("hot_trip", "B10", E.TRIP, Clear.RESET, battery.hot_trip, ALWAYS,
         "keep people away until it has cooled down; inspect the pack, then reset"),
     Row("over_temperature", "B10", E.PAUSE, Clear.AUTO, battery.over_temperature, ALWAYS,
@@ -199,7 +199,7 @@ FAULTS: tuple[Row, ...] = (
         "look which battery is in the bay, and have its BMU calibrated, then start", for_s=5),
     # who else is on the bus
     Row("other_master", "B27", E.WARN, Clear.AUTO, battery.other_master, ALWAYS,
-        "it does no harm as long as it only reads; keep other tools off this bus while batteries charge", clean_s=10),
+        "find that tool, and keep it off this bus while batteries charge", clean_s=10),
     Row("heartbeat_set", "B28", E.WARN, Clear.AUTO, battery.heartbeat_set, ALWAYS,
         "keep other tools from changing this BMU's settings", clean_s=10),
     # the charge

@@ -266,7 +266,7 @@ def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> di
 
 
 def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object:
-    """The answer of whoever listens there. A client that a busy machine kept waiting may be hung up on: it asks again."""
+    """The answer of whoever listens there. A client that a busy machine kept waiting is hung up on: it asks again."""
     while True:
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
@@ -276,7 +276,7 @@ def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object
                 return json.loads(_read_line(client, end_s))
         except (ConnectionResetError, BrokenPipeError):
             if request.get("verb") not in ("status", "stop", "pause") or monotonic() >= end_s:
-                raise  # what counts must not be done twice
+                raise
 
 
 def _connect(client: socket.socket, path: Path, timeout_s: float) -> None:

@@ -13,7 +13,7 @@ from orchestrator.core.machine import RESTING
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.model import Decision, State
+from orchestrator.model import Decision, Snapshot, State, Step
 from orchestrator.workbench.replay import Again
 
 #: What a policy alone keeps from step to step: its own debounces and holds.
@@ -37,6 +37,23 @@ class Difference:
         return self.was.state is not self.now.state
 
 
+def _as_told(snapshot: Snapshot, was: Step | None, now: Step | None, rules: Rules) -> Snapshot:
+    """What the devices would have shown on the other policy's step: the record's charger obeyed its own one.
+
+    Where the steps are the same, or nothing is charged, as it was recorded.
+    """
+    charger, pack_a = snapshot.charger, snapshot.battery.current_a
+    if was is None or now is None or was.index == now.index or charger is None or not rules.manual:
+        return snapshot
+    share = min(1.0, now.current_a / was.current_a)
+    told = now.index if charger.current_limit == was.index else charger.current_limit
+    battery = snapshot.battery
+    if pack_a is not None:
+        battery = replace(battery, current_a=replace(pack_a, value=pack_a.value * share))
+    charger = replace(charger, current_a=charger.current_a * share, current_limit=told)
+    return replace(snapshot, charger=charger, battery=battery)
+
+
 class Comparison:
     """One bay's record against another policy; `differences` grows while steps come."""
 
@@ -55,7 +72,9 @@ class Comparison:
             return
         own = None if parted or self._own is None else self._own
         given = one.memory if own is None else replace(one.memory, **{name: getattr(own, name) for name in OWN})
-        decision, self._own = step(one.recorded.at_s, one.recorded.snapshot, given, self._other(one.rules))
+        rules = self._other(one.rules)
+        snapshot = _as_told(one.recorded.snapshot, one.memory.step, given.step, rules)
+        decision, self._own = step(one.recorded.at_s, snapshot, given, rules)
         if decision.state is one.decision.state and _step(decision) == _step(one.decision):
             self._open = None
             return
