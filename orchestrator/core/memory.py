@@ -61,7 +61,8 @@ class Memory:
     counted_t_s: float | None = None  #: the charger reading up to which the session's Ah are counted
     resumed: bool = False  #: the charger was brought back from standby …
     resume_s: float = 0.0  #: … by a resume sent after this moment
-    ran: bool = False  #: the charger has reported that it runs, in this stage
+    ran: bool = False  #: the charger runs, or did, in this stage: by its own word, by the BMU's, or by what it left
+    shown: bool = False  #: the charger has shown the mode that it was told, in this stage
     order: Command | None = None  #: what the sequence is waiting to see confirmed …
     order_s: float = 0.0  #: … since when
     tries: int = 0  #: … and how often the resume was repeated for it

@@ -16,7 +16,8 @@ from orchestrator.core.finish import tapers
 from orchestrator.core.memory import Still
 from orchestrator.core.witnesses import followed
 from orchestrator.core.witnesses.measured import STILL_ABOVE_A
-from orchestrator.model import ENERGISED, ChargeMode, ChargerReading, Operation, Session, State
+from orchestrator.core.witnesses.standby import sees_current
+from orchestrator.model import ENERGISED, Action, ChargeMode, ChargerReading, Operation, Session, State
 
 #: How far apart the kept temperatures are.
 WARMTH_EVERY_S = 10.0
@@ -33,8 +34,8 @@ def follow(f: Facts, last_s: float | None) -> None:
     running = reading is not None and reading.operation is Operation.RUNNING
     memory.runs_s = _since(f.runs, memory.runs_s, f.now_s)
     memory.taper_s = _since(memory.state is State.CHARGING and tapers(f), memory.taper_s, f.now_s)
-    memory.ran = memory.ran or (f.energised and running)
     memory.witnessed = followed.follow(f, passed_s)
+    memory.ran = memory.ran or (f.energised and (running or _began(f)))
     if reading is not None:
         _follow_modes(f, reading, passed_s)
         _follow_settings(f, reading)
@@ -44,6 +45,23 @@ def follow(f: Facts, last_s: float | None) -> None:
     _follow_warmth(f)
     _follow_battery(f)
     _follow_session(f, passed_s)
+
+
+def _began(f: Facts) -> bool:
+    """The charge has begun, though no status reply has shown it: a run that is ordered again would undo a stop.
+
+    Either the BMU has seen its current; or the charger, which had left standby and shown the mode that it was told, is
+    in standby again.
+    """
+    memory, reading = f.memory, f.reading
+    ordered = memory.order is not None and memory.order.action is Action.RUN
+    if ordered and sees_current(f) and (f.pack_a or 0.0) - memory.witnessed.before_a >= followed.FIRST_A:
+        return True
+    if reading is None or not f.rules.manual:
+        return False
+    memory.shown = memory.shown or reading.charge_mode in (ChargeMode.CHARGE, ChargeMode.PRECHARGE)
+    stood = reading.operation is Operation.STOPPED and reading.charge_mode is ChargeMode.FULL
+    return memory.shown and stood
 
 
 def _since(holds: bool, since_s: float | None, now_s: float) -> float | None:  # noqa: FBT001 - the condition itself
@@ -194,6 +212,7 @@ def follow_state(f: Facts, before: State) -> None:
     memory = f.memory
     memory.since_s = f.now_s
     memory.ran, memory.reached_s, memory.taper_s, memory.qualified_s = False, None, None, None
+    memory.shown = False
     memory.step, memory.raise_s = None, None
     memory.ready, memory.intends, memory.confirmed = False, False, False
     if memory.state not in ENERGISED:

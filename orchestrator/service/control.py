@@ -270,8 +270,7 @@ def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object
     while True:
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-                _connect(client, path, left_s := max(end_s - monotonic(), 0.001))
-                client.settimeout(left_s)
+                _connect(client, path, max(end_s - monotonic(), 0.001))
                 client.sendall(encode(request))
                 return json.loads(_read_line(client, end_s))
         except (ConnectionResetError, BrokenPipeError):

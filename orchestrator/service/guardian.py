@@ -83,7 +83,8 @@ class Guardian:
     def run(self) -> int:
         """Wait for the end of the controller; its exit status, or ACTED if the chargers had to be stopped from here."""
         for number in ENDS:
-            if signal.getsignal(number) is not signal.SIG_IGN:  # `nohup` stays what it is
+            # `nohup` stays what it is; but nobody who starts us can make us deaf to `kill`, or to systemd.
+            if number is signal.SIGTERM or signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._pass_on)
         if not has_terminal() and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
             signal.signal(signal.SIGHUP, self._pass_on_reload)

@@ -11,7 +11,7 @@ from orchestrator.config.policy import Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.witnesses import pack as packs
-from orchestrator.model import ENERGISED, STOP, ChargeMode, Measurement, Operation, Request, State
+from orchestrator.model import ENERGISED, STOP, Action, ChargeMode, Measurement, Operation, Request, State
 from orchestrator.sim import chemistry
 from tests.core.bays import IN, POLICY, charging, idle, stopping
 from tests.core.edges import Edge
@@ -518,3 +518,40 @@ def test_the_voltages_of_the_tests_fit() -> None:
     rules = bay().policy.pack
     for soc_pct in range(101):
         assert said(POLICY, fitting_v(rules, soc_pct, 48.0), soc_pct) is None
+
+
+# --- a charge that somebody stops before a reply has shown it ---------------------------------------------------------
+
+
+def begun() -> World:
+    """Told to run, and no reply shows it yet."""
+    world = World(voltage_v=48.0)
+    world.deaf = {Action.RUN}
+    world.until(State.CHARGING)
+    world.run(2.0)
+    assert world.decision.command is not None
+    assert world.decision.command.action is Action.RUN
+    return world
+
+
+def test_a_charger_that_is_in_standby_again_is_not_started_over_whoever_stopped_it() -> None:
+    world = begun()
+    world.charger.resting = True
+    world.run(2.0)
+    assert world.raised.keys() & {"stopped_by_itself", "early_full"}, "both wait for a person"
+    world.deaf = set()
+    world.run(60.0)
+    assert world.is_in(State.IDLE)
+    assert not world.charger.running
+
+
+def test_a_current_that_only_the_bmu_has_seen_was_a_charge() -> None:
+    world = begun()
+    world.pack_amps = 6.0
+    world.run(0.5)
+    world.pack_amps = 0.0
+    world.deaf = set()
+    world.run(60.0)
+    assert world.is_in(State.IDLE)
+    assert not world.charger.running
+    assert Action.RUN not in {order.action for order in world.orders[-1:] if order is not None}
