@@ -142,7 +142,7 @@ class Walk:
             taken = self.take(place, move)
             steps += 1
             broken += [(name, text, move) for name, text in self.news(taken)]
-            if taken.before.state is not taken.after.state:
+            if taken.before.state is not taken.after.state and not move.restart:  # another life is no change of state
                 changes.add((taken.before.state, taken.after.state))
             if not taken.error and (key := self.gist(taken.after)) not in self._told:
                 self._told.add(key)

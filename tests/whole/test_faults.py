@@ -31,7 +31,7 @@ class Case:
 
 CASES = (
     Case("bmu_reboot", "SUSPENDED", "bmu_rebooted"),  # goes on after 20 s, so it is looked at first
-    Case("line_taken_over", "SUSPENDED", "line_taken_over", SILENCE_S),  # so does this
+    Case("line_taken_over", "SUSPENDED", "line_taken_over", SILENCE_S, instead="line_changed"),  # so does this
     Case("reverse_polarity", "TRIPPED", "reverse_polarity"),
     Case("error_stop", "TRIPPED", "error_stop"),
     Case("system_stop", "IDLE", "system_stop"),
@@ -53,7 +53,7 @@ CASES = (
     Case("amps_disagree", "UNCONTROLLABLE", "amps_disagree", 5 + AT_ONCE_S),
     Case("says_standby", "IDLE", "stopped_by_itself"),
     Case("says_standby_now_and_then", "IDLE", "stopped_by_itself", SILENCE_S),
-    Case("stopped_elsewhere", "IDLE", "stopped_by_itself"),
+    Case("stopped_elsewhere", "IDLE", "early_full", instead="stopped_by_itself"),  # its mode 5 says so, whoever did it
     Case("pack_collapsed", "TRIPPED", "pack_collapsed"),
     Case("another_pack", "TRIPPED", "pack_collapsed", instead="volts_disagree"),  # in mid-charge its volts fall first
     Case("status_bits", "TRIPPED", "status_trip"),
