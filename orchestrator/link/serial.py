@@ -13,6 +13,7 @@ import os
 import select
 import termios
 import time
+from contextlib import suppress
 from typing import Self
 
 import serial
@@ -196,10 +197,30 @@ def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
     port = serial.Serial(None, baudrate=BAUD, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=exclusive)
     port.port = path
     try:
-        port.open()
+        try:
+            port.open()
+        except _FAILURES:
+            if not _taken_back(path):
+                raise
+            port.open()
     except _FAILURES as error:
         raise LinkError(f"{path}: {_sentence(error, path, otherwise='cannot be opened')}") from error
     return port
+
+
+def _taken_back(path: str) -> bool:
+    """Whether the port had another line discipline, which is set right now: with N_NULL pyserial cannot open it."""
+    try:
+        fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except (OSError, ValueError):
+        return False
+    try:
+        return bool(settings.take_back(fd))
+    except OSError:
+        return False
+    finally:
+        with suppress(OSError):
+            os.close(fd)
 
 
 def _sentence(error: BaseException, path: str, *, otherwise: str) -> str:

@@ -59,11 +59,7 @@ def restore(fd: int, tolerated: str = "") -> str:
     `tolerated`: what it differs by because its driver takes no better. Output that was suspended goes on.
     Raises OSError or termios.error for a port that is gone.
     """
-    found = []
-    discipline = _number(fd, termios.TIOCGETD)
-    if discipline != _N_TTY:
-        fcntl.ioctl(fd, termios.TIOCSETD, _N_TTY.to_bytes(4, sys.byteorder))
-        found.append(f"line discipline {discipline}")
+    found = [words] if (words := take_back(fd)) else []
     *flags, characters = termios.tcgetattr(fd)
     words = differences(flags, characters)
     if words and words != tolerated:
@@ -72,6 +68,19 @@ def restore(fd: int, tolerated: str = "") -> str:
     # Nobody can ask whether it is suspended (TCOOFF, or an XOFF that came in); going on is harmless.
     termios.tcflow(fd, termios.TCOON)
     return ", ".join(found)
+
+
+def take_back(fd: int) -> str:
+    """Set the line discipline for bytes as they are; which other one was found, "" where all was well.
+
+    With some others (N_NULL) a tty does not even answer that it is one, and takes no byte: so this comes before
+    anything else is asked. What is no tty has none, and stays as it is. OSError for a port that is gone.
+    """
+    discipline = _number(fd, termios.TIOCGETD)
+    if discipline == _N_TTY:
+        return ""
+    fcntl.ioctl(fd, termios.TIOCSETD, _N_TTY.to_bytes(4, sys.byteorder))
+    return f"line discipline {discipline}"
 
 
 def set_up(fd: int) -> None:

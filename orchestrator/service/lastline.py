@@ -234,6 +234,7 @@ def open_port(name: str, *, leave_held: bool) -> int:
     except ValueError:  # a 0, or half a character: a dying controller may say anything
         raise OSError("not the name of a port") from None
     try:
+        settings.take_back(fd)  # with another line discipline a serial port may not look like one
         if not os.isatty(fd):
             raise OSError("not a serial port")
         if leave_held:

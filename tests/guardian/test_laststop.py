@@ -3,6 +3,7 @@
 import fcntl
 import os
 import socket
+import sys
 import termios
 import threading
 import time
@@ -13,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from orchestrator.errors import LinkError
+from orchestrator.link.serial import SerialLine
 from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import STATUS_REQUEST, encode
 from orchestrator.protocol.standby import OPERATION_STOP_FRAME, QUESTION, STOP_FRAME
@@ -429,6 +432,42 @@ def test_a_port_that_was_set_to_another_speed_is_stopped(tmp_path: Path, *, open
         stty(pty.path, "115200", "echo", "icanon")
         assert stop_all({pty.path: fd}, 3.0, watch_s=0.0) == {pty.path: ""}
         assert not charger.running
+
+
+@pytest.mark.parametrize("opened", [True, False])
+def test_a_port_that_was_left_without_a_line_discipline_is_stopped(tmp_path: Path, *, opened: bool) -> None:
+    """With N_NULL a serial port does not even say that it is one."""
+    with running_chargers(tmp_path) as (bench,):
+        fd = bench.duplicate() if opened else None
+        without_discipline(bench.fd)
+        assert stop_all({bench.name: fd}, 3.0) == {bench.name: ""}
+        assert not bench.runs
+
+
+@pytest.mark.parametrize("opened", [True, False])
+def test_a_service_gets_on_without_a_line_discipline(tmp_path: Path, *, opened: bool) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        line = SerialLine.open(bench.name) if opened else None
+        without_discipline(bench.fd)
+        line = line or SerialLine.open(bench.name)
+        assert line.restore() == ("line discipline 27" if opened else "")
+        line.write(STOP_FRAME)
+        wait_until(lambda: not bench.runs)
+        line.close()
+
+
+def test_what_is_no_serial_port_has_no_line_discipline() -> None:
+    assert stop_all({os.devnull: None}, 0.1) == {os.devnull: "not a serial port"}
+    with pytest.raises(LinkError, match="it is no serial port"):
+        SerialLine.open(os.devnull)
+
+
+def without_discipline(fd: int) -> None:
+    """As another program may leave it."""
+    try:
+        fcntl.ioctl(fd, termios.TIOCSETD, (27).to_bytes(4, sys.byteorder))  # N_NULL
+    except OSError:
+        pytest.skip("this kernel has no N_NULL")
 
 
 @pytest.mark.parametrize("opened", [True, False])
