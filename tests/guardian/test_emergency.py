@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from orchestrator.service import inhand
+from orchestrator.service.estop import UNTOLD
 from orchestrator.service.inhand import ports_in_hand, stations
 from orchestrator.service.witness import NOBODY, Service
 from tests.guardian.chargers import Bench, running_chargers
@@ -393,3 +394,71 @@ sys.exit(main(["--port", *sys.argv[1:]]))
         ]
         assert done.returncode == 1
         assert pty.drain() == b""
+
+
+# --- several services ------------------------------------------------------------------------------------------------
+
+#: What looks like a service: it holds a port, listens, and answers every stop, or nothing at all.
+SERVES = """
+import json, os, socket, sys
+port, path, bay, answers = sys.argv[1:5]
+fd = os.open(port, os.O_RDWR | os.O_NOCTTY)
+null = os.open(os.devnull, os.O_RDWR)
+listener = socket.socket(socket.AF_UNIX)
+listener.bind(path)
+listener.listen()
+print(flush=True)
+while True:
+    client, _ = listener.accept()
+    asked = json.loads(client.makefile("rb").readline() or b"null")
+    if asked is None or answers != "yes":
+        continue
+    bays = [{"name": bay, "port": port}]
+    answer = {"results": {bay: ""}} if asked["verb"] == "stop" else {"bays": bays}
+    client.sendall(json.dumps({"ok": True, **answer}).encode() + b"\\n")
+    client.close()
+"""
+
+
+@contextmanager
+def serving(port: str, path: Path, bay: str, answers: str = "yes") -> Iterator[None]:
+    argv = ["/opt/bin/orchestrator", "-c", SERVES, port, str(path), bay, answers]
+    with subprocess.Popen(argv, executable=sys.executable, stdout=subprocess.PIPE) as service:
+        assert service.stdout is not None
+        service.stdout.readline()
+        try:
+            yield
+        finally:
+            service.kill()
+
+
+@pytest.mark.parametrize("answers", ["yes", "no"])
+def test_every_service_that_holds_one_of_the_ports_is_told(tmp_path: Path, answers: str) -> None:
+    """One that could not be told may start its charger again."""
+    left, right = tmp_path / "left", tmp_path / "right"
+    with (
+        running_chargers(tmp_path, 2) as (one, other),
+        serving(one.name, left, "left-1"),
+        serving(other.name, right, "right-1", answers),
+    ):
+        done = estop("--port", one.name, other.name, cwd=tmp_path)
+        assert f"{left}: the service holds left-1 until an operator starts it\n" in done.stderr
+        if answers == "yes":
+            assert f"{right}: the service holds right-1 until an operator starts it\n" in done.stderr
+            assert (done.returncode, done.stdout.splitlines()[-1]) == (0, DONE.strip())
+        else:
+            assert f"{right}: the service has not taken the stop (it does not answer)" in done.stderr
+            assert (done.returncode, done.stdout.splitlines()[-1]) == (1, UNTOLD)
+        assert done.stdout.count("standby verified") == 2
+
+
+def test_who_holds_what_everybody_does_is_not_the_service(tmp_path: Path) -> None:
+    with (
+        running_chargers(tmp_path, 2) as (one, other),
+        serving(other.name, tmp_path / "other", "other-1"),
+        serving(one.name, tmp_path / "one", "one-1"),
+    ):
+        done = estop("--port", one.name, os.devnull, cwd=tmp_path)
+        assert done.returncode == 1
+        assert f"{os.devnull}: not a serial port" in done.stdout
+        assert done.stderr == "the service holds one-1 until an operator starts it\n"
