@@ -36,6 +36,7 @@ OPENING, OPEN_S = "its driver hangs", 0.5
 #: still holds the ports is its controller, frozen as well, and is killed only afterwards.
 FROZEN = "watchdog"
 UNTOLD = "a service that holds a port could not be told: it may start its chargers again"
+LOST = "every charger that was found is told of here, but it may have named more, and those may run"
 #: How long the proof of standby is waited for, and a service's answer.
 VERIFY_S = 3.0
 #: A charger that stands by is watched for this long: one that runs again was not stopped.
@@ -159,6 +160,8 @@ class EmergencyStop:
             self._notes.append(f"{station}: {error.strerror}")
             return ""
         self.stop(found.ports)
+        if found.damaged:
+            self._doubts.append(f"{station} is damaged: {LOST}")
         self._socket, self._contactors = self._socket or found.socket, found.contactors
         return found.journal
 
@@ -173,27 +176,38 @@ class EmergencyStop:
 
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
         if not self._bays:
-            for note in self._notes:
-                _say(2, note)
-            _say(2, "no port to stop: name a station file or --port PATH")
-            return 1
+            return self._without_ports()
         if self._options.leave_held:
             whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
         else:
-            from orchestrator.service.witness import Services  # noqa: PLC0415 - the first stops are out now
-
-            services = Services(self._bays, self._socket, every_bay=not self._options.ports)
-            self._stopping.witness = services.sees
-            services.start()
-            whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
-            services.wait(self._began_s + VERIFY_S)
-            self._notes += services.said
-            if services.untold:
-                self._doubts.append(UNTOLD)
+            whys = self._with_services()
         end_s = time.monotonic() + OPEN_S
         while OPENING in self._cut.values() and time.monotonic() < end_s:
             time.sleep(LOOK_S)
         return self._tell(whys)
+
+    def _without_ports(self) -> int:
+        """A service that runs may know what the station file does not say any more: it is to stop all it has."""
+        if self._socket and not self._options.leave_held:
+            self._with_services()
+        for note in self._notes + self._doubts:
+            _say(2, note)
+        _say(2, "no port to stop: name a station file or --port PATH")
+        return 1
+
+    def _with_services(self) -> dict[str, str]:
+        """Tell the services, and verify with what they see."""
+        from orchestrator.service.witness import Services  # noqa: PLC0415 - the first stops are out now
+
+        services = Services(self._bays, self._socket, every_bay=not self._options.ports)
+        self._stopping.witness = services.sees
+        services.start()
+        whys = self._stopping.finish(VERIFY_S, on_round=self._isolate) if self._bays else {}
+        services.wait(self._began_s + VERIFY_S)
+        self._notes += services.said
+        if services.untold:
+            self._doubts.append(UNTOLD)
+        return whys
 
     def _isolate(self) -> None:
         """Open the contactors, each in its own time."""

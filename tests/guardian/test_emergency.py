@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from orchestrator.service import inhand
-from orchestrator.service.estop import UNTOLD
+from orchestrator.service.estop import LOST, UNTOLD
 from orchestrator.service.inhand import ports_in_hand, stations
 from orchestrator.service.witness import NOBODY, Service
 from tests.guardian.chargers import Bench, running_chargers
@@ -36,7 +36,8 @@ def estop(*args: str, cwd: Path, stdout: int = subprocess.PIPE, **env: str) -> "
 
 def station_file(path: Path, *benches: Bench, more: str = "") -> Path:
     bays = "".join(f"  - {{name: bay-{n}, charger: {{port: {b.name}}}}}\n" for n, b in enumerate(benches, start=1))
-    path.write_text(f"bays:\n{bays}{more}")
+    whole = "" if "journal:" in more else "journal: {directory: none}\n"
+    path.write_text(f"bays:\n{bays}control: {{socket: none}}\n{whole}{more}")
     return path
 
 
@@ -138,7 +139,9 @@ def test_a_port_that_the_file_names_no_more_is_stopped_if_its_charger_may_run(
             name=name,
         )
         done = estop(str(file), cwd=tmp_path)
-        assert done.stdout.splitlines()[-2:] == [f"old ({dropped.name}): standby verified", DONE.strip()]
+        last = f"{file} is damaged: {LOST}" if broken else DONE.strip()
+        assert done.stdout.splitlines()[-2:] == [f"old ({dropped.name}): standby verified", last]
+        assert done.returncode == bool(broken)
         assert not (named.runs or dropped.runs)
         assert idle.stops == 0, "nobody has told it to run"
 
@@ -462,3 +465,40 @@ def test_who_holds_what_everybody_does_is_not_the_service(tmp_path: Path) -> Non
         assert done.returncode == 1
         assert f"{os.devnull}: not a serial port" in done.stdout
         assert done.stderr == "the service holds one-1 until an operator starts it\n"
+
+
+# --- a station file that is damaged ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "rest",
+    ["", "control: {socket: s}\n", "journal: {directory: j}\n", "control: {socket: s}\njournal: {directory: 'j\n"],
+)
+def test_a_file_that_was_cut_off_may_have_named_more(tmp_path: Path, rest: str) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        file = tmp_path / "station.yaml"
+        file.write_text(f"bays:\n  - {{name: left, charger: {{port: {bench.name}}}}}\n{rest}")
+        done = estop(str(file), cwd=tmp_path)
+        assert not bench.runs
+        assert done.returncode == 1
+        shown = bench.name if "'" in rest else f"left ({bench.name})"  # what is no YAML gives no names
+        assert done.stdout.splitlines()[-2:] == [
+            f"{shown}: standby verified",
+            f"{file} is damaged: {LOST}",
+        ]
+
+
+@pytest.mark.parametrize("by", ["--socket", "ORCHESTRATOR_SOCKET"])
+def test_a_file_that_has_lost_every_port_leads_to_the_service(tmp_path: Path, by: str) -> None:
+    """Which knows its chargers, and stops them all."""
+    file, path = tmp_path / "station.yaml", str(tmp_path / "s")
+    file.write_text("station: depot-1\nbays:\n  - {na")
+    with answering(tmp_path / "s", {"bays": []}) as asked:
+        if by == "--socket":
+            done = estop(str(file), by, path, cwd=tmp_path)
+        else:
+            done = estop(str(file), cwd=tmp_path, ORCHESTRATOR_SOCKET=path)
+        assert {"verb": "stop", "bays": None} in asked
+        assert (done.returncode, done.stdout) == (1, "")
+        assert "the service holds bay-1 until an operator starts it\n" in done.stderr
+        assert f"{file} is damaged: " in done.stderr

@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator.link.holder import control_sockets
 from orchestrator.protocol.standby import STOP_FRAME
-from orchestrator.service.estop import UNTOLD
+from orchestrator.service.estop import LOST, UNTOLD
 from orchestrator.sim.client import PlantProcess
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
@@ -58,6 +58,7 @@ def station_file(directory: Path, text: str) -> Path:
 
 
 BAYS = "bays:\n  - {name: left, charger: {port: ./charger-1}}\n  - {name: right, charger: {port: ./charger-2}}\n"
+BAYS += "control: {socket: none}\njournal: {directory: none}\n"
 
 
 @pytest.mark.parametrize("text", [BAYS, f"stattion: typo\n{BAYS}limits: 7\n"])
@@ -71,8 +72,10 @@ def test_a_station_file_gives_ports_and_names_even_with_mistakes(tmp_path: Path,
 
 def test_a_file_that_is_not_even_yaml_gives_ports(tmp_path: Path) -> None:
     with running_chargers(tmp_path) as (bench,):
-        done = estop(str(station_file(tmp_path, f"]\n  port: {bench.name}\n")))
-        assert (done.returncode, done.stdout) == (0, f"{bench.name}: standby verified\n{DONE}")
+        file = station_file(tmp_path, f"]\n  port: {bench.name}\n")
+        done = estop(str(file))
+        told = f"{bench.name}: standby verified\n{file} is damaged: {LOST}\n"
+        assert (done.returncode, done.stdout) == (1, told)
 
 
 def test_a_station_file_without_ports_or_none_at_all(tmp_path: Path) -> None:
