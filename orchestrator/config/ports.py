@@ -13,6 +13,8 @@ _SOCKET = re.compile(rb"""(?:^|[\s{,])socket:\s+["']?([^\s"',}#]+)""", re.MULTIL
 _DIRECTORY = re.compile(rb"""(?:^|[\s{,])directory:\s+["']?([^\s"',}#]+)""", re.MULTILINE)
 
 
+#: What every station file has at its top level: one that was cut off may still be YAML, yet lacks the last of them.
+_WHOLE = ("bays", "control", "journal")
 _LINE = re.compile(r"0x[0-9a-fA-F]{1,3}|[0-9]{1,4}")
 #: As `config/scalars.py` reads it.
 _BOOLS = {"false": False, "true": True}
@@ -29,6 +31,7 @@ class Wiring:
     socket: str
     contactors: tuple[tuple[str, int, bool], ...] = ()
     journal: str = ""  #: the journal's directory
+    damaged: bool = False  #: a part may be lost, and with it ports
 
 
 def wiring(path: Path) -> Wiring:
@@ -39,7 +42,7 @@ def wiring(path: Path) -> Wiring:
     """
     with path.open("rb") as stream:
         data = stream.read(MAX_BYTES)
-    node, _ = parse(str(path), data)
+    node, wrong = parse(str(path), data)
     ports = {} if node is None else _ports(node)
     bare = _COMMENT.sub(b"", data)
     for match in _PORT.findall(bare):
@@ -51,6 +54,7 @@ def wiring(path: Path) -> Wiring:
         _shown(path.parent / socket) if socket else "",
         tuple((_shown(path.parent / chip), line, active_low) for chip, line, active_low in _contactors(node)),
         _shown(path.parent / journal) if journal else "",
+        damaged=bool(wrong) or any(_get(node, key) is None for key in _WHOLE),
     )
 
 

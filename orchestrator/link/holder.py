@@ -7,6 +7,7 @@ Standard library only, and nothing here asks a device or a file system, which mi
 """
 
 import os
+import stat
 from collections.abc import Iterable, Iterator
 
 LISTENS = "00010000"  #: __SO_ACCEPTCON among the flags in /proc/net/unix
@@ -36,13 +37,25 @@ def holder(port: str, but: Iterable[int] = ()) -> Holder:
     return _best([found for pid in _openers(port) if pid not in besides and (found := _process(pid))])
 
 
-def control_socket(ports: Iterable[str]) -> str:
-    """The control socket of an orchestrator that has one of these ports open; "" where none can be found."""
-    devices = {os.path.realpath(port) for port in ports}
-    for pid, _ in orchestrators():
-        if not devices.isdisjoint(_files(pid)) and (path := _listens_on(pid)):
-            return path
-    return ""
+def control_sockets(ports: Iterable[str]) -> list[str]:
+    """The control socket of every orchestrator that has one of these ports open, each once."""
+    devices = {os.path.realpath(port) for port in ports if _may_be_tty(port)}
+    found = [_listens_on(pid) for pid, _ in orchestrators() if not devices.isdisjoint(_files(pid))]
+    return [path for path in dict.fromkeys(found) if path]
+
+
+def _may_be_tty(port: str) -> bool:
+    """Whether this may be a serial port, by the kernel's list: /dev/null, say, everybody has open."""
+    try:
+        at = os.stat(port)
+    except OSError:
+        return True  # it was unplugged: who still has it open is meant
+    except ValueError:
+        return False
+    drivers = [line.split() for line in _read("/proc/tty/drivers").splitlines()]
+    majors = {words[-3] for words in drivers if len(words) >= 5}  # serial /dev/ttyS 4 64-95 serial
+    major = str(os.major(at.st_rdev))
+    return stat.S_ISCHR(at.st_mode) and (major in majors if majors else major != "1")
 
 
 def orchestrators() -> Iterator[tuple[int, list[str]]]:

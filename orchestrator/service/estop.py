@@ -19,7 +19,7 @@ usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-h
 Stop the charger on every port of the station file, or on the given ports, and verify it. Without arguments the file is
 station.yaml in this folder, else that of the installed service, else that of a service that runs. Ports whose chargers
 may be running by what the service has written down are stopped, too, whether the file still names them or not.
-Needs no running service. One that runs is told to hold these bays until an operator starts them.
+Needs no running service. Each one that holds one of these ports is told to hold its bays until an operator starts them.
 Then the station file's contactors are opened. Those that a service holds are left to it: it opens them by itself
 where a charger does not obey.
 
@@ -27,7 +27,7 @@ where a charger does not obey.
   --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or what the station file says)
   --leave-held     leave ports alone that a running service holds, and tell it nothing
 
-Exit status 0: every charger was verified to stand by; 1: not every one; 2: used wrongly.
+Exit status 0: every charger was verified to stand by; 1: not every one, or there may be more; 2: used wrongly.
 """
 Contactor = tuple[str, int, bool]  #: chip, line, active low
 #: A contactor's driver that has not answered by the end, and a moment more, hangs.
@@ -35,6 +35,8 @@ OPENING, OPEN_S = "its driver hangs", 0.5
 #: What systemd says to ExecStopPost= (systemd.exec, $SERVICE_RESULT) when its watchdog has killed the guardian: who
 #: still holds the ports is its controller, frozen as well, and is killed only afterwards.
 FROZEN = "watchdog"
+UNTOLD = "a service that holds a port could not be told: it may start its chargers again"
+LOST = "every charger that was found is told of here, but it may have named more, and those may run"
 #: How long the proof of standby is waited for, and a service's answer.
 VERIFY_S = 3.0
 #: A charger that stands by is watched for this long: one that runs again was not stopped.
@@ -106,6 +108,7 @@ class EmergencyStop:
         self._opening: set[Contactor] = set()
         self._cut: dict[Contactor, str] = {}  # what became of them
         self._notes: list[str] = []
+        self._doubts: list[str] = []  # why it is not all, although every charger that is known stands by
 
     def stop(self, bays: Mapping[str, str]) -> None:
         """Stop the chargers on these ports; one that has two names once."""
@@ -157,6 +160,8 @@ class EmergencyStop:
             self._notes.append(f"{station}: {error.strerror}")
             return ""
         self.stop(found.ports)
+        if found.damaged:
+            self._doubts.append(f"{station} is damaged: {LOST}")
         self._socket, self._contactors = self._socket or found.socket, found.contactors
         return found.journal
 
@@ -171,25 +176,38 @@ class EmergencyStop:
 
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
         if not self._bays:
-            for note in self._notes:
-                _say(2, note)
-            _say(2, "no port to stop: name a station file or --port PATH")
-            return 1
+            return self._without_ports()
         if self._options.leave_held:
             whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
         else:
-            from orchestrator.service.witness import Service  # noqa: PLC0415 - the first stops are out now
-
-            service = Service(self._bays, self._socket, every_bay=not self._options.ports)
-            self._stopping.witness = service.sees
-            service.start()
-            whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
-            service.told.wait(max(0.0, self._began_s + VERIFY_S - time.monotonic()))
-            self._notes.append(service.said)
+            whys = self._with_services()
         end_s = time.monotonic() + OPEN_S
         while OPENING in self._cut.values() and time.monotonic() < end_s:
             time.sleep(LOOK_S)
         return self._tell(whys)
+
+    def _without_ports(self) -> int:
+        """A service that runs may know what the station file does not say any more: it is to stop all it has."""
+        if self._socket and not self._options.leave_held:
+            self._with_services()
+        for note in self._notes + self._doubts:
+            _say(2, note)
+        _say(2, "no port to stop: name a station file or --port PATH")
+        return 1
+
+    def _with_services(self) -> dict[str, str]:
+        """Tell the services, and verify with what they see."""
+        from orchestrator.service.witness import Services  # noqa: PLC0415 - the first stops are out now
+
+        services = Services(self._bays, self._socket, every_bay=not self._options.ports)
+        self._stopping.witness = services.sees
+        services.start()
+        whys = self._stopping.finish(VERIFY_S, on_round=self._isolate) if self._bays else {}
+        services.wait(self._began_s + VERIFY_S)
+        self._notes += services.said
+        if services.untold:
+            self._doubts.append(UNTOLD)
+        return whys
 
     def _isolate(self) -> None:
         """Open the contactors, each in its own time."""
@@ -212,12 +230,13 @@ class EmergencyStop:
         lines = [f"CUT THE MAINS of {', '.join(running)}: nothing proves that they stand by"] if running else []
         lines += [f"{names[port]}: {why or 'standby verified'}" for port, why in whys.items()]
         lines += [f"contactor on {chip} line {line}: {became}" for (chip, line, _), became in self._cut.items()]
-        if not any(whys.values()):
+        lines += self._doubts
+        if not any(whys.values()) and not self._doubts:
             lines.append("every charger stands by, verified")
         _say(1, "\n".join(lines))
         for note in self._notes:
             _say(2, note)
-        return 1 if any(whys.values()) else 0
+        return 1 if any(whys.values()) or self._doubts else 0
 
 
 def _say(fd: int, text: str) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ServiceError
-from orchestrator.link.holder import control_socket
+from orchestrator.link.holder import control_sockets
 from orchestrator.service.control import ask
 
 #: A service that has not answered by then is asked again.
@@ -23,27 +23,72 @@ LOOK_S, FRESH_S = 0.1, 1.5
 #: Standby may show so much, at the charger and at the BMU, as everywhere else.
 STANDBY_A, BMU_STANDBY_A = 0.5, 1.0
 NOBODY = "no service is running"
+UNTOLD = "the service has not answered in time: nobody holds its bays"
 
 Bay = Mapping[str, Any]  #: of the status document
 
 
-class Service:
-    """The service that holds one of these ports, else the one behind `socket`, if one is named.
+class Services:
+    """Every service that holds one of these ports, else the one behind `socket`, if one is named.
 
-    `every_bay`: it is to hold all its bays, not only those of these ports.
+    `every_bay`: they are to hold all their bays, not only those of these ports.
     """
 
     def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool) -> None:
-        self.said = "the service has not answered in time: nobody holds its bays"  #: what became of it, for people
+        self._names, self._named, self._every_bay = list(names), socket, every_bay
+        self._found: list[Service] = []
+        self._looked = threading.Event()
+
+    def start(self) -> None:
+        """Look for them, tell them, and go on asking them."""
+        threading.Thread(target=self._look, name="services", daemon=True).start()
+
+    def wait(self, end_s: float) -> None:
+        """Until all have answered, at the longest until then."""
+        self._looked.wait(max(0.0, end_s - time.monotonic()))
+        for service in self._found:
+            service.told.wait(max(0.0, end_s - time.monotonic()))
+
+    def sees(self, name: str, since_s: float) -> tuple[float, str] | None:
+        """What the one that is in touch with this port's charger last saw of it (see `Service.sees`)."""
+        return next((seen for one in self._found if (seen := one.sees(name, since_s)) is not None), None)
+
+    @property
+    def said(self) -> list[str]:
+        """What became of each, for people; which one is told where there are several."""
+        if not self._found:
+            return [UNTOLD]
+        return [f"{one.path}: {one.said}" if len(self._found) > 1 else one.said for one in self._found]
+
+    @property
+    def untold(self) -> bool:
+        """Whether one that holds a port may start its charger again: it has not taken the stop."""
+        return not self._looked.is_set() or any(one.holds and not one.told.is_set() for one in self._found)
+
+    def _look(self) -> None:
+        paths = control_sockets(self._names)
+        self._found = [
+            Service(self._names, path, every_bay=self._every_bay, holds=bool(paths)) for path in paths or [self._named]
+        ]
+        self._looked.set()
+        for service in self._found:
+            service.start()
+
+
+class Service:
+    """The service behind this socket, if there is one; `holds` if it has one of these ports open."""
+
+    def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool, holds: bool = False) -> None:
+        self.said = UNTOLD  #: what became of it, for people
         self.told = threading.Event()  #: that it has answered, or that there is none
+        self.path, self.holds = Path(socket), holds
         self._ports = {os.path.realpath(name) for name in names}
         self._named, self._every_bay = socket, every_bay
-        self._path = Path(socket)
         self._seen: tuple[float, Mapping[str, Bay]] = (0.0, {})
         self._thread = threading.Thread(target=self._run, name="service", daemon=True)
 
     def start(self) -> None:
-        """Look for it, tell it, and go on asking it."""
+        """Tell it, and go on asking it."""
         self._thread.start()
 
     def sees(self, name: str, since_s: float) -> tuple[float, str] | None:
@@ -70,14 +115,12 @@ class Service:
 
     def _hold(self) -> bool:
         """Tell it to hold its bays until an operator starts them. False where there is no service."""
-        found = control_socket(self._ports)
-        if not found and not _listens(self._named):
+        if not _listens(self._named):
             self.said = NOBODY
             self.told.set()  # one that starts now stops its chargers first, and asks nobody
             return False
-        self._path = Path(found or self._named)
         bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
-        results = ask(self._path, {"verb": "stop", "bays": bays}, ANSWER_S)["results"]
+        results = ask(self.path, {"verb": "stop", "bays": bays}, ANSWER_S)["results"]
         answers = dict(results) if isinstance(results, Mapping) else {}
         refused = [f"{name}: {answer}" for name, answer in answers.items() if answer]
         held = ", ".join(name for name, answer in answers.items() if not answer)
@@ -90,7 +133,7 @@ class Service:
 
     def _bays(self) -> list[tuple[str, Bay]]:
         """Each bay with its port's real name."""
-        bays: Any = ask(self._path, {"verb": "status"}, ANSWER_S)["bays"]
+        bays: Any = ask(self.path, {"verb": "status"}, ANSWER_S)["bays"]
         return [(os.path.realpath(bay["port"]), bay) for bay in bays]
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from orchestrator.service import inhand
+from orchestrator.service.estop import LOST, UNTOLD
 from orchestrator.service.inhand import ports_in_hand, stations
 from orchestrator.service.witness import NOBODY, Service
 from tests.guardian.chargers import Bench, running_chargers
@@ -35,7 +36,8 @@ def estop(*args: str, cwd: Path, stdout: int = subprocess.PIPE, **env: str) -> "
 
 def station_file(path: Path, *benches: Bench, more: str = "") -> Path:
     bays = "".join(f"  - {{name: bay-{n}, charger: {{port: {b.name}}}}}\n" for n, b in enumerate(benches, start=1))
-    path.write_text(f"bays:\n{bays}{more}")
+    whole = "" if "journal:" in more else "journal: {directory: none}\n"
+    path.write_text(f"bays:\n{bays}control: {{socket: none}}\n{whole}{more}")
     return path
 
 
@@ -137,7 +139,9 @@ def test_a_port_that_the_file_names_no_more_is_stopped_if_its_charger_may_run(
             name=name,
         )
         done = estop(str(file), cwd=tmp_path)
-        assert done.stdout.splitlines()[-2:] == [f"old ({dropped.name}): standby verified", DONE.strip()]
+        last = f"{file} is damaged: {LOST}" if broken else DONE.strip()
+        assert done.stdout.splitlines()[-2:] == [f"old ({dropped.name}): standby verified", last]
+        assert done.returncode == bool(broken)
         assert not (named.runs or dropped.runs)
         assert idle.stops == 0, "nobody has told it to run"
 
@@ -393,3 +397,108 @@ sys.exit(main(["--port", *sys.argv[1:]]))
         ]
         assert done.returncode == 1
         assert pty.drain() == b""
+
+
+# --- several services ------------------------------------------------------------------------------------------------
+
+#: What looks like a service: it holds a port, listens, and answers every stop, or nothing at all.
+SERVES = """
+import json, os, socket, sys
+port, path, bay, answers = sys.argv[1:5]
+fd = os.open(port, os.O_RDWR | os.O_NOCTTY)
+null = os.open(os.devnull, os.O_RDWR)
+listener = socket.socket(socket.AF_UNIX)
+listener.bind(path)
+listener.listen()
+print(flush=True)
+while True:
+    client, _ = listener.accept()
+    asked = json.loads(client.makefile("rb").readline() or b"null")
+    if asked is None or answers != "yes":
+        continue
+    bays = [{"name": bay, "port": port}]
+    answer = {"results": {bay: ""}} if asked["verb"] == "stop" else {"bays": bays}
+    client.sendall(json.dumps({"ok": True, **answer}).encode() + b"\\n")
+    client.close()
+"""
+
+
+@contextmanager
+def serving(port: str, path: Path, bay: str, answers: str = "yes") -> Iterator[None]:
+    argv = ["/opt/bin/orchestrator", "-c", SERVES, port, str(path), bay, answers]
+    with subprocess.Popen(argv, executable=sys.executable, stdout=subprocess.PIPE) as service:
+        assert service.stdout is not None
+        service.stdout.readline()
+        try:
+            yield
+        finally:
+            service.kill()
+
+
+@pytest.mark.parametrize("answers", ["yes", "no"])
+def test_every_service_that_holds_one_of_the_ports_is_told(tmp_path: Path, answers: str) -> None:
+    """One that could not be told may start its charger again."""
+    left, right = tmp_path / "left", tmp_path / "right"
+    with (
+        running_chargers(tmp_path, 2) as (one, other),
+        serving(one.name, left, "left-1"),
+        serving(other.name, right, "right-1", answers),
+    ):
+        done = estop("--port", one.name, other.name, cwd=tmp_path)
+        assert f"{left}: the service holds left-1 until an operator starts it\n" in done.stderr
+        if answers == "yes":
+            assert f"{right}: the service holds right-1 until an operator starts it\n" in done.stderr
+            assert (done.returncode, done.stdout.splitlines()[-1]) == (0, DONE.strip())
+        else:
+            assert f"{right}: the service has not taken the stop (it does not answer)" in done.stderr
+            assert (done.returncode, done.stdout.splitlines()[-1]) == (1, UNTOLD)
+        assert done.stdout.count("standby verified") == 2
+
+
+def test_who_holds_what_everybody_does_is_not_the_service(tmp_path: Path) -> None:
+    with (
+        running_chargers(tmp_path, 2) as (one, other),
+        serving(other.name, tmp_path / "other", "other-1"),
+        serving(one.name, tmp_path / "one", "one-1"),
+    ):
+        done = estop("--port", one.name, os.devnull, cwd=tmp_path)
+        assert done.returncode == 1
+        assert f"{os.devnull}: not a serial port" in done.stdout
+        assert done.stderr == "the service holds one-1 until an operator starts it\n"
+
+
+# --- a station file that is damaged ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "rest",
+    ["", "control: {socket: s}\n", "journal: {directory: j}\n", "control: {socket: s}\njournal: {directory: 'j\n"],
+)
+def test_a_file_that_was_cut_off_may_have_named_more(tmp_path: Path, rest: str) -> None:
+    with running_chargers(tmp_path) as (bench,):
+        file = tmp_path / "station.yaml"
+        file.write_text(f"bays:\n  - {{name: left, charger: {{port: {bench.name}}}}}\n{rest}")
+        done = estop(str(file), cwd=tmp_path)
+        assert not bench.runs
+        assert done.returncode == 1
+        shown = bench.name if "'" in rest else f"left ({bench.name})"  # what is no YAML gives no names
+        assert done.stdout.splitlines()[-2:] == [
+            f"{shown}: standby verified",
+            f"{file} is damaged: {LOST}",
+        ]
+
+
+@pytest.mark.parametrize("by", ["--socket", "ORCHESTRATOR_SOCKET"])
+def test_a_file_that_has_lost_every_port_leads_to_the_service(tmp_path: Path, by: str) -> None:
+    """Which knows its chargers, and stops them all."""
+    file, path = tmp_path / "station.yaml", str(tmp_path / "s")
+    file.write_text("station: depot-1\nbays:\n  - {na")
+    with answering(tmp_path / "s", {"bays": []}) as asked:
+        if by == "--socket":
+            done = estop(str(file), by, path, cwd=tmp_path)
+        else:
+            done = estop(str(file), cwd=tmp_path, ORCHESTRATOR_SOCKET=path)
+        assert {"verb": "stop", "bays": None} in asked
+        assert (done.returncode, done.stdout) == (1, "")
+        assert "the service holds bay-1 until an operator starts it\n" in done.stderr
+        assert f"{file} is damaged: " in done.stderr

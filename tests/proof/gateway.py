@@ -185,7 +185,7 @@ class Gateway:
             load_module.load_station: self._load,
             control.ControlSocket: partial(Door, self),
             control.ask: self._ask,
-            holder.control_socket: self._holder,
+            holder.control_sockets: self._holder,
             witness._listens: lambda _: self.door is not None,
             boot.boot_id: lambda: f"boot {self.boots}",
             can_module._open_bus: lambda _: Driver(self.bus, self.time),
@@ -315,7 +315,7 @@ class Gateway:
             raise ServiceError(asked.error or "no answer")
         return {"ok": True, **asked.answer}
 
-    def _holder(self, ports: Iterable[str]) -> str:
-        """The control socket of the service that has one of these ports locked."""
+    def _holder(self, ports: Iterable[str]) -> list[str]:
+        """The control sockets of the service that has one of these ports locked."""
         locked = any((tty := self.kernel.ttys.get(port)) is not None and tty.lock is not None for port in ports)
-        return SOCKET if locked and self.door is not None else ""
+        return [SOCKET] if locked and self.door is not None else []

@@ -733,7 +733,7 @@ WORDS: tuple[Seed, ...] = (
         "words",
         "an estop without a service ends with a complaint",
         ("tests/guardian/test_estop.py::test_ports_without_a_service",),
-        (f"{SERVICE}witness.py", "        if not found and not _listens(self._named):\n", "        if False:\n"),
+        (f"{SERVICE}witness.py", "        if not _listens(self._named):\n", "        if False:\n"),
     ),
 )
 
