@@ -71,9 +71,9 @@ def test_a_port_whose_name_no_file_can_have_is_shown_as_written(tmp_path: Path) 
 def test_a_file_without_ports_has_none(tmp_path: Path) -> None:
     file = tmp_path / "x.yaml"
     file.write_text("bays: 7\n")
-    assert wiring(file) == Wiring({}, "")
+    assert wiring(file) == Wiring({}, "", damaged=True)
     file.write_text("bays: [7, {charger: 1}, {charger: {port: [1]}}, {charger: {port: tty}}]\n")
-    assert wiring(file) == Wiring({}, "")
+    assert wiring(file) == Wiring({}, "", damaged=True)
     with pytest.raises(OSError, match="No such file"):
         wiring(tmp_path / "none.yaml")
 
