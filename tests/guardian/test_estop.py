@@ -219,7 +219,7 @@ def test_with_its_station_file_every_bay_is_held(station: Station) -> None:
     assert done.stdout.splitlines() == [*standby, DONE.strip()]
     assert done.stderr == held("bay-1", "bay-2", "bay-3", "bay-4")
     bays = service.wait("IDLE", ["bay-1", "bay-2", "bay-3", "bay-4"]).values()
-    # On a busy machine the service may have seen its charger stop before it was told why; a person starts it all the same.
+    # On a busy machine it may have seen its charger stop before it was told why; a person starts it all the same.
     assert all(bay["reason"].endswith(("start to go on", "then start")) for bay in bays)
     assert not any(plant.state(bay)["operation"] for bay in (1, 2, 3, 4))
 
