@@ -14,7 +14,7 @@ from orchestrator.model import ENERGISED, Session, State
 
 #: In these a charger may be delivering current.
 RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
-UNFINISHED = "the service died while this bay was charging; its charger was stopped first when it began again"
+UNFINISHED = "the last run of this service ended in mid-charge; its charger was stopped first when it began again"
 
 Age = float  #: seconds, at the moment when it was written down
 

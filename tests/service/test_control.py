@@ -384,8 +384,8 @@ def test_requests_that_are_too_many_are_refused_in_time(tmp_path: Path, monkeypa
     with listening(path, bays), closing_all() as clients:
         crowd = [say(path, clients, "start", [f"bay-{number}"]) for number in range(3)]
         said = [reply(one) for one in crowd]
-    assert [one["ok"] for one in said] == [True, False, False]
-    assert said[1]["error"] == "too many requests at once: ask again"
+    assert sorted(one["ok"] for one in said) == [False, False, True], "whichever was read first"
+    assert {one["error"] for one in said if not one["ok"]} == {"too many requests at once: ask again"}
 
 
 #: What the first one takes of one processor, and how late a stop may be then: its rest and a few turns.
