@@ -24,10 +24,13 @@ EDGES: dict[str, tuple[str, ...]] = {
     "config": ("errors", "keys", "model", "protocol.objects"),
     "interlock": ("config.policy", "config.station", "errors", "keys", "model"),
     "core": ("config.policy", "config.station", "errors", "keys", "model"),
-    "link": ("errors", "keys", "model", "protocol"),
+    # What must work when nothing else does. Only the station file needs PyYAML.
+    "lastresort": ("config.ports", "errors", "protocol.standby"),
+    "link": ("errors", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
     # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
-    "service": ("config", "core", "devices", "errors", "interlock", "keys", "link", "model", "protocol"),
+    "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol"),
+    "commissioning": ("config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile"),
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
     # What it checks and tries is the core itself, on the models of the emulators, without any line between them.
@@ -36,25 +39,25 @@ EDGES: dict[str, tuple[str, ...]] = {
         "sim.chemistry", "sim.pack",
     ),
     "show": (),
-    "demo": ("config", "errors", "keys", "model", "service", "show", "sim"),
+    "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim"),
     "cli": (
-        "config", "core", "demo", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service",
-        "show", "sim", "workbench",
+        "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort", "link",
+        "model", "protocol", "service", "show", "sim", "workbench",
     ),
-    "__main__": ("cli", "service.estop", "service.guardian"),
+    "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
 
 #: Third-party library → its owners; nobody else imports it, and nothing else is imported at all.
 OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
-    "cattrs": ("workbench.recording",),
-    "distributed": ("workbench.sweep",),
+    "cattrs": ("workbench.replay.recording",),
+    "distributed": ("workbench.simulate.sweep",),
     "durand": ("sim",),
     "gpiod": ("link.gpio",),
-    "jinja2": ("workbench.page",),
-    "matplotlib": ("workbench.plot", "workbench.tradeoff"),
-    "pygraphviz": ("workbench.drawing",),
+    "jinja2": ("workbench.draw.page",),
+    "matplotlib": ("workbench.draw.plot", "workbench.draw.tradeoff"),
+    "pygraphviz": ("workbench.draw.drawing",),
     "rich": ("demo",),
     "serial": ("link.serial",),
     "transitions": ("core.machine",),
@@ -70,7 +73,7 @@ LIBRARY = frozenset({
 #: … and none of these built-in functions.
 IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "open", "print"})
 
-CLOCK_READERS = ("cli", "demo", "service", "sim", "workbench.verbs")
+CLOCK_READERS = ("cli", "commissioning", "demo", "lastresort", "service", "sim", "workbench.verbs")
 CLOCKS = frozenset({
     "clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "monotonic", "monotonic_ns", "perf_counter",
     "perf_counter_ns", "process_time", "process_time_ns", "strftime", "thread_time", "thread_time_ns", "time",

@@ -7,22 +7,20 @@ never waits for a client.
 """
 
 import errno
-import json
 import os
 import selectors
 import socket
-import struct
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from math import inf
 from pathlib import Path
-from time import monotonic, sleep, thread_time
+from time import sleep, thread_time
 
-from orchestrator.errors import NoServiceError, OrchestratorError, ServiceError
+from orchestrator.errors import OrchestratorError, ServiceError
 from orchestrator.service.client import Client, parse_request
-from orchestrator.service.reception import Handler, Reception, encode, refusal
-from orchestrator.service.socketfile import identity, listen, owner, remove
+from orchestrator.service.reception import Handler, Reception, refusal
+from orchestrator.service.socketfile import identity, listen, remove
 
 #: So many clients are served at once; for one more the longest idle one goes.
 MAX_CLIENTS = 256
@@ -39,8 +37,6 @@ CLOSED = (errno.EINVAL, errno.EBADF)
 RETRY_S = 0.1
 #: Strangers are counted, and troubles said, this often at most.
 SAY_S = 60.0
-#: More than any service says.
-MAX_ANSWER = 32 * 1024 * 1024
 
 
 class ControlSocket:
@@ -241,60 +237,3 @@ class ControlSocket:
         if trouble != self._lost:
             self._lost = trouble
             self._say(f"control socket: {trouble}")
-
-
-def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> dict[str, object]:
-    """Send one request to a running service and return its answer, all within `timeout_s`.
-
-    Raises NoServiceError where no service answers, ServiceError where the answer is no.
-    """
-    end_s = monotonic() + timeout_s
-    try:
-        answer = _exchange(path, request, end_s)
-    except PermissionError:
-        raise NoServiceError(f"{path}: permission denied: only {owner(path)} and root may use it (sudo)") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or "no answer"
-        raise NoServiceError(
-            f"no service answers on {path} ({reason}): is it running, and is this its control.socket? "
-            "Name it with --socket or $ORCHESTRATOR_SOCKET"
-        ) from None
-    if not isinstance(answer, dict) or not answer.get("ok"):
-        why = answer.get("error") if isinstance(answer, dict) else f"what answers on {path} is no service of this kind"
-        raise ServiceError(str(why or "the service refused"))
-    return answer
-
-
-def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object:
-    """The answer of whoever listens there. A client that a busy machine kept waiting is hung up on: it asks again."""
-    while True:
-        try:
-            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-                _connect(client, path, max(end_s - monotonic(), 0.001))
-                client.sendall(encode(request))
-                return json.loads(_read_line(client, end_s))
-        except (ConnectionResetError, BrokenPipeError):
-            if request.get("verb") not in ("status", "stop", "pause") or monotonic() >= end_s:
-                raise
-
-
-def _connect(client: socket.socket, path: Path, timeout_s: float) -> None:
-    """Connect; where too many clients wait already, wait in the kernel's own queue, where nobody is passed over."""
-    whole_s, part_s = divmod(timeout_s, 1.0)
-    client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", int(whole_s), max(int(part_s * 1e6), 1)))
-    try:
-        client.connect(str(path))
-    except BlockingIOError:
-        raise TimeoutError("timed out") from None
-
-
-def _read_line(client: socket.socket, end_s: float) -> bytes:
-    """One line; its time is up for the whole of it, also against one who answers byte for byte."""
-    data = bytearray()
-    while not data.endswith(b"\n"):
-        client.settimeout(max(end_s - monotonic(), 0.001))
-        part = client.recv(1 << 16)
-        data += part
-        if not part or len(data) > MAX_ANSWER or monotonic() > end_s:
-            raise TimeoutError("timed out" if part else "no answer")
-    return bytes(data)

@@ -1,7 +1,6 @@
 """The control socket's name in the file system: made owner-only, watched, and taken away only while it is ours."""
 
 import os
-import pwd
 import socket
 from pathlib import Path
 
@@ -77,11 +76,3 @@ def remove(path: Path, ours: Identity | None) -> None:
     """Take the name away, unless it is another's by now."""
     if ours is not None and identity(path) == ours:
         path.unlink(missing_ok=True)
-
-
-def owner(path: Path) -> str:
-    """Whose socket this is, for people; the folder may not even let us look."""
-    try:
-        return f"its owner, {pwd.getpwuid(path.stat().st_uid).pw_name},"
-    except (OSError, KeyError):
-        return "the service's own user"

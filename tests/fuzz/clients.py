@@ -13,6 +13,7 @@ from typing import Any
 from unittest.mock import patch
 
 from orchestrator.errors import ServiceError
+from orchestrator.lastresort import asking
 from orchestrator.model import Request
 from orchestrator.service import client, control, reception
 from tests.fuzz.control import BAYS, LOOP, SUPERVISOR
@@ -84,7 +85,7 @@ def is_answered() -> None:
     end_s = monotonic() + ANSWER_S
     while True:
         try:
-            said: Any = control.ask(PATH, {"verb": "status"}, timeout_s=ANSWER_S)
+            said: Any = asking.ask(PATH, {"verb": "status"}, timeout_s=ANSWER_S)
         except ServiceError:
             assert monotonic() < end_s and not SOCKET.stalled(monotonic()), "nobody answers any more"
         else:

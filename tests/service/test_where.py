@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import ServiceError, UsageError
-from orchestrator.service.control import ControlSocket, ask
+from orchestrator.lastresort.asking import ask
+from orchestrator.service.control import ControlSocket
 from orchestrator.service.where import find_socket
 
 

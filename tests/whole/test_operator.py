@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import ServiceError
-from orchestrator.service.control import ask
+from orchestrator.lastresort.asking import ask
 from orchestrator.sim.client import PlantProcess
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until

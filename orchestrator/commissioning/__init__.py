@@ -1,0 +1,1 @@
+"""Before a bay charges for the first time: its devices asked, its object map found."""

@@ -1,0 +1,79 @@
+"""One question to a running service, over its control socket: one JSON object a line, out and in."""
+
+import json
+import pwd
+import socket
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from time import monotonic
+
+from orchestrator.errors import NoServiceError, ServiceError
+
+#: More than any service says.
+MAX_ANSWER = 32 * 1024 * 1024
+
+
+def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> dict[str, object]:
+    """Send one request to a running service and return its answer, all within `timeout_s`.
+
+    Raises NoServiceError where no service answers, ServiceError where the answer is no.
+    """
+    end_s = monotonic() + timeout_s
+    try:
+        answer = _exchange(path, request, end_s)
+    except PermissionError:
+        raise NoServiceError(f"{path}: permission denied: only {_owner(path)} and root may use it (sudo)") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or "no answer"
+        raise NoServiceError(
+            f"no service answers on {path} ({reason}): is it running, and is this its control.socket? "
+            "Name it with --socket or $ORCHESTRATOR_SOCKET"
+        ) from None
+    if not isinstance(answer, dict) or not answer.get("ok"):
+        why = answer.get("error") if isinstance(answer, dict) else f"what answers on {path} is no service of this kind"
+        raise ServiceError(str(why or "the service refused"))
+    return answer
+
+
+def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object:
+    """The answer of whoever listens there. A client that a busy machine kept waiting is hung up on: it asks again."""
+    while True:
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+                _connect(client, path, max(end_s - monotonic(), 0.001))
+                client.sendall(json.dumps(request).encode() + b"\n")
+                return json.loads(_read_line(client, end_s))
+        except (ConnectionResetError, BrokenPipeError):
+            if request.get("verb") not in ("status", "stop", "pause") or monotonic() >= end_s:
+                raise
+
+
+def _connect(client: socket.socket, path: Path, timeout_s: float) -> None:
+    """Connect; where too many clients wait already, wait in the kernel's own queue, where nobody is passed over."""
+    whole_s, part_s = divmod(timeout_s, 1.0)
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", int(whole_s), max(int(part_s * 1e6), 1)))
+    try:
+        client.connect(str(path))
+    except BlockingIOError:
+        raise TimeoutError("timed out") from None
+
+
+def _read_line(client: socket.socket, end_s: float) -> bytes:
+    """One line; its time is up for the whole of it, also against one who answers byte for byte."""
+    data = bytearray()
+    while not data.endswith(b"\n"):
+        client.settimeout(max(end_s - monotonic(), 0.001))
+        part = client.recv(1 << 16)
+        data += part
+        if not part or len(data) > MAX_ANSWER or monotonic() > end_s:
+            raise TimeoutError("timed out" if part else "no answer")
+    return bytes(data)
+
+
+def _owner(path: Path) -> str:
+    """Whose socket this is, for people; the folder may not even let us look."""
+    try:
+        return f"its owner, {pwd.getpwuid(path.stat().st_uid).pw_name},"
+    except (OSError, KeyError):
+        return "the service's own user"

@@ -1,0 +1,1 @@
+"""Pictures: the state machine, simulations, sweeps."""

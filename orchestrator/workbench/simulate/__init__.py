@@ -1,0 +1,1 @@
+"""What a policy would do, in hours of simulated time."""
