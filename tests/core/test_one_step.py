@@ -37,7 +37,7 @@ from tests.core.world import bay
 
 
 def goes(f: Facts) -> Course:
-    return course(f, latches.shown(f.memory.faults))
+    return course(f, latches.shown(f.memory.faults, f.now_s))
 
 
 def holding(**changes: Any) -> dict[str, Any]:
@@ -250,7 +250,7 @@ def test_a_value_counts_while_it_is_fresh_and_not_from_the_future(t_s: float, va
 
 
 def test_a_fault_of_the_first_moment_is_shown_from_then_on() -> None:
-    (fault,) = latches.shown({"soh_low": FaultMemory(raised_s=0.0)})
+    (fault,) = latches.shown({"soh_low": FaultMemory(raised_s=0.0)}, 9.0)
     assert fault.since_s == 0.0
 
 

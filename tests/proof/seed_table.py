@@ -346,7 +346,11 @@ WITNESSES: tuple[Seed, ...] = (
         "witness",
         "UNCONTROLLABLE ends with the first standby, not with a lasting one",
         ("tests/core/test_witnesses.py",),
-        (f"{CORE}safestop.py", "proved_to_last(f) if f.memory.state is State.UNCONTROLLABLE else f.stopped", "f.stopped"),
+        (
+            f"{CORE}safestop.py",
+            "proved_to_last(f) if f.memory.state is State.UNCONTROLLABLE else f.stopped",
+            "f.stopped",
+        ),
     ),
     scene(
         "returns are not counted",
