@@ -216,8 +216,10 @@ def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
 def test_a_countdown_is_no_news() -> None:
     """The reason of a backoff says when it goes on: new words each second, and not one line of the journal."""
     world = charging()
-    world.charger_link = replace(world.charger_link, taken_over="115200 baud", taken_over_t_s=world.now_s)
-    world.run(10)
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.tick()
+    world.battery_link = replace(world.battery_link, implausible={})
+    world.run(5)
     assert world.state is State.SUSPENDED
     reasons = set()
     for _ in range(8):
