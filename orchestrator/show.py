@@ -50,9 +50,10 @@ def table(bays: Sequence[Bay]) -> str:
 
 
 def other_faults(bay: Bay) -> list[Mapping[str, object]]:
-    """The faults that the reason does not tell already."""
+    """The faults that the reason does not tell already, in the same words or as the state."""
     faults = cast("list[Mapping[str, object]]", bay["faults"])
-    return [fault for fault in faults if str(fault["text"]) not in str(bay["reason"])]
+    said = {"will_not_stop"} if bay["state"] == "UNCONTROLLABLE" else set()
+    return [fault for fault in faults if str(fault["text"]) not in str(bay["reason"]) and fault["id"] not in said]
 
 
 def is_alarming(bay: Bay) -> bool:
@@ -131,7 +132,7 @@ def _row(bay: Bay) -> tuple[str, ...]:
         _marked(figure(charger["current_a"], "{:.2f} A"), old=bool(charger.get("old"))),
         _marked(figure(battery["temperature_c"], "{:.1f} °C"), old="temperature_c" in old),
         "–" if step is None else f"{step} ({figure(bay.get('step_current_a'), '{:g} A')})",
-        str(bay["reason"]),
+        "see ALARM" if is_alarming(bay) else str(bay["reason"]),
     )
 
 

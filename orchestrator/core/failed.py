@@ -43,7 +43,7 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
     answer = f"internal error: {error}; {ANSWERS}" if refused else ""
     decision = Decision(
-        memory.state, memory.reason, STOP, faults=shown(memory.faults), alarm=out, closed=memory.closed,
+        memory.state, memory.reason, STOP, faults=shown(memory.faults, now_s), alarm=out, closed=memory.closed,
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory

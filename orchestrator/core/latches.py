@@ -10,16 +10,21 @@ which is judged last, and all the others go on.
 """
 
 from dataclasses import replace
+from math import ceil
 
 from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
+from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory
+from orchestrator.core.safestop import verified
 from orchestrator.model import ActiveFault, Effect
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
 BACKOFF_S = (10.0, 60.0, 300.0)
+ORDINALS = ("1st", "2nd", "3rd")
+MINUTE_S = 60.0
 #: Strikes are forgotten after this long; one more than there are backoffs latches.
 STRIKES_S = 3600.0
 
@@ -97,7 +102,10 @@ def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMem
     wait_s = clear_after_s(row, fault)
     if wait_s is not None and now_s - clean_s >= wait_s:
         return FaultMemory(strikes=fault.strikes) if fault.strikes else None
-    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s)
+    text = fault.text
+    if row.past is not None and f.memory.state in UNVERIFIED and verified(f):
+        text = row.past(text, row.for_s + clean_s - fault.raised_s)
+    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, text=text)
 
 
 def clear_after_s(row: Row, fault: FaultMemory) -> float | None:
@@ -121,23 +129,58 @@ def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
     return live
 
 
-def shown(faults: dict[str, FaultMemory]) -> tuple[ActiveFault, ...]:
-    """The faults in force, for people: what was seen and what to do. What has tripped begins with what to do."""
+def shown(faults: dict[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
+    """The faults in force, for people: what was seen and what to do. What has tripped begins with what to do.
+
+    `at_rest`: the charger stands by, verified.
+    """
     return tuple(
-        ActiveFault(name, effect(name, fault), _text(name, fault), fault.raised_s or 0.0)
+        ActiveFault(name, effect(name, fault), _text(ROW[name], fault, now_s, at_rest=at_rest), fault.raised_s or 0.0)
         for name, fault in raised(faults)
     )
 
 
-def _text(name: str, fault: FaultMemory) -> str:
-    advice = _advice(ROW[name], fault)
-    return f"{advice} – {fault.text}" if effect(name, fault) is Effect.TRIP else f"{fault.text}; {advice}"
-
-
-def _advice(row: Row, fault: FaultMemory) -> str:
+def _text(row: Row, fault: FaultMemory, now_s: float, *, at_rest: bool) -> str:
+    advice = row.at_rest if at_rest and row.at_rest else row.advice
     if fault.latched and row.clear is not Clear.RESET:
-        return f"{row.advice}; it came {len(fault.strikes)} times within an hour: reset by a person"
-    return row.advice
+        advice = f"{advice}; it came {len(fault.strikes)} times within an hour: reset by a person"
+    if effect(row.id, fault) is Effect.TRIP:
+        return f"{advice} – {fault.text}"
+    return f"{fault.text}{_ago(now_s - (fault.raised_s or 0.0)) if row.moment else ''}; {advice}"
+
+
+def _ago(age_s: float) -> str:
+    return f", {age_s / 60:.0f} min ago" if age_s >= MINUTE_S else ", just now"
+
+
+def goes_on(f: Facts) -> str:
+    """For the end of a sentence: when a bay goes on whose worst fault has a backoff, or what a person types for that.
+
+    "" for all other faults, whose own words say it. Made anew in each step, and part of no fault: who looks for news
+    compares ids.
+    """
+    name, fault = raised(f.memory.faults)[0]
+    if ROW[name].clear is not Clear.BACKOFF:
+        return ""
+    if fault.latched:
+        bay = f.rules.bay.name
+        gone = f"; its cause is gone: orchestrator reset {bay}, then orchestrator start {bay}"
+        return gone if fault.clean_s is not None else ""
+    others = [(one, other) for one, other in raised(f.memory.faults) if effect(one, other) >= Effect.NO_START]
+    lefts_s = [_left_s(ROW[one], other, f.now_s) for one, other in others]
+    own_s, strikes = _left_s(ROW[name], fault, f.now_s), max(len(fault.strikes), 1)
+    which = f"({ORDINALS[strikes - 1]} of {len(BACKOFF_S)} within an hour)"
+    if own_s is None:
+        return f"; goes on by itself {clear_after_s(ROW[name], fault):g} s after its cause is gone {which}"
+    known_s = [left_s for left_s in lefts_s if left_s is not None]
+    earliest = " at the earliest" if len(known_s) < len(lefts_s) else ""
+    return f"; its cause is gone, goes on by itself in {ceil(max(known_s))} s{earliest} {which}"
+
+
+def _left_s(row: Row, fault: FaultMemory, now_s: float) -> float | None:
+    """After how long a fault clears by itself, by what is known now."""
+    wait_s = clear_after_s(row, fault)
+    return None if wait_s is None or fault.clean_s is None else max(0.0, wait_s - (now_s - fault.clean_s))
 
 
 def release(

@@ -1,15 +1,24 @@
-"""What becomes of an operator's request. A refusal names its cause; a reset permits a start, it does not make one."""
+"""What becomes of an operator's request. A refusal names its cause; a reset permits a start, it does not make one.
+
+Accepted is what has an effect. A request that would change nothing is refused with what the bay does, or waits for; a
+stop alone is always accepted.
+"""
 
 from collections.abc import Callable
 
 from orchestrator.core import latches
 from orchestrator.core.memory import Memory
+from orchestrator.core.safestop import LASTS_S
 from orchestrator.model import Request, State
 
 STOPPED = "stopped by the operator; start to go on"
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
 RESET = "reset by the operator; start to go on"
+OUT_OF_CONTROL = (
+    "the charger was not seen to stop: cut its mains; nothing can be started or reset here before it has stood by for "
+    f"{LASTS_S:g} s"
+)
 
 
 def hear(memory: Memory, request: Request, now_s: float) -> str:
@@ -23,23 +32,33 @@ def _stop(memory: Memory, _now_s: float) -> str:
 
 
 def _pause(memory: Memory, _now_s: float) -> str:
+    latched = [name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None]
+    if latched:  # its reset leads to a start, which would end the pause
+        return f"not running: {', '.join(latched)} must be reset first"
     if memory.hold:
         return f"not running: {memory.hold}"
+    if memory.paused:
+        return "paused already; start to go on"
     memory.paused = True
     return ""
 
 
 def _start(memory: Memory, now_s: float) -> str:
     if memory.state is State.UNCONTROLLABLE:
-        return "the charger does not obey: cut its mains; nothing can start here"
-    memory.faults, reasons = latches.release(memory.faults, now_s, by_reset=False)
+        return OUT_OF_CONTROL
+    before = memory.faults
+    memory.faults, reasons = latches.release(before, now_s, by_reset=False)
     if reasons:
         return "; ".join(reasons)
+    if not (memory.hold or memory.paused) and len(memory.faults) == len(before):
+        return f"nothing to start: {memory.state}: {memory.reason}"
     memory.hold, memory.paused = "", False
     return ""
 
 
 def _reset(memory: Memory, now_s: float) -> str:
+    if memory.state is State.UNCONTROLLABLE:
+        return OUT_OF_CONTROL
     before = memory.faults
     faults, reasons = latches.release(before, now_s, by_reset=True)
     cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
@@ -47,9 +66,10 @@ def _reset(memory: Memory, now_s: float) -> str:
     reasons = reasons or [text for name in cleared if (text := _too_often(name, resets, now_s))]
     if reasons:
         return "; ".join(reasons)
+    if len(faults) == len(before):
+        return f"nothing to reset: {memory.state}: {memory.reason}"
     memory.faults, memory.resets = faults, resets + tuple((now_s, name) for name in cleared)
-    if len(memory.faults) < len(before):  # in whatever state: the way on is a start, also while the stop is verified
-        memory.hold = RESET
+    memory.hold = RESET  # in whatever state: the way on is a start, also while the stop is verified
     return ""
 
 

@@ -79,13 +79,13 @@ def _moved(old: Place, new: Place) -> str:
     if not old.port:
         return f"an older version of this service has run {old.bay} in the meantime"
     if old.bay != new.bay:
-        what = shown(new.port) if old.is_port_of(new) else f"the BMU on {new.can}, node {new.node_id},"
+        what = shown(new.port) if old.is_port_of(new) else f"the BMU on {new.can}, node 0x{new.node_id:02X},"
         return f"{what} was {old.bay}'s when this service last ran, and is {new.bay}'s now"
     if old.port != new.port:
         return f"{new.bay} was on {shown(old.port)} when this service last ran, and is on {shown(new.port)} now"
     return (
-        f"{new.bay} had the BMU on {old.can}, node {old.node_id}, when this service last ran, "
-        f"and has {new.can}, node {new.node_id}, now"
+        f"{new.bay} had the BMU on {old.can}, node 0x{old.node_id:02X}, when this service last ran, "
+        f"and has {new.can}, node 0x{new.node_id:02X}, now"
     )
 
 

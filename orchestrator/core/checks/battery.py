@@ -34,7 +34,7 @@ def bmu_silent(f: Facts) -> str | None:
     """FAULTS B1, B5, B19, B21: no values, or a line or a node of which the values cannot be trusted."""
     if (f.battery.online and not f.silent) or f.just_booted:
         return None
-    return f.battery.problem or f"the BMU (node {f.rules.bay.battery.node_id}) has stopped answering"
+    return f.battery.problem or f"the BMU (node 0x{f.rules.bay.battery.node_id:02X}) has stopped answering"
 
 
 def stale_reading(f: Facts) -> str | None:

@@ -22,6 +22,8 @@ IDLE_MAX_S = 10.0
 NEARLY_FULL_PCT = 95.0
 #: So many settings that go back within this time are no accident.
 MAX_REVERTS, REVERTS_S = 3, 60.0
+#: How a stop is told that only one of the two has seen, and one that was verified in the end.
+CONTRADICTED, PAST = "is not seen by both", "before, "
 #: What somebody else did to the line is news for this long.
 NEWS_S = 5.0
 
@@ -60,9 +62,18 @@ def will_not_stop(f: Facts) -> str | None:
     if not sees_current(f):
         return None
     return (
-        f"the stop, which is repeated, is not obeyed: the BMU still sees {f.pack_a:.2f} A, the charger says "
-        f"{f.reading.current_a:.2f} A"
+        f"the stop, which is repeated, {CONTRADICTED}: the BMU still sees {f.pack_a:.2f} A, the charger says "
+        f"{f.reading.current_a:.2f} A; one of them is wrong"
     )
+
+
+def did_not_stop(text: str, lasted_s: float) -> str:
+    """What is said of `will_not_stop` once its charger stands by; `text` is what was said before, this or that."""
+    if text.startswith(PAST):
+        return text
+    if CONTRADICTED in text:
+        return f"{PAST}the BMU saw current for {lasted_s:.0f} s while the charger said none: one of them was wrong"
+    return f"{PAST}it did not obey the stop for {lasted_s:.0f} s"
 
 
 def will_not_start(f: Facts) -> str | None:
@@ -174,8 +185,8 @@ def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
 
 def early_full(f: Facts) -> str | None:
     """FAULTS C18."""
-    if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f):
-        return None
+    if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f) or not ends_full(f):
+        return None  # what did not end like a full charge was stopped by somebody: `stopped_by_itself`
     return f"the charger reports full (mode 5), the BMU only {f.soc:.0f} %"
 
 

@@ -19,5 +19,5 @@ def pairing_not_proved(f: Facts) -> str | None:
         )
     return (
         f"the charger of {name} has begun with {f.amps:.2f} A, and its BMU (node "
-        f"{f.rules.bay.battery.node_id}) sees {seen_a:.2f} A of it: they are not on one battery"
+        f"0x{f.rules.bay.battery.node_id:02X}) sees {seen_a:.2f} A of it: they are not on one battery"
     )

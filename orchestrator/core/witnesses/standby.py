@@ -41,6 +41,6 @@ def current_without_order(f: "Facts") -> str | None:
         return f"the BMU sees {f.pack_a:.2f} A flow into the pack, nothing was commanded, and the charger is not heard"
     return (
         f"the BMU sees {f.pack_a:.2f} A flow into the pack while the charger says {f.reading.current_a:.2f} A and "
-        "nothing was commanded: believe the BMU. Either the charger's word is wrong, its cable belongs to another bay, "
-        "or something else charges this pack"
+        "nothing was commanded. Either the charger's word is wrong, its cable belongs to another bay, something else "
+        "charges this pack, or the BMU's current is wrong"
     )
