@@ -1,7 +1,7 @@
 """What becomes of an operator's request. A refusal names its cause; a reset permits a start, it does not make one.
 
-Accepted is what has an effect. A request that would change nothing is refused with what the bay does, or waits for; a
-stop alone is always accepted.
+Accepted is what has an effect, or what is so already. Any other request that would change nothing is refused with what
+the bay does, or waits for; a stop alone is always accepted.
 """
 
 from collections.abc import Callable
@@ -9,8 +9,10 @@ from collections.abc import Callable
 from orchestrator.core import latches
 from orchestrator.core.memory import Memory
 from orchestrator.core.safestop import LASTS_S
-from orchestrator.model import Request, State
+from orchestrator.model import ENERGISED, Request, State
 
+#: A charge has been started already.
+AT_WORK = ENERGISED | {State.QUALIFYING}
 STOPPED = "stopped by the operator; start to go on"
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
@@ -37,8 +39,6 @@ def _pause(memory: Memory, _now_s: float) -> str:
         return f"not running: {', '.join(latched)} must be reset first"
     if memory.hold:
         return f"not running: {memory.hold}"
-    if memory.paused:
-        return "paused already; start to go on"
     memory.paused = True
     return ""
 
@@ -50,7 +50,7 @@ def _start(memory: Memory, now_s: float) -> str:
     memory.faults, reasons = latches.release(before, now_s, by_reset=False)
     if reasons:
         return "; ".join(reasons)
-    if not (memory.hold or memory.paused) and len(memory.faults) == len(before):
+    if not (memory.hold or memory.paused) and len(memory.faults) == len(before) and memory.state not in AT_WORK:
         return f"nothing to start: {memory.state}: {memory.reason}"
     memory.hold, memory.paused = "", False
     return ""
