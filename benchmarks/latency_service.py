@@ -18,11 +18,11 @@ from orchestrator.config.load import load_station
 from orchestrator.config.station import BatteryConfig, Station
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus_budget import BusBudget
+from orchestrator.lastresort.guardian import Guardian
 from orchestrator.link.serial import SerialLine
 from orchestrator.protocol.charger import STOP_FRAME
 from orchestrator.service import supervisor
 from orchestrator.service.guarded import GuardianLink
-from orchestrator.service.guardian import Guardian
 
 CONTROLLER_ARGUMENTS = 3  #: more than so many: the guardian's socket is the last
 

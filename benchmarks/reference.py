@@ -21,9 +21,9 @@ from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Scenario, Visit
 from orchestrator.config.shipped import shipped_names
 from orchestrator.sim.pack import REFERENCE_C, ZERO_C, Pack
-from orchestrator.workbench.plant import pack_of
-from orchestrator.workbench.simulation import Run, simulate
-from orchestrator.workbench.trail import Moment
+from orchestrator.workbench.simulate.plant import pack_of
+from orchestrator.workbench.simulate.simulation import Run, simulate
+from orchestrator.workbench.simulate.trail import Moment
 
 POLICY = "li-ion-48v"
 #: How far beyond 100 % PyBaMM's state of charge reaches here; it ends a simulation at its own 0 and 1.

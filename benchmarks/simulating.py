@@ -13,8 +13,8 @@ from benchmarks.report import Goal, Result, Series
 from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Scenario, Visit
 from orchestrator.workbench.processes import cores
-from orchestrator.workbench.simulation import simulate
-from orchestrator.workbench.sweep import Axis, played
+from orchestrator.workbench.simulate.simulation import simulate
+from orchestrator.workbench.simulate.sweep import Axis, played
 
 POLICY = "li-ion-48v"
 HOURS = 4.0

@@ -16,11 +16,11 @@ def main() -> int:
 
 def _run(arguments: list[str]) -> int:
     if arguments[:1] == ["estop"]:
-        from orchestrator.service.estop import main as estop
+        from orchestrator.lastresort.estop import main as estop
 
         return estop(arguments[1:])
     if arguments[:1] == ["run"] and not any(word.startswith("-") for word in arguments) and len(arguments) <= 2:
-        from orchestrator.service.guardian import guard
+        from orchestrator.lastresort.guardian import guard
 
         return guard(arguments[1:] or ["station.yaml"])
     from orchestrator.cli import main as command_line

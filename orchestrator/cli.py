@@ -141,13 +141,13 @@ def _kinds(text: str) -> tuple[int, int]:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from orchestrator.service.guardian import guard
+    from orchestrator.lastresort.guardian import guard
 
     return guard([arguments.station])
 
 
 def _status(arguments: argparse.Namespace) -> int:
-    from orchestrator.service.control import ask
+    from orchestrator.lastresort.asking import ask
     from orchestrator.service.where import find_socket
 
     path = find_socket(arguments.socket)
@@ -171,7 +171,7 @@ def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> 
 
 
 def _request(arguments: argparse.Namespace) -> int:
-    from orchestrator.service.control import ask
+    from orchestrator.lastresort.asking import ask
     from orchestrator.service.where import find_socket
 
     if bool(arguments.bay) == arguments.all:
@@ -200,7 +200,7 @@ def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[
 
     `every`: and at chargers that are no bay's any more.
     """
-    from orchestrator.service.control import ask
+    from orchestrator.lastresort.asking import ask
     from orchestrator.show import is_alarming, stands_by, strays, what_to_do
 
     end_s = time.monotonic() + STANDBY_S
@@ -220,7 +220,7 @@ def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[
 def _check(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import check
     from orchestrator.devices.bus_load import slow_buses
-    from orchestrator.workbench.lint import LINT
+    from orchestrator.workbench.prove.lint import LINT
 
     findings = check(arguments.file, LINT)
     for finding in findings:
@@ -264,8 +264,8 @@ def _decode(arguments: argparse.Namespace) -> int:
 
 
 def _probe(arguments: argparse.Namespace) -> int:
+    from orchestrator.commissioning.probe import probe
     from orchestrator.config.load import load_station
-    from orchestrator.service.probe import probe
 
     station = load_station(arguments.station)
     return probe(station, arguments.bay, arguments.nmt, old_protocol=arguments.old_protocol)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.service import guardian, lastline, supervisor
-from orchestrator.service.estop import VERIFY_S, Options
+from orchestrator.lastresort import guardian, lastline
+from orchestrator.lastresort.estop import VERIFY_S, Options
+from orchestrator.service import supervisor
 
 ROOT = Path(__file__).resolve().parent.parent
 UNIT = ROOT / "deploy" / "orchestrator.service"

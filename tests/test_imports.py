@@ -41,20 +41,20 @@ EDGES: dict[str, tuple[str, ...]] = {
         "config", "core", "demo", "devices", "errors", "interlock", "keys", "link", "model", "protocol", "service",
         "show", "sim", "workbench",
     ),
-    "__main__": ("cli", "service.estop", "service.guardian"),
+    "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
 
 #: Third-party library → its owners; nobody else imports it, and nothing else is imported at all.
 OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
-    "cattrs": ("workbench.recording",),
-    "distributed": ("workbench.sweep",),
+    "cattrs": ("workbench.replay.recording",),
+    "distributed": ("workbench.simulate.sweep",),
     "durand": ("sim",),
     "gpiod": ("link.gpio",),
-    "jinja2": ("workbench.page",),
-    "matplotlib": ("workbench.plot", "workbench.tradeoff"),
-    "pygraphviz": ("workbench.drawing",),
+    "jinja2": ("workbench.draw.page",),
+    "matplotlib": ("workbench.draw.plot", "workbench.draw.tradeoff"),
+    "pygraphviz": ("workbench.draw.drawing",),
     "rich": ("demo",),
     "serial": ("link.serial",),
     "transitions": ("core.machine",),

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Mapping
 
-from orchestrator.config.scalars import UnfitError
-from orchestrator.config.yamltree import Entries, Items, Node, Scalar
+from orchestrator.config.yaml.scalars import UnfitError
+from orchestrator.config.yaml.tree import Entries, Items, Node, Scalar
 
 #: A name, or an index in brackets: `current.soc_pct[0].to` has four.
 _PART = re.compile(r"([^.\[\]]+)|\[(\d+)\]")

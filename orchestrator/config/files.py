@@ -9,12 +9,12 @@ from orchestrator.config.map_rules import MAP_RULES
 from orchestrator.config.policy import Policy
 from orchestrator.config.policy_rules import POLICY_RULES
 from orchestrator.config.rules import Problems, problems
-from orchestrator.config.scalars import UnfitError, did_you_mean, nearest, shown
 from orchestrator.config.scenario import Scenario
 from orchestrator.config.scenario_rules import SCENARIO_RULES
 from orchestrator.config.shipped import shipped_dir, shipped_names
 from orchestrator.config.station import Station
 from orchestrator.config.station_rules import station_problems
+from orchestrator.config.yaml.scalars import UnfitError, did_you_mean, nearest, shown
 from orchestrator.protocol.objects import ObjectMap
 
 

@@ -12,9 +12,9 @@ from typing import Any, Union, get_args, get_origin
 
 from orchestrator.config.files import MAP, POLICY, Kind
 from orchestrator.config.policy import Policy
-from orchestrator.config.scalars import allowed
-from orchestrator.config.schema import INVALID, Slot, slots
 from orchestrator.config.shipped import shipped_names
+from orchestrator.config.yaml.scalars import allowed
+from orchestrator.config.yaml.schema import INVALID, Slot, slots
 from orchestrator.keys import Key, Range
 from orchestrator.protocol.objects import ObjectMap
 

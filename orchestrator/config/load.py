@@ -9,13 +9,13 @@ from typing import TypeVar
 from orchestrator.config.change import changed
 from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.policy import Policy
-from orchestrator.config.reader import Reader
 from orchestrator.config.rules import Problems
-from orchestrator.config.scalars import UnfitError, nearest
 from orchestrator.config.scenario import Scenario
-from orchestrator.config.schema import INVALID
 from orchestrator.config.station import Station
-from orchestrator.config.yamltree import MAX_BYTES, Entries, Node, Refused, parse
+from orchestrator.config.yaml.reader import Reader
+from orchestrator.config.yaml.scalars import UnfitError, nearest
+from orchestrator.config.yaml.schema import INVALID
+from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Node, Refused, parse
 from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from orchestrator.config.names import name_problem
 from orchestrator.config.rules import Problems, Rule
-from orchestrator.config.scalars import did_you_mean
+from orchestrator.config.yaml.scalars import did_you_mean
 from orchestrator.model import BatteryReading
 from orchestrator.protocol.objects import ObjectEntry, Sweep, TpdoEntry
 

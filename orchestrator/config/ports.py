@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.config.yamltree import MAX_BYTES, Entries, Items, Node, Scalar, parse
+from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Items, Node, Scalar, parse
 
 _COMMENT = re.compile(rb"(?:^|(?<=\s))#.*", re.MULTILINE)
 _PORT = re.compile(rb"""(?:^|[\s{,])port:\s+["']?(/[^\s"',}#]+)""", re.MULTILINE)
@@ -16,7 +16,7 @@ _DIRECTORY = re.compile(rb"""(?:^|[\s{,])directory:\s+["']?([^\s"',}#]+)""", re.
 #: What every station file has at its top level: one that was cut off may still be YAML, yet lacks the last of them.
 _WHOLE = ("bays", "control", "journal")
 _LINE = re.compile(r"0x[0-9a-fA-F]{1,3}|[0-9]{1,4}")
-#: As `config/scalars.py` reads it.
+#: As `config/yaml/scalars.py` reads it.
 _BOOLS = {"false": False, "true": True}
 
 

@@ -5,9 +5,9 @@ from itertools import pairwise
 
 from orchestrator.config.names import name_problem
 from orchestrator.config.rules import Problems, Rule
-from orchestrator.config.scalars import did_you_mean
 from orchestrator.config.scenario import Ask, BatteryModel, Defect, SensorFault, Visit, Weather
 from orchestrator.config.station_rules import lowest_step_problems, step_problems
+from orchestrator.config.yaml.scalars import did_you_mean
 
 Visits = tuple[Visit, ...]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from orchestrator.config.names import name_problem
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems, Rule, problems
-from orchestrator.config.scalars import did_you_mean, nearest
+from orchestrator.config.yaml.scalars import did_you_mean, nearest
 from orchestrator.keys import Range
 from orchestrator.protocol.objects import ObjectMap
 

@@ -10,7 +10,7 @@ from typing import Self, cast
 
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.errors import OrchestratorError, ServiceError
-from orchestrator.service.control import ask
+from orchestrator.lastresort.asking import ask
 from orchestrator.sim.client import PlantProcess
 
 STATION = """\

@@ -1,7 +1,7 @@
 """A GPIO line that drives a contactor: the only user of gpiod. Whatever goes wrong here becomes one LinkError.
 
 gpiod is an extra, and imported when a station names a contactor. The kernel gives a line to one owner at a time, and an
-owner is an open file: it can be shared with another process (`service/lastopen.py` drives it there without a library).
+owner is an open file: it can be shared with another process (`lastresort/lastopen.py` drives it there without a library).
 """
 
 import errno

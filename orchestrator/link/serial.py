@@ -3,7 +3,7 @@
 pyserial is used for what it does well: opening, locking and setting up the port. Around it stand the answers to its
 traps: waiting is done with poll(), since its own write spins on a full line and its timeouts reconfigure the port.
 
-The port is not ours alone. Whoever has it open may set it to something else (`settings.py`), or have locked it before
+The port is not ours alone. Whoever has it open may set it to something else (`line_settings.py`), or have locked it before
 us: a lock of another orchestrator is respected, any other one must not keep a stop from the charger.
 """
 
@@ -20,8 +20,8 @@ import serial
 from serial.rs485 import RS485Settings
 
 from orchestrator.errors import LinkError
-from orchestrator.link import settings
-from orchestrator.link.holder import holder
+from orchestrator.lastresort import line_settings
+from orchestrator.lastresort.port_owner import holder
 
 BAUD = 19200  #: 8 data bits, no parity, 1 stop bit, no flow control (protocol 2/2, §2.2.2)
 BYTE_S = 10 / BAUD  #: start bit, 8 data bits, stop bit: 0.52 ms
@@ -113,7 +113,7 @@ class SerialLine:
     def restore(self) -> str:
         """Set the port up again if another program has changed it; what was found, in words, "" where all was well."""
         try:
-            return settings.restore(self._port.fileno(), self._tolerated)
+            return line_settings.restore(self._port.fileno(), self._tolerated)
         except _FAILURES as error:
             raise self._failed(error) from error
 
@@ -121,7 +121,7 @@ class SerialLine:
         """Which program holds the port's lock instead of us, "" once it is ours: it is asked for again each time."""
         try:
             fd = self._port.fileno()
-            settings.share(fd)
+            line_settings.share(fd)
             if not self._locked:
                 fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._locked = True
@@ -215,7 +215,7 @@ def _taken_back(path: str) -> bool:
     except (OSError, ValueError):
         return False
     try:
-        return bool(settings.take_back(fd))
+        return bool(line_settings.take_back(fd))
     except OSError:
         return False
     finally:

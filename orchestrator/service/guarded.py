@@ -5,9 +5,9 @@ import socket
 import threading
 from collections.abc import Callable
 
+from orchestrator.lastresort.guardian import ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
 from orchestrator.link.gpio import OutputLine
 from orchestrator.link.serial import SerialLine
-from orchestrator.service.guardian import ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
 
 #: A guardian that has not answered a heartbeat for this long is gone, or hangs.
 SILENCE_S = 2.0

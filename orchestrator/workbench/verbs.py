@@ -48,7 +48,7 @@ def _add_simulate(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def prove_all(files: Sequence[str], jobs: int | None) -> int:
     """`check --exhaustive` for each policy and each kind of bay in files without errors; 1 if a property is broken."""
     from orchestrator.core.rules import Rules
-    from orchestrator.workbench.exhaustive import bays_in, prove
+    from orchestrator.workbench.prove.exhaustive import bays_in, prove
 
     held = True
     for file in files:
@@ -68,7 +68,7 @@ def prove_all(files: Sequence[str], jobs: int | None) -> int:
 
 
 def _simulate(arguments: argparse.Namespace) -> int:
-    from orchestrator.workbench.simulate import as_table, play
+    from orchestrator.workbench.simulate.verb import as_table, play
 
     if arguments.sweep:
         return _sweep(arguments)
@@ -81,9 +81,9 @@ def _simulate(arguments: argparse.Namespace) -> int:
 
 def _sweep(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import load_scenario
-    from orchestrator.workbench.figures import aligned
     from orchestrator.workbench.processes import cores
-    from orchestrator.workbench.sweep import axis, cluster, played, rows
+    from orchestrator.workbench.simulate.figures import aligned
+    from orchestrator.workbench.simulate.sweep import axis, cluster, played, rows
 
     if len(arguments.policy) != 1:
         raise UsageError("--sweep: name one policy")
@@ -98,7 +98,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
 
 def _present() -> ModuleType:
     try:
-        from orchestrator.workbench import present
+        from orchestrator.workbench.draw import present
     except ImportError as error:
         raise missing("--out", error) from None
     return present
@@ -117,7 +117,7 @@ def _progress(form: str = "{:.0%}") -> Callable[[str, float], None]:
 
 def _replay(arguments: argparse.Namespace) -> int:
     try:
-        from orchestrator.workbench.replaying import replay
+        from orchestrator.workbench.replay.verb import replay
     except ImportError as error:
         raise missing("replay", error) from None
     return replay(arguments.journal, arguments.policy, arguments.bay)
@@ -125,14 +125,14 @@ def _replay(arguments: argparse.Namespace) -> int:
 
 def _diagram(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import load_policy
-    from orchestrator.workbench.diagram import diagram, mermaid
+    from orchestrator.workbench.draw.diagram import diagram, mermaid
 
     of = diagram(load_policy(arguments.policy) if arguments.policy else None)
     if arguments.format == "mermaid":
         _give(mermaid(of).encode(), arguments.out)
         return 0
     try:
-        from orchestrator.workbench.drawing import draw
+        from orchestrator.workbench.draw.drawing import draw
     except ImportError as error:
         raise missing(arguments.format, error) from None
     if arguments.out is None and sys.stdout.isatty():

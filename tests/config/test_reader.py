@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.config.load import check, load_policy
-from orchestrator.config.reader import MAX_FINDINGS, Reader
-from orchestrator.config.schema import INVALID, places
 from orchestrator.config.shipped import shipped_dir
-from orchestrator.config.yamltree import parse
+from orchestrator.config.yaml.reader import MAX_FINDINGS, Reader
+from orchestrator.config.yaml.schema import INVALID, places
+from orchestrator.config.yaml.tree import parse
 from orchestrator.errors import ConfigError
 from orchestrator.keys import Range, Source, key
 from orchestrator.model import ControlMode

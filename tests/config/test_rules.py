@@ -9,8 +9,8 @@ from orchestrator.config.map_rules import READING_FIELDS, REQUIRED
 from orchestrator.config.names import name_problem
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems, Rule, problems
-from orchestrator.config.schema import slots
 from orchestrator.config.station import Bay, Station
+from orchestrator.config.yaml.schema import slots
 from orchestrator.protocol.objects import ObjectMap
 
 GOOD = Path(__file__).parent / "good"

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.config import scalars
-from orchestrator.config.scalars import UnfitError
-from orchestrator.config.yamltree import Mark, Scalar
+from orchestrator.config.yaml import scalars
+from orchestrator.config.yaml.scalars import UnfitError
+from orchestrator.config.yaml.tree import Mark, Scalar
 from orchestrator.keys import Key
 
 VOLTS = Key("a voltage", unit="V")

@@ -7,8 +7,8 @@ import pytest
 
 from orchestrator.config.load import check, load_map, load_policy, load_scenario, load_station
 from orchestrator.config.scenario import Ask, BatteryModel, ChargerModel, Scenario, SensorFault, Visit, Weather
-from orchestrator.config.schema import slots
 from orchestrator.config.shipped import shipped_dir, shipped_names
+from orchestrator.config.yaml.schema import slots
 from orchestrator.keys import Range
 from orchestrator.model import ControlMode
 from orchestrator.protocol.objects import Evidence, ObjectMap

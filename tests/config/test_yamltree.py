@@ -8,10 +8,10 @@ import yaml
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from orchestrator.config import yamltree
 from orchestrator.config.load import check
 from orchestrator.config.shipped import shipped_dir
-from orchestrator.config.yamltree import MAX_BYTES, MAX_DEPTH, Entries, Items, Mark, Node, Refused, Scalar, parse
+from orchestrator.config.yaml import tree
+from orchestrator.config.yaml.tree import MAX_BYTES, MAX_DEPTH, Entries, Items, Mark, Node, Refused, Scalar, parse
 
 HERE = Path(__file__).parent
 FILES = sorted([*HERE.glob("good/*.yaml"), *shipped_dir().glob("policies/*.yaml"), *shipped_dir().glob("configs/*/*")])
@@ -19,7 +19,7 @@ FILES = sorted([*HERE.glob("good/*.yaml"), *shipped_dir().glob("policies/*.yaml"
 
 def _with(loader: object, data: bytes, monkeypatch: pytest.MonkeyPatch) -> tuple[Node | None, list[object]]:
     with monkeypatch.context() as patch:
-        patch.setattr(yamltree, "_LOADERS", (loader,))
+        patch.setattr(tree, "_LOADERS", (loader,))
         node, findings = parse("f", data)
         return node, [(finding.line, finding.column, finding.text) for finding in findings]
 
@@ -57,16 +57,16 @@ def test_both_parsers_give_the_same_tree_and_places(path: Path, monkeypatch: pyt
 @pytest.mark.parametrize("path", sorted(HERE.glob("broken/*.yaml")), ids=lambda path: path.name)
 def test_without_libyaml_the_findings_are_the_same(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = check([path])
-    monkeypatch.setattr(yamltree, "_LOADERS", (yaml.SafeLoader,))
+    monkeypatch.setattr(tree, "_LOADERS", (yaml.SafeLoader,))
     assert check([path]) == expected
 
 
 @pytest.mark.parametrize("text", [r'a: "\U00110000"', r'a: "\UFFFFFFFF"', f"%YAML 1.{'1' * 5000}\n---\na: 1\n"])
-@pytest.mark.parametrize("loaders", [yamltree._LOADERS, (yaml.SafeLoader,)], ids=["both", "pure"])
+@pytest.mark.parametrize("loaders", [tree._LOADERS, (yaml.SafeLoader,)], ids=["both", "pure"])
 def test_a_number_beyond_all_bounds_is_one_finding(
     text: str, loaders: tuple[type], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(yamltree, "_LOADERS", loaders)
+    monkeypatch.setattr(tree, "_LOADERS", loaders)
     node, findings = parse("f", text.encode())
     assert node is None
     assert len(findings) == 1
@@ -117,12 +117,12 @@ def test_the_billion_laughs_are_not_told() -> None:
     )
     node, findings = parse("f", bomb)
     assert node is None
-    assert len(findings) == yamltree.MAX_FINDINGS
+    assert len(findings) == tree.MAX_FINDINGS
     assert all("anchors and aliases are not allowed" in finding.text for finding in findings)
 
 
 def test_findings_are_bounded_too() -> None:
-    assert len(parse("f", b"\t\n" * 1000)[1]) == yamltree.MAX_FINDINGS
+    assert len(parse("f", b"\t\n" * 1000)[1]) == tree.MAX_FINDINGS
 
 
 def test_an_error_that_nobody_translated_is_still_told(monkeypatch: pytest.MonkeyPatch) -> None:

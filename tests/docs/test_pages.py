@@ -5,7 +5,7 @@ from pathlib import Path
 
 from orchestrator.config.shipped import shipped_names
 from orchestrator.core.faults import FAULTS
-from orchestrator.workbench.diagram import diagram, mermaid
+from orchestrator.workbench.draw.diagram import diagram, mermaid
 from tests.docs.catalogue import CATALOGUE
 from tests.docs.fault_page import page, rows_of
 

@@ -8,10 +8,11 @@ from pathlib import Path
 from unittest.mock import patch
 from zlib import crc32
 
-from orchestrator.config import load, ports, yamltree
-from orchestrator.config.reader import MAX_FINDINGS
+from orchestrator.config import load, ports
 from orchestrator.config.station import Station
-from orchestrator.config.yamltree import MAX_FINDINGS as MAX_YAML_FINDINGS
+from orchestrator.config.yaml import tree
+from orchestrator.config.yaml.reader import MAX_FINDINGS
+from orchestrator.config.yaml.tree import MAX_FINDINGS as MAX_YAML_FINDINGS
 from orchestrator.errors import ConfigError, Finding
 from tests.fuzz.target import Target, kind_of_word, scratch
 
@@ -70,7 +71,7 @@ for name, text in (("policy.yaml", POLICY), ("map.yaml", MAP)):
 
 
 #: The same bytes are parsed once, whoever reads them.
-parse = lru_cache(maxsize=16)(yamltree.parse)
+parse = lru_cache(maxsize=16)(tree.parse)
 
 
 def one(data: bytes) -> None:

@@ -8,8 +8,8 @@ from unittest.mock import patch
 
 import pytest
 
-from orchestrator.service import guardian, lastline
-from orchestrator.service.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
+from orchestrator.lastresort import guardian, lastline
+from orchestrator.lastresort.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records, scratch
 
 #: What an event is: any message without and with a descriptor, a port's name with one, with three and without, a port
@@ -68,7 +68,7 @@ TARGET = Target(
         record(RAW_FD), record(RAW_FD, b"B"), record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"),
         record(NAME, b"x" * 31),
     ],
-    ["orchestrator/service/guardian.py", "orchestrator/service/lastline.py"],
+    ["orchestrator/lastresort/guardian.py", "orchestrator/lastresort/lastline.py"],
     max_bytes=128,
     limit_s=1.0,
 )  # fmt: skip

@@ -15,15 +15,17 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from orchestrator.config import ports, yamltree
+from orchestrator.config import ports
+from orchestrator.config.yaml import tree
 from orchestrator.core import persisted
 from orchestrator.devices import battery, dialogue
 from orchestrator.devices.sdo_client import SdoClient
+from orchestrator.lastresort import lastline
+from orchestrator.lastresort.guardian import Guardian
 from orchestrator.model import Measurement
 from orchestrator.protocol import frame, standby, words
-from orchestrator.service import control, lastline, reception, typed
+from orchestrator.service import control, reception, typed
 from orchestrator.service.client import Client
-from orchestrator.service.guardian import Guardian
 from orchestrator.service.reception import Later
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz import __main__ as runner
@@ -138,12 +140,12 @@ def texts_only(patch: Patch) -> None:
 
 
 def marks_believed(patch: Patch) -> None:
-    patch.setattr(yamltree, "explain", lambda error: (error.context_mark.line + 1, 1, "not valid YAML"))
+    patch.setattr(tree, "explain", lambda error: (error.context_mark.line + 1, 1, "not valid YAML"))
 
 
 def wrong_place(patch: Patch) -> None:
-    mark = yamltree.Mark
-    patch.setattr(yamltree, "Mark", lambda line, column: mark(line + 30, column))
+    mark = tree.Mark
+    patch.setattr(tree, "Mark", lambda line, column: mark(line + 30, column))
 
 
 def any_json(patch: Patch) -> None:

@@ -15,10 +15,10 @@ from typing import Any
 
 import pytest
 
-from orchestrator.service import inhand
-from orchestrator.service.estop import LOST, UNTOLD
-from orchestrator.service.inhand import ports_in_hand, stations
-from orchestrator.service.witness import NOBODY, Service
+from orchestrator.lastresort import inhand
+from orchestrator.lastresort.estop import LOST, UNTOLD
+from orchestrator.lastresort.inhand import ports_in_hand, stations
+from orchestrator.lastresort.running_service import NOBODY, Service
 from tests.guardian.chargers import Bench, running_chargers
 from tests.link.ptys import plugged
 from tests.waiting import wait_until
@@ -55,7 +55,7 @@ def test_without_arguments_the_file_in_this_folder_counts(tmp_path: Path) -> Non
 #: An emergency stop that sees only these processes: others on this machine may be somebody else's tests.
 AMONG = """
 import sys
-from orchestrator.service import estop, inhand
+from orchestrator.lastresort import estop, inhand
 every, ours = inhand.orchestrators, {int(word) for word in sys.argv[1:]}
 inhand.orchestrators = lambda: (one for one in every() if one[0] in ours)
 sys.exit(estop.main([]))
@@ -356,7 +356,7 @@ def test_a_current_that_only_the_bmu_sees_is_told_first(tmp_path: Path) -> None:
 
 
 def test_a_file_of_the_working_directory_is_not_imported_by_the_controller(tmp_path: Path) -> None:
-    from orchestrator.service.guardian import CONTROLLER
+    from orchestrator.lastresort.guardian import CONTROLLER
 
     for name in ("serial", "can", "transitions", "yaml", "select"):
         (tmp_path / f"{name}.py").write_text("print('imported')\n")
@@ -378,7 +378,7 @@ def opens(path, *rest):
         time.sleep(100)
     return good(path, *rest)
 os.open = opens
-from orchestrator.service.estop import main
+from orchestrator.lastresort.estop import main
 sys.exit(main(["--port", *sys.argv[1:]]))
 """
     with plugged(tmp_path / "stuck") as pty, running_chargers(tmp_path) as (bench,):

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.link.holder import control_sockets
+from orchestrator.lastresort.estop import LOST, UNTOLD
+from orchestrator.lastresort.port_owner import control_sockets
 from orchestrator.protocol.standby import STOP_FRAME
-from orchestrator.service.estop import LOST, UNTOLD
 from orchestrator.sim.client import PlantProcess
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until

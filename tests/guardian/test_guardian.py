@@ -18,9 +18,9 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.lastresort.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT, Guardian
+from orchestrator.lastresort.lastopen import OPEN, SET_VALUES
 from orchestrator.service.guarded import GuardianLink
-from orchestrator.service.guardian import ACTED, ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT, Guardian
-from orchestrator.service.lastopen import OPEN, SET_VALUES
 from tests.devices.fake_charger import charger_on
 from tests.guardian.chargers import running_chargers
 from tests.link.ptys import plugged
@@ -32,7 +32,7 @@ from tests.whole.station import die_with_parent
 #: on most machines: a test hands over a pipe, and what the guardian would ask of the kernel comes out at its other end.
 LAUNCH = """
 import os, socket, struct, sys, termios, time
-from orchestrator.service import guardian, lastopen
+from orchestrator.lastresort import guardian, lastopen
 ioctl = lastopen.fcntl.ioctl
 def drive(fd, number, asked=0):
     if number != lastopen.SET_VALUES:
@@ -342,7 +342,7 @@ def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_an
 
 def test_it_starts_a_controller_that_nobody_can_freeze_and_ends_with_its_status(tmp_path: Path) -> None:
     """Whoever started it may ignore the end of children, which the kernel then buries at once, or block signals."""
-    guards = "import signal, sys; from orchestrator.service import guardian; "
+    guards = "import signal, sys; from orchestrator.lastresort import guardian; "
     guards += "signal.signal(signal.SIGCHLD, signal.SIG_IGN); "
     guards += "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM]); "
     guards += "sys.exit(guardian.guard(['our.yaml'], ('-c', sys.argv[1])))"

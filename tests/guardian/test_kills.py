@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import ServiceError
+from orchestrator.lastresort.guardian import ACTED
 from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import encode
-from orchestrator.service.guardian import ACTED
 from orchestrator.sim.client import PlantProcess
 from tests.guardian.saboteur import MODES
 from tests.guardian.test_guardian import state_of
@@ -23,7 +23,7 @@ from tests.whole.station import Service, orchestrator, station_document
 
 GUARD = """
 import sys
-from orchestrator.service import guardian
+from orchestrator.lastresort import guardian
 guardian.VERIFY_S = 1.0
 sys.exit(guardian.guard(sys.argv[2:], ("-m", "tests.guardian.saboteur", sys.argv[1])))
 """

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.service import lastopen
-from orchestrator.service.lastopen import GET_LINE, HELD, OPEN, OPENED, REQUEST, SET_VALUES, request
+from orchestrator.lastresort import lastopen
+from orchestrator.lastresort.lastopen import GET_LINE, HELD, OPEN, OPENED, REQUEST, SET_VALUES, request
 
 SOURCE = Path(__file__).with_name("gpio_abi.c")
 #: A C compiler, where there are one and the kernel's header.
@@ -37,7 +37,7 @@ class Kernel:
 
 def kernel(monkeypatch: pytest.MonkeyPatch, error: int = 0) -> Kernel:
     made = Kernel(error)
-    monkeypatch.setattr("orchestrator.service.lastopen.fcntl.ioctl", made.ioctl)
+    monkeypatch.setattr("orchestrator.lastresort.lastopen.fcntl.ioctl", made.ioctl)
     return made
 
 

@@ -15,13 +15,9 @@ from typing import Any
 import pytest
 
 from orchestrator.errors import LinkError
-from orchestrator.link.serial import SerialLine
-from orchestrator.model import Action, Command
-from orchestrator.protocol.charger import STATUS_REQUEST, encode
-from orchestrator.protocol.standby import OPERATION_STOP_FRAME, QUESTION, STOP_FRAME
-from orchestrator.service import laststop
-from orchestrator.service.guardian import VERIFY_S
-from orchestrator.service.lastline import (
+from orchestrator.lastresort import laststop
+from orchestrator.lastresort.guardian import VERIFY_S
+from orchestrator.lastresort.lastline import (
     ASK_S,
     GONE,
     HANGS,
@@ -35,7 +31,11 @@ from orchestrator.service.lastline import (
     drop_port,
     open_port,
 )
-from orchestrator.service.laststop import LastStop, stop_all
+from orchestrator.lastresort.laststop import LastStop, stop_all
+from orchestrator.link.serial import SerialLine
+from orchestrator.model import Action, Command
+from orchestrator.protocol.charger import STATUS_REQUEST, encode
+from orchestrator.protocol.standby import OPERATION_STOP_FRAME, QUESTION, STOP_FRAME
 from orchestrator.sim.charger_frames import Kind, Lie
 from tests.devices.fake_charger import charger_on
 from tests.guardian.chargers import running_chargers

@@ -13,19 +13,19 @@ from tests.test_imports import PACKAGE, ROOT, Module, product
 
 LINK = {"", "link"}
 PACKAGES = LINK | {"protocol", "service"}
-LINE = PACKAGES | {"link.holder", "link.settings", "protocol.standby", "service.lastline"}
-STOP = LINE | {"service.laststop"}
+LINE = PACKAGES | {"lastresort.port_owner", "lastresort.line_settings", "protocol.standby", "lastresort.lastline"}
+STOP = LINE | {"lastresort.laststop"}
 #: Module → all of the product that is imported with it.
 LEAN: dict[str, set[str]] = {
     "protocol.standby": {"", "protocol", "protocol.standby"},
-    "link.holder": LINK | {"link.holder"},
-    "link.settings": LINK | {"link.settings"},
-    "service.say": {"", "service", "service.say"},
-    "service.lastopen": {"", "service", "service.lastopen"},
-    "service.lastline": LINE,
-    "service.laststop": STOP,
-    "service.estop": STOP | {"service.estop"},
-    "service.guardian": STOP | {"service.lastopen", "service.say", "service.guardian"},
+    "lastresort.port_owner": LINK | {"lastresort.port_owner"},
+    "lastresort.line_settings": LINK | {"lastresort.line_settings"},
+    "lastresort.notify": {"", "service", "lastresort.notify"},
+    "lastresort.lastopen": {"", "service", "lastresort.lastopen"},
+    "lastresort.lastline": LINE,
+    "lastresort.laststop": STOP,
+    "lastresort.estop": STOP | {"lastresort.estop"},
+    "lastresort.guardian": STOP | {"lastresort.lastopen", "lastresort.notify", "lastresort.guardian"},
 }
 MODULES = {module.name: module for module in product()}
 
@@ -94,6 +94,6 @@ def test_an_emergency_stop_needs_no_other_library(tmp_path: Path) -> None:
 
 
 def test_an_import_that_is_not_listed_is_seen() -> None:
-    spoilt = Module("service.say", "import os\ntry:\n    import yaml\nexcept ImportError:\n    import json\n")
+    spoilt = Module("lastresort.notify", "import os\ntry:\n    import yaml\nexcept ImportError:\n    import json\n")
     assert list(at_import(spoilt)) == ["os", "yaml", "json"]
-    assert list(at_import(Module("service.say", "def f():\n    import yaml\n"))) == []
+    assert list(at_import(Module("lastresort.notify", "def f():\n    import yaml\n"))) == []

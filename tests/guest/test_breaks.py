@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.service.guardian import ACTED, SILENCE_S
+from orchestrator.lastresort.guardian import ACTED, SILENCE_S
 from tests.guest.stage import LOOK_S, note, socketcan, station, vcan
 from tests.waiting import wait_until
 
@@ -15,7 +15,7 @@ AT_ONCE_S = 0.5
 REOPENED_S = 2.0
 GUARD = """
 import sys
-from orchestrator.service.guardian import guard
+from orchestrator.lastresort.guardian import guard
 sys.exit(guard(sys.argv[2:], ("-m", "tests.guest.breaker", sys.argv[1])))
 """
 

@@ -15,7 +15,7 @@ import pytest
 import serial
 
 from orchestrator.errors import LinkError
-from orchestrator.link import holder, settings
+from orchestrator.lastresort import line_settings, port_owner
 from orchestrator.link.serial import BYTE_S, SerialLine
 from tests.link.ptys import Pty, plugged
 from tests.link.strangers import holding, stty
@@ -125,8 +125,8 @@ def test_a_strangers_lock_keeps_no_stop_away_and_is_named_until_it_is_ours(pty: 
 
 def test_a_stranger_that_nobody_can_see_is_one_all_the_same(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
     with holding(pty.path):
-        monkeypatch.setattr(holder, "_pids", list)  # as with /proc mounted hidepid=2
-        monkeypatch.setattr(holder, "_lockers", lambda _: [])
+        monkeypatch.setattr(port_owner, "_pids", list)  # as with /proc mounted hidepid=2
+        monkeypatch.setattr(port_owner, "_lockers", lambda _: [])
         line = SerialLine.open(pty.path)
         assert line.locked_by() == "an unknown program"
         line.close()
@@ -191,12 +191,12 @@ def test_what_another_program_has_set_is_named_and_set_right(
 def test_a_format_that_no_pty_takes_has_its_words(flag: int, words: str) -> None:
     cflag = flag | termios.CLOCAL | (0 if words == "receiver off" else termios.CREAD)
     flags = [0, 0, cflag, 0, termios.B19200, termios.B19200]
-    assert settings.differences(flags, [0] * 32) == words
+    assert line_settings.differences(flags, [0] * 32) == words
 
 
 def test_a_speed_without_a_name_is_still_another_one() -> None:
     flags = [0, 0, termios.CS8 | termios.CLOCAL | termios.CREAD, 0, 12345, 12345]
-    assert settings.differences(flags, [0] * 32) == "an odd number of baud"
+    assert line_settings.differences(flags, [0] * 32) == "an odd number of baud"
 
 
 def test_settings_that_a_driver_does_not_take_are_nobodys_doing(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:

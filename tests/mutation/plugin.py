@@ -47,7 +47,7 @@ def _plain(val: str | bytes, config: pytest.Config | None) -> str:
 collecting._ascii_escaped_by_config = _plain
 
 #: File of tests → the module that they start as a process.
-ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/service/guardian.py"}
+ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/lastresort/guardian.py"}
 #: What takes longer is a slow test, measured with mutmut's detours in the code.
 QUICK_S = 0.3
 #: What takes longer waits for something that a mutant keeps from coming.

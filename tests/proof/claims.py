@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.workbench.recording import read
-from orchestrator.workbench.replay import again
+from orchestrator.workbench.replay.again import again
+from orchestrator.workbench.replay.recording import read
 
 if TYPE_CHECKING:
     from tests.proof.judge import Charger, Judge

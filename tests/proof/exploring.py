@@ -10,10 +10,10 @@ from orchestrator.config.load import load_policy
 from orchestrator.core.machine import TABLE
 from orchestrator.core.rules import Rules
 from orchestrator.model import ControlMode, State
-from orchestrator.workbench.exhaustive import prove
-from orchestrator.workbench.explore import Walk
-from orchestrator.workbench.inputs import StationInputs
-from orchestrator.workbench.properties import PROPERTIES
+from orchestrator.workbench.prove.exhaustive import prove
+from orchestrator.workbench.prove.explore import Walk
+from orchestrator.workbench.prove.inputs import StationInputs
+from orchestrator.workbench.prove.properties import PROPERTIES
 from tests.proof.report import say
 from tests.proof.virtual_service import station
 

@@ -22,9 +22,9 @@ from orchestrator.config import load as load_module
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.config.station import Station
 from orchestrator.errors import ServiceError
+from orchestrator.lastresort import estop, guardian, port_owner, running_service
 from orchestrator.link import can as can_module
-from orchestrator.link import holder
-from orchestrator.service import boot, control, controller, estop, guardian, witness
+from orchestrator.service import boot, control, controller
 from tests.proof.virtual_can import BusWire, Driver
 from tests.proof.virtual_disk import Disk
 from tests.proof.virtual_kernel import ROOT, Kernel
@@ -185,8 +185,8 @@ class Gateway:
             load_module.load_station: self._load,
             control.ControlSocket: partial(Door, self),
             control.ask: self._ask,
-            holder.control_sockets: self._holder,
-            witness._listens: lambda _: self.door is not None,
+            port_owner.control_sockets: self._holder,
+            running_service._listens: lambda _: self.door is not None,
             boot.boot_id: lambda: f"boot {self.boots}",
             can_module._open_bus: lambda _: Driver(self.bus, self.time),
         }

@@ -22,8 +22,8 @@ from orchestrator.sim.can_noise import Bus
 from orchestrator.sim.can_wire import PERFECT
 from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.presets import PACKS
-from orchestrator.workbench.properties import PROPERTIES
-from orchestrator.workbench.story import Move, Taken
+from orchestrator.workbench.prove.properties import PROPERTIES
+from orchestrator.workbench.prove.story import Move, Taken
 from tests.proof.script import ARRIVES, MENDS, Happening, Script
 from tests.proof.truth import CONDITIONS, MARGIN_S, VERIFY_S, Bay, Heard, named
 from tests.proof.virtual_rig import ANSWER_S, Nature

@@ -20,8 +20,9 @@ class Seed:
     where: tuple[str, ...] = ()
 
 
-SERVICE, DEVICES, CORE, LINK = (
+SERVICE, LASTRESORT, DEVICES, CORE, LINK = (
     "orchestrator/service/",
+    "orchestrator/lastresort/",
     "orchestrator/devices/",
     "orchestrator/core/",
     "orchestrator/link/",
@@ -71,7 +72,11 @@ LINES: tuple[Seed, ...] = (
         "line",
         "the guardian and estop do not look at the line's settings",
         ("another speed, then killed",),
-        (f"{SERVICE}lastline.py", "return self._fd is not None and bool(settings.restore(self._fd))", "return False"),
+        (
+            f"{LASTRESORT}lastline.py",
+            "return self._fd is not None and bool(line_settings.restore(self._fd))",
+            "return False",
+        ),
     ),
     scene(
         "a stranger's lock keeps the service out",
@@ -92,7 +97,7 @@ LINES: tuple[Seed, ...] = (
         "line",
         "estop --leave-held leaves alone what a stranger has locked",
         ("tests/guardian/test_laststop.py::test_a_strangers_lock_keeps_no_stop_away",),
-        (f"{SERVICE}lastline.py", "        if holder(name, (os.getpid(),)).ours:", "        if True:"),
+        (f"{LASTRESORT}lastline.py", "        if holder(name, (os.getpid(),)).ours:", "        if True:"),
     ),
 )
 
@@ -276,7 +281,7 @@ DISK: tuple[Seed, ...] = (
         "disk",
         "estop stops what the file names, not what was written down as running",
         ("file edited, then both killed",),
-        (f"{SERVICE}inhand.py", '            if entry.get("running") and', "            if False and"),
+        (f"{LASTRESORT}inhand.py", '            if entry.get("running") and', "            if False and"),
     ),
     hostile(
         "a start ignores ports in hand",
@@ -367,14 +372,18 @@ WITNESSES: tuple[Seed, ...] = (
         "witness",
         "one answer in two that shows standby is a proof for estop",
         ("tests/guardian/test_laststop.py::test_one_answer_in_two_is_no_proof",),
-        (f"{SERVICE}lastline.py", "PROOFS = 2\n", "PROOFS = 1\n"),
+        (f"{LASTRESORT}lastline.py", "PROOFS = 2\n", "PROOFS = 1\n"),
     ),
     hostile(
         "estop does not ask the BMU",
         "witness",
         "estop takes the service's charger at its word, whatever the BMU sees",
         ("tests/guardian/test_emergency.py::test_both_witnesses_have_to_agree",),
-        (f"{SERVICE}witness.py", ' if battery["online"] and bmu_a > BMU_STANDBY_A else ""', ' if False else ""'),
+        (
+            f"{LASTRESORT}running_service.py",
+            ' if battery["online"] and bmu_a > BMU_STANDBY_A else ""',
+            ' if False else ""',
+        ),
     ),
 )
 
@@ -385,7 +394,7 @@ PORTS: tuple[Seed, ...] = (
         "estop opens and stops one port after the other",
         ("half dead adapter, estop",),
         (
-            f"{SERVICE}laststop.py",
+            f"{LASTRESORT}laststop.py",
             "        self._waiting += lines\n        self._start()\n",
             "        for line in lines:\n            line.first()\n"
             "        self._waiting += lines\n        self._start()\n",
@@ -396,21 +405,21 @@ PORTS: tuple[Seed, ...] = (
         "ports",
         "the guardian waits for a driver that takes its time over a close",
         ("tests/guardian/test_guardian.py::test_a_port_whose_close_hangs_keeps_nobody_from_watching",),
-        (f"{SERVICE}guardian.py", "            aside(partial(drop_port, old))", "            drop_port(old)"),
+        (f"{LASTRESORT}guardian.py", "            aside(partial(drop_port, old))", "            drop_port(old)"),
     ),
     hostile(
         "a hung driver holds the others up",
         "ports",
         "the guardian writes its first stops one after another, in one thread",
         ("tests/guardian/test_laststop.py::test_a_driver_that_hangs_delays_no_other_port",),
-        (f"{SERVICE}laststop.py", "                sweeper.join(STUCK_S)\n", "                sweeper.join()\n"),
+        (f"{LASTRESORT}laststop.py", "                sweeper.join(STUCK_S)\n", "                sweeper.join()\n"),
     ),
     scene(
         "a hung controller is left alone",
         "ports",
         "the guardian waits ten times as long for a heartbeat",
         ("frozen",),
-        (f"{SERVICE}guardian.py", "SILENCE_S = 0.5", "SILENCE_S = 5.0"),
+        (f"{LASTRESORT}guardian.py", "SILENCE_S = 0.5", "SILENCE_S = 5.0"),
     ),
     part(
         "an opened port goes on",
@@ -647,7 +656,7 @@ OURS: tuple[Seed, ...] = (
         "a journal with one line that cannot be read is not replayed",
         ("a record over lives",),
         (
-            f"{WORKBENCH}recording.py",
+            f"{WORKBENCH}replay/recording.py",
             "        except (BaseValidationError, LookupError, TypeError, ValueError, ",
             "        except (",
         ),
@@ -657,8 +666,8 @@ OURS: tuple[Seed, ...] = (
         "record",
         "a restart in a journal is taken for a deviation",
         ("a record over lives",),
-        (f"{WORKBENCH}recording.py", 'BREAKS = frozenset({"run", "lost"})', 'BREAKS = frozenset({"lost"})'),
-        (f"{WORKBENCH}replay.py", "if recorded.gap or recorded.memory.last_s is None:", "if recorded.gap:"),
+        (f"{WORKBENCH}replay/recording.py", 'BREAKS = frozenset({"run", "lost"})', 'BREAKS = frozenset({"lost"})'),
+        (f"{WORKBENCH}replay/again.py", "if recorded.gap or recorded.memory.last_s is None:", "if recorded.gap:"),
     ),
     part(
         "a reboot loses events",
@@ -666,7 +675,7 @@ OURS: tuple[Seed, ...] = (
         "events of the second boot are looked for in the first one's steps",
         ("tests/workbench/test_replay.py",),
         (
-            f"{WORKBENCH}recording.py",
+            f"{WORKBENCH}replay/recording.py",
             '            later = [step for step in near if step.wall >= line["wall"]]  # a step is '
             "written down after its events\n",
             "            later = near[-1:]\n",
@@ -716,7 +725,7 @@ WORDS: tuple[Seed, ...] = (
         "estop without arguments knows the file of this folder only",
         ("tests/guardian/test_emergency.py::test_else_those_of_the_services_that_run",),
         (
-            f"{SERVICE}inhand.py",
+            f"{LASTRESORT}inhand.py",
             "    for place in PLACES:\n        yield _existing([place])\n    yield _existing(",
             "    yield _existing([PLACES[0]])\n    return\n    yield _existing(",
         ),
@@ -733,7 +742,7 @@ WORDS: tuple[Seed, ...] = (
         "words",
         "an estop without a service ends with a complaint",
         ("tests/guardian/test_estop.py::test_ports_without_a_service",),
-        (f"{SERVICE}witness.py", "        if not _listens(self._named):\n", "        if False:\n"),
+        (f"{LASTRESORT}running_service.py", "        if not _listens(self._named):\n", "        if False:\n"),
     ),
 )
 
@@ -803,7 +812,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
             "tests/guardian/test_emergency.py::test_a_file_of_the_working_directory_is_not_imported_by_the_controller",
             "tests/test_surroundings.py",
         ),
-        (f"{SERVICE}guardian.py", 'CONTROLLER = ("-P", "-m",', 'CONTROLLER = ("-m",'),
+        (f"{LASTRESORT}guardian.py", 'CONTROLLER = ("-P", "-m",', 'CONTROLLER = ("-m",'),
         ("orchestrator/__main__.py", '    os.environ["PYTHONSAFEPATH"] = "1"\n', ""),
     ),
     hostile(

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core import persisted
-from orchestrator.service import lastline
+from orchestrator.lastresort import lastline
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.environment import play, smallest
 from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script

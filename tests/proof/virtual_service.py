@@ -34,9 +34,9 @@ from orchestrator.core.persisted import Persisted
 from orchestrator.devices import bus as bus_module
 from orchestrator.devices import charger as charger_module
 from orchestrator.keys import Range
+from orchestrator.lastresort import line_settings as settings_module
 from orchestrator.link import can as can_module
 from orchestrator.link import serial as serial_module
-from orchestrator.link import settings as settings_module
 from orchestrator.model import ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
 from orchestrator.service import reload as reload_module

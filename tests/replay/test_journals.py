@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.model import State
-from orchestrator.workbench.recording import read
-from orchestrator.workbench.replay import again
+from orchestrator.workbench.replay.again import again
+from orchestrator.workbench.replay.recording import read
 from tests.replay.record import JOURNALS, SEEDS
 
 PATHS = sorted(JOURNALS.glob("*.jsonl.gz"))

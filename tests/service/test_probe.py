@@ -7,6 +7,8 @@ from threading import Event, Thread
 
 import pytest
 
+from orchestrator.commissioning.compare_maps import comparison
+from orchestrator.commissioning.probe import probe
 from orchestrator.config.load import load_map, load_station
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.config.station import Station
@@ -14,9 +16,7 @@ from orchestrator.errors import ServiceError
 from orchestrator.link.can_gate import refusal
 from orchestrator.model import Measurement
 from orchestrator.protocol.words import Decoded
-from orchestrator.service.compare_maps import comparison
 from orchestrator.service.control import ControlSocket
-from orchestrator.service.probe import probe
 from orchestrator.sim.client import PlantProcess
 from tests.link.strangers import holding
 from tests.sim.wires import on_bus, udp_keys
@@ -225,7 +225,9 @@ def test_a_contactors_line_is_shown(site: Site, monkeypatch: pytest.MonkeyPatch)
     def low(document: Document) -> None:
         document["bays"][0]["contactor"] = {"chip": "/dev/gpiochip0", "line": 17, "active_low": True}
 
-    monkeypatch.setattr("orchestrator.service.probe.describe", lambda chip, line: f"{chip} line {line}: input, free")
+    monkeypatch.setattr(
+        "orchestrator.commissioning.probe.describe", lambda chip, line: f"{chip} line {line}: input, free"
+    )
     status, shown = site.probe(change=low)
     assert status == 0
     assert "contactor on /dev/gpiochip0 line 17: input, free; closed while the pin is low" in shown

@@ -12,7 +12,8 @@ from pathlib import Path
 from threading import Event
 from typing import Any, Self, cast
 
-from orchestrator.service.control import ask
+from orchestrator.lastresort.asking import ask
+
 from orchestrator.sim.client import PlantProcess
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from orchestrator.lastresort.asking import ask
 
 from orchestrator.errors import ServiceError
-from orchestrator.service.control import ask
 from orchestrator.sim.client import PlantProcess
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until

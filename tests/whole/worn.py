@@ -9,7 +9,8 @@ import signal
 import sys
 import threading
 
-from orchestrator.service import controller, disk, guardian, loading, rotating
+from orchestrator.lastresort import guardian
+from orchestrator.service import controller, disk, loading, rotating
 
 ARMED = threading.Event()
 

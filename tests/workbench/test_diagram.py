@@ -12,8 +12,8 @@ from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.core.machine import TABLE
 from orchestrator.model import State
-from orchestrator.workbench.diagram import Diagram, diagram, mermaid
-from orchestrator.workbench.drawing import draw
+from orchestrator.workbench.draw.diagram import Diagram, diagram, mermaid
+from orchestrator.workbench.draw.drawing import draw
 
 Transitions = set[tuple[str, str, str]]
 

@@ -7,10 +7,10 @@ import pytest
 from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Visit
 from orchestrator.model import State
-from orchestrator.workbench.compare import differences
-from orchestrator.workbench.figures import aligned, clock, clock_s, figures, table
-from orchestrator.workbench.simulation import Run, simulate
-from orchestrator.workbench.trail import Moment, Span, Trail, bounds
+from orchestrator.workbench.simulate.compare import differences
+from orchestrator.workbench.simulate.figures import aligned, clock, clock_s, figures, table
+from orchestrator.workbench.simulate.simulation import Run, simulate
+from orchestrator.workbench.simulate.trail import Moment, Span, Trail, bounds
 from tests.workbench.scenarios import battery, scenario
 
 POLICY = load_policy("li-ion-48v")

@@ -11,11 +11,11 @@ from orchestrator.config.scenario import Ask, Defect, Sensor, SensorFault
 from orchestrator.core.memory import Memory
 from orchestrator.core.step import step
 from orchestrator.model import Decision, Request, State
-from orchestrator.workbench import simulation
-from orchestrator.workbench.devices import TICK_S
-from orchestrator.workbench.leap import EVENTFUL, SUMS, outline
 from orchestrator.workbench.processes import cores
-from orchestrator.workbench.simulation import Run, Simulation, simulate
+from orchestrator.workbench.simulate import simulation
+from orchestrator.workbench.simulate.devices import TICK_S
+from orchestrator.workbench.simulate.leap import EVENTFUL, SUMS, outline
+from orchestrator.workbench.simulate.simulation import Run, Simulation, simulate
 from tests.workbench.scenarios import battery, scenario
 
 #: Hours of each shipped scenario that are stepped through tick by tick: up to behind what is special to it.

@@ -7,7 +7,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.config.load import check, load_policy
 from orchestrator.config.shipped import shipped_dir
-from orchestrator.workbench.lint import LINT
+from orchestrator.workbench.prove.lint import LINT
 
 ODD = Path(__file__).parent / "odd"
 

@@ -10,8 +10,8 @@ from PIL import Image
 
 from orchestrator.config.load import load_policy
 from orchestrator.errors import OrchestratorError
-from orchestrator.workbench.present import save
-from orchestrator.workbench.simulation import Run, simulate
+from orchestrator.workbench.draw.present import save
+from orchestrator.workbench.simulate.simulation import Run, simulate
 from tests.workbench.scenarios import scenario
 
 #: Tags that have no end.

@@ -5,7 +5,7 @@ import pytest
 from orchestrator.config.scenario import Cell, Visit
 from orchestrator.model import ChargeMode
 from orchestrator.sim.charger import Push
-from orchestrator.workbench.plant import Plant, pack_of
+from orchestrator.workbench.simulate.plant import Plant, pack_of
 from tests.workbench.scenarios import battery, scenario
 
 

@@ -13,9 +13,9 @@ from orchestrator.config.load import load_policy
 from orchestrator.core import course
 from orchestrator.model import Request, State
 from orchestrator.service.records import WHOLE_EVERY
-from orchestrator.workbench.otherwise import Difference, compare, told
-from orchestrator.workbench.recording import read
-from orchestrator.workbench.replay import again
+from orchestrator.workbench.replay.again import again
+from orchestrator.workbench.replay.otherwise import Difference, compare, told
+from orchestrator.workbench.replay.recording import read
 from tests.service.bench import STEP_S, Bench
 
 

@@ -8,7 +8,7 @@ from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Ask, Defect, Sensor, SensorFault, Visit, Weather
 from orchestrator.config.shipped import shipped_names
 from orchestrator.model import ENERGISED, Request, State
-from orchestrator.workbench.simulation import Run, UnsuitableError, simulate
+from orchestrator.workbench.simulate.simulation import Run, UnsuitableError, simulate
 from tests.workbench.scenarios import battery, scenario
 
 POLICY = load_policy("li-ion-48v")

@@ -10,11 +10,11 @@ from PIL import Image
 
 from orchestrator.config.load import load_scenario
 from orchestrator.errors import ConfigError, UsageError
-from orchestrator.workbench.figures import Figures
-from orchestrator.workbench.present import save_sweep
+from orchestrator.workbench.draw.present import save_sweep
 from orchestrator.workbench.processes import cores
-from orchestrator.workbench.simulation import UnsuitableError
-from orchestrator.workbench.sweep import Axis, ClusterError, Point, Sweep, axis, best, cluster, played, rows
+from orchestrator.workbench.simulate.figures import Figures
+from orchestrator.workbench.simulate.simulation import UnsuitableError
+from orchestrator.workbench.simulate.sweep import Axis, ClusterError, Point, Sweep, axis, best, cluster, played, rows
 
 FINISH = Axis(("finish.soc_pct",), ("80", "97", "100"))
 DEEP = load_scenario("deep-discharge")
@@ -80,7 +80,7 @@ def test_a_cluster_finds_what_the_cores_find(swept: Sweep) -> None:
 
 
 def test_a_cluster_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("orchestrator.workbench.sweep.CONNECT_S", 0.2)
+    monkeypatch.setattr("orchestrator.workbench.simulate.sweep.CONNECT_S", 0.2)
     with pytest.raises(ClusterError, match="no cluster answers there"), cluster("tcp://127.0.0.1:9"):
         pass
 

@@ -1,0 +1,140 @@
+"""`orchestrator probe`: asks each device of a station a few questions and shows everything that it says.
+
+For the first day at a new station: is it wired right, does it answer, which object map is the right one? Nothing is
+commanded: the charger gets status requests, the BMU reads (and an NMT command, if it is asked for).
+"""
+
+from collections.abc import Callable, Sequence
+from textwrap import indent
+from time import monotonic
+
+from orchestrator.commissioning.probe_bmu import BmuProbe
+from orchestrator.config.station import Bay, ChargerConfig, ContactorConfig, Rs485, Station
+from orchestrator.devices.dialogue import REQUESTS, SILENCE, Dialogue
+from orchestrator.errors import LinkError, ServiceError
+from orchestrator.link.can import CanBus
+from orchestrator.link.gpio import describe
+from orchestrator.link.serial import SerialLine
+from orchestrator.model import ChargerReading
+from orchestrator.protocol.explain import explain
+from orchestrator.protocol.hextext import hex_of
+from orchestrator.protocol.sdo import NmtCommand
+from orchestrator.service.socketfile import is_alive
+
+#: As the service waits for a reply.
+REPLY_S = 0.12
+
+NMT = {
+    "start": NmtCommand.START,
+    "stop": NmtCommand.STOP,
+    "reset-node": NmtCommand.RESET_NODE,
+    "reset-communication": NmtCommand.RESET_COMMUNICATION,
+}
+
+Show = Callable[[str], None]
+
+
+def probe(
+    station: Station, bays: Sequence[str], nmt: str | None = None, *, old_protocol: bool = False, show: Show = print
+) -> int:
+    """Probe the named bays, or all; 0 if every device answered, else 1.
+
+    `nmt` (a key of `NMT`) is sent to each BMU first. `old_protocol`: ask for the BMU's undocumented pages, too.
+    ServiceError if a service runs on this station, or for a bay that it does not have.
+    """
+    known = {bay.name: bay for bay in station.bays}
+    unknown = [name for name in bays if name not in known]
+    if unknown:
+        raise ServiceError(f"no bay {unknown[0]!r} in this station: {', '.join(known)}")
+    if is_alive(station.control.socket):
+        raise ServiceError(
+            f"a service is running this station ({station.control.socket}), and two cannot talk to one device: "
+            "stop it first, or ask it: orchestrator status"
+        )
+    silent = []
+    for bay in [known[name] for name in bays] or station.bays:
+        show(f"=== {bay.name}")
+        if not _charger(bay.charger, show):
+            silent.append(f"{bay.name}'s charger")
+        if bay.contactor is not None and not _contactor(bay.contactor, show):
+            silent.append(f"{bay.name}'s contactor")
+        if not _bmu(station, bay, NMT[nmt] if nmt else None, old_protocol=old_protocol, show=show):
+            silent.append(f"{bay.name}'s BMU")
+    show(f"NO ANSWER: {', '.join(silent)}" if silent else "every device answered")
+    return 1 if silent else 0
+
+
+# --- the charger -----------------------------------------------------------------------------------------------------
+
+
+def _charger(config: ChargerConfig, show: Show) -> bool:
+    try:
+        line = SerialLine.open(config.port, kernel_rs485=config.rs485 is Rs485.KERNEL)
+    except LinkError as error:
+        show(f"charger: {error}")
+        return False
+    dialogue = Dialogue()
+    try:
+        if stranger := line.locked_by():
+            show(f"charger on {config.port}: {stranger} has locked this port, and may take its answers")
+        for _ in REQUESTS:
+            reading, exchange = _ask(line, dialogue)
+            if reading is not None:
+                break
+    except LinkError as error:
+        show(f"charger: {error}")
+        return False
+    finally:
+        line.close()
+    if reading is None:
+        show(f"charger on {config.port}: {SILENCE[dialogue.heard]}")
+    else:
+        show(f"charger on {config.port}: answers")
+    show(indent("\n".join(item.text for item in explain(hex_of(exchange))), "  "))
+    if reading is not None and reading.control_mode not in (None, config.control):
+        words = [mode.name.lower() if mode is not None else "" for mode in (reading.control_mode, config.control)]
+        show(f"  ! it is in {words[0]} mode, the station file says {words[1]}: look at its rotary switch")
+    return reading is not None
+
+
+def _ask(line: SerialLine, dialogue: Dialogue) -> tuple[ChargerReading | None, bytes]:
+    """One status request, and all bytes that went to and fro."""
+    asked_s = now_s = monotonic()
+    request = exchange = dialogue.ask(asked_s)
+    line.write(request)
+    reading, sending = None, len(request)
+    while reading is None and (left_s := asked_s + REPLY_S - now_s) > 0:
+        came = line.read(left_s, sending + dialogue.missing)
+        exchange, sending, now_s = exchange + came, 0, monotonic()
+        reading = dialogue.hear(came, now_s)
+    return reading or dialogue.give_up(now_s), exchange
+
+
+# --- the contactor ---------------------------------------------------------------------------------------------------
+
+
+def _contactor(config: ContactorConfig, show: Show) -> bool:
+    try:
+        closes = "low" if config.active_low else "high"
+        show(f"contactor on {describe(config.chip, config.line)}; closed while the pin is {closes}")
+    except LinkError as error:
+        show(f"contactor: {error}")
+        return False
+    return True
+
+
+# --- the BMU ---------------------------------------------------------------------------------------------------------
+
+
+def _bmu(station: Station, bay: Bay, nmt: NmtCommand | None, *, old_protocol: bool, show: Show) -> bool:
+    name = bay.battery.can
+    bus = CanBus(name, station.can[name], [bay.battery.node_id], pages=old_protocol, filtered=False)
+    bmu = BmuProbe(bus, bay.battery, show)
+    try:
+        bus.open()
+        return bmu.run(nmt, old_protocol=old_protocol)
+    except LinkError as error:
+        show(f"BMU: {error}")
+        return False
+    finally:
+        bus.close()

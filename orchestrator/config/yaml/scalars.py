@@ -1,0 +1,225 @@
+"""One scalar's text into the type that its key expects, or a sentence that says what should have been written.
+
+YAML's own guessing is not used: to it `on` is true, `1:30` is 90, `012` is 10, `19:20:00` is 69600 and `1e3` is a text.
+Here the key decides what is expected; whatever other YAML readers would take differently is refused.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from difflib import SequenceMatcher
+from enum import Enum
+
+from orchestrator.config.yaml.tree import Scalar
+from orchestrator.keys import Key
+
+_NUMBER = re.compile(r"[-+]?(0|[1-9]\d*)(\.\d+)?", re.ASCII)
+_HEX = re.compile(r"0x[\da-fA-F]+", re.ASCII)
+_NULL = re.compile(r"~|null", re.IGNORECASE)
+_TRUE = {"true", "yes", "on", "y", "1"}
+_FALSE = {"false", "no", "off", "n", "0"}
+_RANGE = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:\.\.+|…|-|–|~|to|,|;|:|/)\s*([-+]?\d+(?:\.\d+)?)", re.ASCII)
+_MAX_DIGITS = 40  #: of a number; more is nonsense
+_ALIKE = 0.6  #: of 1; below, two words are not a slip of each other
+_MAX_WORD = 64  #: that is compared with others
+_MAX_PATH = 4096  #: bytes, Linux' PATH_MAX
+
+
+class UnfitError(ValueError):
+    """The text does not fit its key; the message says what does."""
+
+
+def is_null(node: object) -> bool:
+    """Whether this was written as `null`."""
+    return isinstance(node, Scalar) and node.plain and _NULL.fullmatch(node.text) is not None
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The known word that was probably meant, or ""."""
+    if len(word) > _MAX_WORD:
+        return ""
+    folded = word.casefold().replace("-", "_")
+    score = {other: SequenceMatcher(None, folded, other.casefold().replace("-", "_")).ratio() for other in known}
+    best = max(score, key=score.__getitem__, default="")
+    return best if best and score[best] >= _ALIKE else ""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """`did you mean X? ` if one is near, and all that is allowed."""
+    known = tuple(known)
+    near = nearest(word, known)
+    return (f"did you mean {near}? Allowed: " if near else "allowed: ") + ", ".join(known)
+
+
+def quantity(value: float, unit: str) -> str:
+    """A number with its unit, without a trailing `.0`."""
+    return f"{value:.10g}" + (f" {unit}" if unit else "")
+
+
+def allowed(key: Key) -> str:
+    """The bounds of a key in words, e.g. "above 0, at most 100 %"."""
+    if key.ge is not None and key.le is not None:
+        return f"{key.ge:g} … {key.le:g} {key.unit}".rstrip()
+    lower = f"at least {key.ge:g}" if key.ge is not None else f"above {key.gt:g}" if key.gt is not None else ""
+    upper = f"at most {key.le:g}" if key.le is not None else f"below {key.lt:g}" if key.lt is not None else ""
+    bounds = ", ".join(part for part in (lower, upper) if part)
+    return f"{bounds} {key.unit}".rstrip() if bounds else ""
+
+
+def bounded(value: float, key: Key) -> float:
+    """`value` itself, if it lies within the key's bounds."""
+    low = (key.ge is not None and value < key.ge) or (key.gt is not None and value <= key.gt)
+    high = (key.le is not None and value > key.le) or (key.lt is not None and value >= key.lt)
+    if low or high:
+        raise UnfitError(f"{quantity(value, key.unit)} is too {'low' if low else 'high'}, allowed: {allowed(key)}")
+    return value
+
+
+def read_float(node: Scalar, key: Key) -> float:
+    """A decimal number, written out."""
+    if node.plain and len(node.text) <= _MAX_DIGITS and _NUMBER.fullmatch(node.text):
+        return bounded(float(node.text), key)
+    raise UnfitError(_why_no_number(node, key))
+
+
+def read_int(node: Scalar, key: Key) -> int:
+    """A whole number, decimal or 0x… hexadecimal."""
+    if node.plain and len(node.text) <= _MAX_DIGITS:
+        if _HEX.fullmatch(node.text):
+            return int(bounded(int(node.text, 16), key))
+        if (match := _NUMBER.fullmatch(node.text)) and not match[2]:
+            return int(bounded(int(node.text), key))
+        if match:
+            raise UnfitError(f"{node.text} must be a whole number, e.g. {round(float(node.text))}")
+    raise UnfitError(_why_no_number(node, key))
+
+
+def read_bool(node: Scalar, _key: Key) -> bool:
+    """`true` or `false`."""
+    if node.plain and node.text in ("true", "false"):
+        return node.text == "true"
+    word = node.text.strip().casefold()
+    meant = "true" if word in _TRUE else "false" if word in _FALSE else "true or false"
+    raise UnfitError(f"write {meant}{'' if node.plain else ' without quotes'}, not {shown(node.text)}")
+
+
+def read_str(node: Scalar, key: Key) -> str:
+    """One line of text that is not empty."""
+    if not node.text.strip():
+        raise UnfitError(f"needs a text: {key.about}")
+    if not node.text.isprintable():
+        raise UnfitError("needs one line of text without control characters")
+    return node.text
+
+
+def read_path(node: Scalar, key: Key) -> str:
+    """A path; one for a device that is no more than a bare name is not believed."""
+    text = read_str(node, key)
+    if len(text) > _MAX_PATH:
+        raise UnfitError(f"a path has at most {_MAX_PATH} characters, this one {len(text)}")
+    if key.is_path and "/" not in text:
+        example = f"/dev/{text}" if text.startswith(("tty", "gpiochip")) else "/dev/ttyUSB0"
+        raise UnfitError(f"{shown(text)} is not a whole path: write e.g. {example[:_MAX_DIGITS]}")
+    return text
+
+
+def range_meant(text: str) -> str:
+    """`[low, high]` for a range that was written in another way; "" if it is none."""
+    match = _RANGE.fullmatch(text.strip()) if len(text) <= _MAX_DIGITS else None
+    return f"[{match[1]}, {match[2]}]" if match else ""
+
+
+def read_enum(node: Scalar, kind: type[Enum]) -> Enum:
+    """A member by its name in lower case."""
+    members = {member.name.lower(): member for member in kind}
+    if node.text in members:
+        return members[node.text]
+    raise UnfitError(f"{shown(node.text)} is not one of the words allowed here; {did_you_mean(node.text, members)}")
+
+
+def read_any(node: Scalar, key: Key) -> object:
+    """A value for a library that is handed it as it is: null, true/false, a number or a text."""
+    if not node.plain:
+        return read_str(node, key) if node.text else ""
+    if is_null(node):
+        return None
+    if node.text in ("true", "false"):
+        return node.text == "true"
+    if _HEX.fullmatch(node.text) or ((match := _NUMBER.fullmatch(node.text)) and not match[2]):
+        return read_int(node, key)
+    if _NUMBER.fullmatch(node.text):
+        return float(node.text)
+    if node.text.casefold() in _TRUE | _FALSE:
+        raise UnfitError(f'{node.text} is ambiguous: write true or false, or "{node.text}" in quotes for the text')
+    if _AMBIGUOUS.fullmatch(node.text):
+        raise UnfitError(f"{_why_no_number(node, key)}; or in quotes for the text")
+    return node.text
+
+
+_AMBIGUOUS = re.compile(r"[-+]?(0\d+|0o\d+|0b[01]+|\d[\d_]*_\d*|\d+\.|\.\d+|\d+(\.\d*)?e[-+]?\d+|\.(nan|inf))", re.I)
+
+
+def shown(text: str) -> str:
+    """A text from the file, quoted and shortened for a message."""
+    return repr(text if len(text) <= _MAX_DIGITS else text[: _MAX_DIGITS - 1] + "…")
+
+
+def _number(text: str) -> str:
+    """A number that was written in another way, as it should be written; "" if it is not one."""
+    try:
+        value = float(text)
+    except ValueError:
+        return ""
+    return f"{value:.10f}".rstrip("0").rstrip(".") if math.isfinite(value) and abs(value) < 1e15 else ""
+
+
+def _instead(number: str, text: str) -> str:
+    return f"write {number}, not {text}" if number else ""
+
+
+def _sexagesimal(match: re.Match[str]) -> str:
+    parts = [float(part) for part in match[0].split(":")]
+    whole = "h:min:s" if len(parts) > 2 else "h:min or min:s"
+    return f"{match[0]} looks like a time ({whole}) and would be read as {_base60(parts):g}: write one number"
+
+
+def _base60(parts: list[float]) -> float:
+    total = 0.0
+    for part in parts:
+        total = total * 60 + part
+    return total
+
+
+#: How numbers are written that we do not take, and what we say; the first that fits is used.
+_HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
+    (re.compile(r"\d+(:\d+(\.\d+)?)+", re.A), _sexagesimal),
+    (re.compile(r"[-+]?\.(nan|inf)|[-+]?(nan|inf|infinity)", re.I), lambda m: f"{m[0]} is not a number to charge by"),
+    (re.compile(r"0x[\da-f]+", re.I | re.A), lambda m: f"write it in decimal: {int(m[0], 16)}, not {m[0]}"),
+    (re.compile(r"0o[0-7]+", re.A), lambda m: f"write it in decimal: {int(m[0], 8)}, not {m[0]}"),
+    (
+        re.compile(r"0\d+", re.A),
+        lambda m: f"{m[0]} with a leading 0 may be read as octal: write {m[0].lstrip('0') or 0}",
+    ),
+    (re.compile(r"([-+]?\d+),(\d+)", re.A), lambda m: f"use a decimal point: {m[1]}.{m[2]}, not {m[0]}"),
+    (re.compile(r"[-+]?\d[\d_.]*_[\d_.]*", re.A), lambda m: _instead(_number(m[0].replace("_", "")), m[0])),
+    (re.compile(r"[-+]?[\d.]+e[-+]?\d+", re.I | re.A), lambda m: _instead(_number(m[0]), m[0])),
+    (re.compile(r"[-+]?(\d+\.|\.\d+|0+\d+\.\d*)", re.A), lambda m: _instead(_number(m[0]), m[0])),
+    (
+        re.compile(r"(?!0[xo]|[\d.]+[eE][-+]?\d)([-+]?\d+(\.\d+)?) *[^\d.,:_\s].*", re.A),
+        lambda m: f"only the number, without a unit: {m[1]}, not {m[0]}",
+    ),
+)
+
+
+def _why_no_number(node: Scalar, key: Key) -> str:
+    kind = f"a number in {key.unit}" if key.unit else "a number"
+    text = node.text
+    if not node.text.strip():
+        return f"needs {kind}: {key.about}"
+    if not node.plain and _NUMBER.fullmatch(text.strip()):
+        return f"write {text.strip()} without quotes"
+    if len(text) <= _MAX_DIGITS:
+        for pattern, say in _HABITS:
+            if (match := pattern.fullmatch(text.strip())) and (said := say(match)):
+                return said
+    return f"{shown(text)} is not {kind}"

@@ -1,0 +1,248 @@
+"""`orchestrator estop`: stop chargers with no service, with one that hangs and with one that runs.
+
+Ports are opened without the lock that a service holds on them, each by a thread of its own, and the first stops go out
+before anything else is looked at. Standard library only, and PyYAML where a station file has to be read.
+"""
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Mapping
+
+from orchestrator.lastresort.lastline import HELD
+from orchestrator.lastresort.laststop import LOOK_S, LastStop
+
+USAGE = """\
+usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held]
+
+Stop the charger on every port of the station file, or on the given ports, and verify it. Without arguments the file is
+station.yaml in this folder, else that of the installed service, else that of a service that runs. Ports whose chargers
+may be running by what the service has written down are stopped, too, whether the file still names them or not.
+Needs no running service. Each one that holds one of these ports is told to hold its bays until an operator starts them.
+Then the station file's contactors are opened. Those that a service holds are left to it: it opens them by itself
+where a charger does not obey.
+
+  --port PATH ...  these ports, without a station file
+  --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or what the station file says)
+  --leave-held     leave ports alone that a running service holds, and tell it nothing
+
+Exit status 0: every charger was verified to stand by; 1: not every one, or there may be more; 2: used wrongly.
+"""
+Contactor = tuple[str, int, bool]  #: chip, line, active low
+#: A contactor's driver that has not answered by the end, and a moment more, hangs.
+OPENING, OPEN_S = "its driver hangs", 0.5
+#: What systemd says to ExecStopPost= (systemd.exec, $SERVICE_RESULT) when its watchdog has killed the guardian: who
+#: still holds the ports is its controller, frozen as well, and is killed only afterwards.
+FROZEN = "watchdog"
+UNTOLD = "a service that holds a port could not be told: it may start its chargers again"
+LOST = "every charger that was found is told of here, but it may have named more, and those may run"
+#: How long the proof of standby is waited for, and a service's answer.
+VERIFY_S = 3.0
+#: A charger that stands by is watched for this long: one that runs again was not stopped.
+WATCH_S = 1.0
+#: Who reads what is told may keep it waiting for this long.
+READER_S = 2.0
+#: What the service has written down is waited for no longer than this: its disk may hang.
+READ_S = 1.0
+
+
+class Options:
+    """The command line, taken apart by hand: argparse alone would cost half of the time there is."""
+
+    def __init__(self, words: list[str]) -> None:
+        self.ports: list[str] = []
+        self.stations: list[str] = []
+        self.socket = os.environ.get("ORCHESTRATOR_SOCKET", "")
+        self.leave_held = False
+        self.wrong = ""
+        taking = ""
+        for word in words:
+            if word == "--leave-held":
+                self.leave_held, taking = True, ""
+            elif word in ("--port", "--socket"):
+                taking = word
+            elif word.startswith("-"):
+                self.wrong = f"unknown option {word}"
+            elif taking == "--port":
+                self.ports.append(word)
+            elif taking == "--socket":
+                self.socket, taking = word, ""
+            else:
+                self.stations.append(word)
+        if os.environ.get("SERVICE_RESULT") == FROZEN:
+            self.leave_held = False
+        if len(self.stations) + bool(self.ports) > 1:
+            self.wrong = "name one station file, or ports"
+        elif taking == "--socket" or (taking == "--port" and not self.ports):
+            self.wrong = f"{taking} needs a path"
+
+
+def main(words: list[str]) -> int:
+    """Stop, verify, tell; the exit status."""
+    if "-h" in words or "--help" in words:
+        _say(1, USAGE.rstrip())
+        return 0
+    options = Options(words)
+    if options.wrong:
+        _say(2, f"orchestrator estop: {options.wrong}\n{USAGE.rstrip()}")
+        return 2
+    stop = EmergencyStop(options)
+    if options.ports:
+        stop.stop(dict.fromkeys(options.ports, ""))
+    else:
+        stop.by_station()
+    return stop.finish()
+
+
+class EmergencyStop:
+    """One emergency stop, from the first port to the last word."""
+
+    def __init__(self, options: Options) -> None:
+        self._options, self._socket = options, options.socket
+        self._began_s = time.monotonic()
+        self._stopping = LastStop(leave_held=options.leave_held, watch_s=WATCH_S)
+        self._bays: dict[str, str] = {}  # of each port's bay the name, where it has one
+        self._real: set[str] = set()
+        self._contactors: tuple[Contactor, ...] = ()
+        self._opening: set[Contactor] = set()
+        self._cut: dict[Contactor, str] = {}  # what became of them
+        self._notes: list[str] = []
+        self._doubts: list[str] = []  # why it is not all, although every charger that is known stands by
+
+    def stop(self, bays: Mapping[str, str]) -> None:
+        """Stop the chargers on these ports; one that has two names once."""
+        new = {}
+        for port, bay in bays.items():
+            real = os.path.realpath(port)
+            if real not in self._real:
+                self._real.add(real)
+                new[port] = bay
+        self._bays.update(new)
+        self._stopping.stop(dict.fromkeys(new))
+
+    def by_station(self) -> None:
+        """Stop what a station file names, and what is in hand besides."""
+        journals = self._take_any() if not self._options.stations else [self._take(self._options.stations[0])]
+        readings = [threading.Thread(target=self._take_in_hand, args=(name,), daemon=True) for name in journals if name]
+        end_s = time.monotonic() + READ_S
+        for reading in readings:
+            reading.start()
+        for reading in readings:
+            reading.join(max(0.0, end_s - time.monotonic()))
+        if any(reading.is_alive() for reading in readings):
+            self._notes.append("the journal cannot be read in time: ports that it may name besides were not stopped")
+
+    def _take_any(self) -> list[str]:
+        """The station file that is meant where none is named; of several that run, all of them."""
+        from orchestrator.lastresort.inhand import stations  # noqa: PLC0415 - only where it is needed
+
+        for together in stations():
+            journals = []
+            for station in together:
+                before = len(self._bays)
+                journals.append(self._take(station))
+                if journals[-1] or len(self._bays) > before:
+                    self._notes.append(f"station file: {os.path.abspath(station)}")  # noqa: PTH100 - pathlib has none
+            if self._bays or any(journals):
+                return journals
+        return []
+
+    def _take(self, station: str) -> str:
+        """Stop what this file names; the journal's directory. A file with mistakes gives what it can."""
+        from pathlib import Path  # noqa: PLC0415 - only where it is needed
+
+        from orchestrator.config.ports import wiring  # noqa: PLC0415 - PyYAML
+
+        try:
+            found = wiring(Path(station))
+        except OSError as error:
+            self._notes.append(f"{station}: {error.strerror}")
+            return ""
+        self.stop(found.ports)
+        if found.damaged:
+            self._doubts.append(f"{station} is damaged: {LOST}")
+        self._socket, self._contactors = self._socket or found.socket, found.contactors
+        return found.journal
+
+    def _take_in_hand(self, journal: str) -> None:
+        from orchestrator.lastresort.inhand import ports_in_hand  # noqa: PLC0415 - the first stops are out now
+
+        self.stop(ports_in_hand(journal))
+
+    def finish(self) -> int:
+        """Verify all of them, with whatever help there is, and tell what became of each; the exit status."""
+        import signal  # noqa: PLC0415 - the first stops are out now
+
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
+        if not self._bays:
+            return self._without_ports()
+        if self._options.leave_held:
+            whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
+        else:
+            whys = self._with_services()
+        end_s = time.monotonic() + OPEN_S
+        while OPENING in self._cut.values() and time.monotonic() < end_s:
+            time.sleep(LOOK_S)
+        return self._tell(whys)
+
+    def _without_ports(self) -> int:
+        """A service that runs may know what the station file does not say any more: it is to stop all it has."""
+        if self._socket and not self._options.leave_held:
+            self._with_services()
+        for note in self._notes + self._doubts:
+            _say(2, note)
+        _say(2, "no port to stop: name a station file or --port PATH")
+        return 1
+
+    def _with_services(self) -> dict[str, str]:
+        """Tell the services, and verify with what they see."""
+        from orchestrator.lastresort.running_service import Services  # noqa: PLC0415 - the first stops are out now
+
+        services = Services(self._bays, self._socket, every_bay=not self._options.ports)
+        self._stopping.witness = services.sees
+        services.start()
+        whys = self._stopping.finish(VERIFY_S, on_round=self._isolate) if self._bays else {}
+        services.wait(self._began_s + VERIFY_S)
+        self._notes += services.said
+        if services.untold:
+            self._doubts.append(UNTOLD)
+        return whys
+
+    def _isolate(self) -> None:
+        """Open the contactors, each in its own time."""
+        for line in set(self._contactors) - self._opening:
+            self._opening.add(line)
+            self._cut.setdefault(line, OPENING)
+            threading.Thread(target=self._open, args=(line,), daemon=True).start()
+
+    def _open(self, line: Contactor) -> None:
+        from orchestrator.lastresort.lastopen import request  # noqa: PLC0415 - the first stops are out now
+
+        chip, number, active_low = line
+        self._cut[line] = request(chip, number, active_low=active_low)
+        self._opening.discard(line)
+
+    def _tell(self, whys: Mapping[str, str]) -> int:
+        """First what to do."""
+        names = {port: f"{bay} ({port})" if (bay := self._bays[port]) else port for port in whys}
+        running = [names[port] for port, why in whys.items() if why not in ("", HELD)]
+        lines = [f"CUT THE MAINS of {', '.join(running)}: nothing proves that they stand by"] if running else []
+        lines += [f"{names[port]}: {why or 'standby verified'}" for port, why in whys.items()]
+        lines += [f"contactor on {chip} line {line}: {became}" for (chip, line, _), became in self._cut.items()]
+        lines += self._doubts
+        if not any(whys.values()) and not self._doubts:
+            lines.append("every charger stands by, verified")
+        _say(1, "\n".join(lines))
+        for note in self._notes:
+            _say(2, note)
+        return 1 if any(whys.values()) or self._doubts else 0
+
+
+def _say(fd: int, text: str) -> None:
+    """A terminal that cannot show a character, stands still or is gone must not change how this ends."""
+    from orchestrator.lastresort.notify import put  # noqa: PLC0415 - the first stops are out now
+
+    stream = sys.stdout if fd == 1 else sys.stderr
+    encoding = getattr(stream, "encoding", None) or "ascii"
+    put(fd, f"{text}\n".encode(encoding, errors="backslashreplace"), READER_S)

@@ -1,0 +1,276 @@
+"""One charger's line in the hands of a process of last resort: stopped, asked and watched by a thread of its own.
+
+Theory of operation. In rounds of half a second the charger is sent the stop twice, then operation 0, then a question.
+Twice, because a controller that died in mid-frame may have left half a frame in a charger's decoder, which then
+swallows the first stop. The first byte goes out before anything is asked of the port; were its settings somebody
+else's, they are set right and the stop is written again. Two answers in a row that show standby are the proof; then the
+charger is only asked, and if it runs again it is stopped again. A port that fails is closed, and opened by its name.
+
+Whatever the port's driver is asked for may take for ever. Then it is this thread that hangs, and nobody waits for it.
+Standard library only, few imports.
+"""
+
+import errno
+import fcntl
+import os
+import select
+import termios
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+from orchestrator.lastresort import line_settings
+from orchestrator.lastresort.port_owner import holder
+from orchestrator.protocol.standby import ANSWER_BYTES, OPERATION_STOP_FRAME, QUESTION, STOP_FRAME, stands_by
+
+#: What is written when, in seconds from a round's beginning; each frame has left the wire when the next one comes.
+STOPS: tuple[tuple[float, bytes], ...] = ((0.0, STOP_FRAME), (0.02, STOP_FRAME), (0.04, OPERATION_STOP_FRAME))
+#: Then the charger gets time to obey, and is asked; an answer takes as long as anywhere else (120 ms), and a bit.
+ASK_S = 0.25
+ANSWER_S = 0.2
+ROUND_S = 0.5
+#: A charger that has shown standby is asked again this often: "200 ms or more is recommended" (protocol 2/2, §2.2.2).
+AGAIN_S = 0.21
+#: So many answers in a row that show standby are a proof: one answer in two may be wrong.
+PROOFS = 2
+#: From an answer's first byte to its last, with an adapter's latency: who reads earlier gets pieces, or leaves some to
+#: another process that reads this port.
+GATHER_S = 0.01 + ANSWER_BYTES * 10 / 19200
+#: Of what came in, kept up to this; far more than one answer.
+KEEP = 256
+
+#: (name of a port, since when) → (which sample, "" if it shows standby, else why not) of another process that looks
+#: after it; None: nobody does, and the charger has to be asked. Answers at once.
+Witness = Callable[[str, float], tuple[float, str] | None]
+
+SILENT = "no proof of standby: the charger does not answer"
+ONCE = "no proof of standby: the charger has shown it only once"
+RUNS = "NOT stopped: the charger says that it goes on"
+STALLED = "the line takes nothing"
+GONE = "the line is gone"
+HANGS = "the port's driver hangs"
+HELD = "left alone: a service holds this port"
+
+
+class LastLine:
+    """One charger's line and what has become of it; `why` is "" once standby is verified."""
+
+    def __init__(self, name: str, fd: int | None, witness: Witness, *, leave_held: bool) -> None:
+        self.name, self.why = name, SILENT
+        self.tried = threading.Event()  #: the first stop is out, or could not be written
+        self.shown_s: float | None = None  #: since when every answer has shown standby
+        self._fd, self._witness, self._leave_held = fd, witness, leave_held
+        self._stopped_s = 0.0  # when the first stop had been written
+        self._begun = False  # the thread has had its first round
+        self._proofs, self._sample = 0, 0.0
+        self._over = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> bool:
+        """Begin; False where there is no thread to be had."""
+        thread = threading.Thread(target=self._run, name=f"stop {self.name}", daemon=True)
+        try:
+            thread.start()
+        except RuntimeError:
+            return False
+        self._thread = thread
+        return True
+
+    def first(self) -> None:
+        """Write the first stop, before anything else is asked of the port."""
+        if self._fd is not None:
+            os.set_blocking(self._fd, False)
+        self.write(STOP_FRAME)
+        self._stopped_s = time.monotonic()
+        self.tried.set()
+
+    def end(self) -> None:
+        """Let the thread close the port and end."""
+        self._over.set()
+
+    def join(self, within_s: float) -> None:
+        """Wait for that; a port whose driver hangs is told."""
+        if self._thread is not None:
+            self._thread.join(within_s)
+            if self._thread.is_alive() and self.why:
+                self.why = HANGS
+
+    def _run(self) -> None:
+        while not self._over.is_set() and self.why != HELD:
+            began_s, stood_by = time.monotonic(), bool(self._proofs)
+            try:
+                self._round(began_s)
+            except Exception as error:  # noqa: BLE001 - a thread that dies here is a charger that nobody stops
+                self._fail(f"internal: {error!r}")
+            if self._proofs or not stood_by:  # one that runs again is stopped at once
+                self._pause_until(began_s + (AGAIN_S if self._proofs else ROUND_S))
+        self._close()
+
+    def _round(self, began_s: float) -> None:
+        if not self._proofs:
+            self._stop()
+            for at_s, frame in STOPS[1:]:
+                self._pause_until(began_s + at_s)
+                self.write(frame)
+            self._pause_until(began_s + ASK_S)
+        self._look()
+
+    def _stop(self) -> None:
+        if not self.tried.is_set():
+            self.first()
+        elif self._begun:
+            self.write(STOP_FRAME)
+        self._begun = True
+        if self._restored():
+            self.write(STOP_FRAME)
+
+    def _pause_until(self, at_s: float) -> None:
+        left_s = at_s - time.monotonic()
+        if left_s > 0:
+            self._over.wait(left_s)
+
+    def _look(self) -> None:
+        """Take another sample of what the charger does."""
+        seen = self._witness(self.name, self._stopped_s)
+        if seen is None:
+            self._judge(self._answer())
+        elif seen[1]:
+            self._judge(seen[1])
+        elif seen[0] != self._sample:
+            self._sample = seen[0]
+            self._judge("")
+
+    def _judge(self, why: str | None) -> None:
+        """Count a sample: "" shows standby, None is silence, which takes no proof away."""
+        if why == "":
+            self._proofs += 1
+            self.shown_s = self.shown_s or time.monotonic()
+            self.why = "" if self._proofs >= PROOFS else ONCE
+        elif why is not None or self._proofs < PROOFS:
+            self._proofs, self.shown_s = 0, None
+            self.why = why or self.why
+
+    def write(self, frame: bytes) -> None:
+        """Write what the line takes now. What a full line still holds is dropped: an old order must not come out."""
+        try:
+            if self._fd is None:
+                self._fd = open_port(self.name, leave_held=self._leave_held)
+                self.why = SILENT
+            if not _takes(self._fd, frame):
+                _flush(self._fd, termios.TCOFLUSH)
+                if not _takes(self._fd, frame):
+                    self._fail(STALLED)
+        except OSError as error:
+            self._failed(error)
+
+    def _restored(self) -> bool:
+        """Whether the port's settings had to be set right."""
+        with suppress(OSError, termios.error):  # gone, or no tty: the next use of it will tell
+            return self._fd is not None and bool(line_settings.restore(self._fd))
+        return False
+
+    def _answer(self) -> str | None:
+        """What the charger says to a question: "" for standby. What came in before it proves nothing."""
+        heard, end_s = b"", time.monotonic() + ANSWER_S
+        if self._fd is not None:
+            _flush(self._fd, termios.TCIFLUSH)
+            self.write(QUESTION)
+        while self._fd is not None and (left_s := end_s - time.monotonic()) > 0:
+            listener = select.poll()
+            listener.register(self._fd, select.POLLIN)
+            if not listener.poll(left_s * 1000):
+                break
+            time.sleep(GATHER_S)
+            heard = (heard + self._read())[-KEEP:]
+            standby = stands_by(heard)
+            if standby is not None:
+                return "" if standby else RUNS
+        return None
+
+    def _read(self) -> bytes:
+        assert self._fd is not None
+        try:
+            data = os.read(self._fd, 4096)
+            if not data:
+                raise OSError(GONE)
+        except BlockingIOError:
+            return b""  # somebody else has read it
+        except OSError as error:
+            self._failed(error)
+            return b""
+        return data
+
+    def _failed(self, error: OSError) -> None:
+        if error.errno == errno.EBUSY:
+            self._fail(f"one program has this port for itself alone (TIOCEXCL): {holder(self.name, (os.getpid(),))}")
+        else:
+            self._fail(error.strerror or str(error))
+        self._close()
+
+    def _fail(self, why: str) -> None:
+        if self._proofs < PROOFS:
+            self.why, self._proofs, self.shown_s = why, 0, None
+
+    def _close(self) -> None:
+        """Close the port. What a stalled line has not taken is dropped, since close() would wait for it."""
+        if self._fd is not None:
+            fd, self._fd = self._fd, None
+            if self.why == STALLED:
+                drop_port(fd)
+                return
+            with suppress(OSError):  # it is closed, whatever its driver says to that
+                os.close(fd)
+
+
+def open_port(name: str, *, leave_held: bool) -> int:
+    """Open a charger's port for stopping: without waiting, and with its settings; the descriptor.
+
+    `leave_held`: only if no orchestrator holds it, by the lock that one puts on it; then it is held. Anybody else's
+    lock keeps no stop away. OSError says why not.
+    """
+    try:
+        fd = os.open(name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except ValueError:  # a 0, or half a character: a dying controller may say anything
+        raise OSError("not the name of a port") from None
+    try:
+        line_settings.take_back(fd)  # with another line discipline a serial port may not look like one
+        if not os.isatty(fd):
+            raise OSError("not a serial port")
+        if leave_held:
+            _lock(fd, name)
+        line_settings.restore(fd)
+    except termios.error:
+        return fd  # its settings may be right all the same
+    except OSError:
+        os.close(fd)
+        raise
+    return fd
+
+
+def _lock(fd: int, name: str) -> None:
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        if holder(name, (os.getpid(),)).ours:  # we have it open ourselves, and hold nothing
+            raise OSError(HELD) from None
+
+
+def drop_port(fd: int) -> None:
+    """Close a port that is given up. What it has not sent is dropped: close() would wait for a line that is stalled."""
+    _flush(fd, termios.TCOFLUSH)
+    with suppress(OSError):
+        os.close(fd)
+
+
+def _takes(fd: int, frame: bytes) -> bool:
+    """Whether a line has taken the whole frame."""
+    try:
+        return os.write(fd, frame) == len(frame)
+    except BlockingIOError:
+        return False
+
+
+def _flush(fd: int, queue: int) -> None:
+    with suppress(termios.error):  # gone; the next use of it will tell
+        termios.tcflush(fd, queue)

@@ -1,0 +1,166 @@
+"""The service that may be running beside an `estop`: told to hold what was stopped, and asked what it sees.
+
+While it runs it reads the ports, and would get the answers to anybody else's questions; so its readings are the proof.
+They must be newer than the stop, as everywhere else, and they are two witnesses: a charger that shows 0 A while the
+BMU sees current runs. All of this is a thread of its own: no stop waits for a service that hangs or drips.
+"""
+
+import os
+import threading
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from orchestrator.lastresort.asking import ask
+
+from orchestrator.errors import ServiceError
+from orchestrator.lastresort.port_owner import control_sockets
+
+#: A service that has not answered by then is asked again.
+ANSWER_S = 0.5
+#: How often it is asked what it sees, and how old that may be.
+LOOK_S, FRESH_S = 0.1, 1.5
+#: Standby may show so much, at the charger and at the BMU, as everywhere else.
+STANDBY_A, BMU_STANDBY_A = 0.5, 1.0
+NOBODY = "no service is running"
+UNTOLD = "the service has not answered in time: nobody holds its bays"
+
+Bay = Mapping[str, Any]  #: of the status document
+
+
+class Services:
+    """Every service that holds one of these ports, else the one behind `socket`, if one is named.
+
+    `every_bay`: they are to hold all their bays, not only those of these ports.
+    """
+
+    def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool) -> None:
+        self._names, self._named, self._every_bay = list(names), socket, every_bay
+        self._found: list[Service] = []
+        self._looked = threading.Event()
+
+    def start(self) -> None:
+        """Look for them, tell them, and go on asking them."""
+        threading.Thread(target=self._look, name="services", daemon=True).start()
+
+    def wait(self, end_s: float) -> None:
+        """Until all have answered, at the longest until then."""
+        self._looked.wait(max(0.0, end_s - time.monotonic()))
+        for service in self._found:
+            service.told.wait(max(0.0, end_s - time.monotonic()))
+
+    def sees(self, name: str, since_s: float) -> tuple[float, str] | None:
+        """What the one that is in touch with this port's charger last saw of it (see `Service.sees`)."""
+        return next((seen for one in self._found if (seen := one.sees(name, since_s)) is not None), None)
+
+    @property
+    def said(self) -> list[str]:
+        """What became of each, for people; which one is told where there are several."""
+        if not self._found:
+            return [UNTOLD]
+        return [f"{one.path}: {one.said}" if len(self._found) > 1 else one.said for one in self._found]
+
+    @property
+    def untold(self) -> bool:
+        """Whether one that holds a port may start its charger again: it has not taken the stop."""
+        return not self._looked.is_set() or any(one.holds and not one.told.is_set() for one in self._found)
+
+    def _look(self) -> None:
+        paths = control_sockets(self._names)
+        self._found = [
+            Service(self._names, path, every_bay=self._every_bay, holds=bool(paths)) for path in paths or [self._named]
+        ]
+        self._looked.set()
+        for service in self._found:
+            service.start()
+
+
+class Service:
+    """The service behind this socket, if there is one; `holds` if it has one of these ports open."""
+
+    def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool, holds: bool = False) -> None:
+        self.said = UNTOLD  #: what became of it, for people
+        self.told = threading.Event()  #: that it has answered, or that there is none
+        self.path, self.holds = Path(socket), holds
+        self._ports = {os.path.realpath(name) for name in names}
+        self._named, self._every_bay = socket, every_bay
+        self._seen: tuple[float, Mapping[str, Bay]] = (0.0, {})
+        self._thread = threading.Thread(target=self._run, name="service", daemon=True)
+
+    def start(self) -> None:
+        """Tell it, and go on asking it."""
+        self._thread.start()
+
+    def sees(self, name: str, since_s: float) -> tuple[float, str] | None:
+        """What it last saw of this port's charger: which sample, and "" for standby. None: they are not in touch."""
+        seen_s, bays = self._seen
+        bay = bays.get(os.path.realpath(name)) if time.monotonic() - seen_s <= FRESH_S else None
+        try:
+            return _sample(bay, since_s) if bay else None
+        except (LookupError, TypeError):
+            return None  # it is of another version
+
+    def _run(self) -> None:
+        while True:
+            try:
+                if not self.told.is_set() and not self._hold():
+                    return
+                self._seen = time.monotonic(), dict(self._bays())
+            except (ServiceError, LookupError, TypeError, ValueError) as error:
+                if not self.told.is_set():
+                    silent = str(error).startswith("no service answers")
+                    why = "it does not answer" if silent else error
+                    self.said = f"the service has not taken the stop ({why}): nobody holds its bays"
+            time.sleep(LOOK_S)
+
+    def _hold(self) -> bool:
+        """Tell it to hold its bays until an operator starts them. False where there is no service."""
+        if not _listens(self._named):
+            self.said = NOBODY
+            self.told.set()  # one that starts now stops its chargers first, and asks nobody
+            return False
+        bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
+        results = ask(self.path, {"verb": "stop", "bays": bays}, ANSWER_S)["results"]
+        answers = dict(results) if isinstance(results, Mapping) else {}
+        refused = [f"{name}: {answer}" for name, answer in answers.items() if answer]
+        held = ", ".join(name for name, answer in answers.items() if not answer)
+        holds = (
+            f"the service holds {held} until an operator starts it" if held else "the service holds none of these ports"
+        )
+        self.said = "; ".join([holds, *refused])
+        self.told.set()
+        return True
+
+    def _bays(self) -> list[tuple[str, Bay]]:
+        """Each bay with its port's real name."""
+        bays: Any = ask(self.path, {"verb": "status"}, ANSWER_S)["bays"]
+        return [(os.path.realpath(bay["port"]), bay) for bay in bays]
+
+
+def _listens(path: str) -> bool:
+    """Whether there may be a service behind this name: one that is too busy to be connected to is one."""
+    import socket  # noqa: PLC0415 - control.py has it anyway
+
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        probe.settimeout(ANSWER_S)
+        try:
+            probe.connect(path)
+        except (FileNotFoundError, ConnectionRefusedError):
+            return False
+        except (OSError, ValueError):
+            return bool(path)
+    return True
+
+
+def _sample(bay: Bay, since_s: float) -> tuple[float, str] | None:
+    charger, battery = bay["charger"], bay["battery"]
+    at_s, amps, bmu_a = charger["t_s"] or 0.0, charger["current_a"] or 0.0, battery.get("current_a") or 0.0
+    bmu_sees = f"the BMU sees {bmu_a:.1f} A" if battery["online"] and bmu_a > BMU_STANDBY_A else ""
+    if not charger["online"]:
+        return (at_s, f"NOT stopped: {bmu_sees}, and the charger does not answer") if bmu_sees else None
+    if at_s <= since_s:
+        return at_s, "no proof of standby: the service has not heard from the charger since"
+    if charger["operation"] == 0 and amps <= STANDBY_A:
+        return at_s, f"NOT stopped: the charger says {amps:.1f} A, {bmu_sees}" if bmu_sees else ""
+    return at_s, f"NOT stopped: the service says {bay['state']}: {bay['reason']}"

@@ -1,0 +1,50 @@
+"""One self-contained HTML page of one or more simulations: it needs no network, and opens from a mail."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader
+
+from orchestrator.workbench.draw.plot import colour, says, svg, when
+from orchestrator.workbench.simulate.figures import clock_s, figures, table
+from orchestrator.workbench.simulate.simulation import Run
+from orchestrator.workbench.simulate.trail import Moment, bounds
+
+#: Moments that a page keeps of each policy for what is shown under the pointer.
+MAX_MOMENTS = 1500
+
+
+def save_page(runs: Sequence[Run], path: Path) -> None:
+    """Write the page."""
+    environment = Environment(loader=PackageLoader("orchestrator.workbench", "."), autoescape=True, trim_blocks=True)
+    drawing = svg(runs)
+    path.write_text(
+        environment.get_template("page.html").render(
+            scenario=runs[0].scenario,
+            drawing=drawing,
+            head=table([figures(run) for run in runs])[0],
+            rows=[(row, len(set(row[1:])) > 1) for row in table([figures(run) for run in runs])[1:]],
+            policies=[_policy(run, number) for number, run in enumerate(runs)],
+            hours=runs[0].scenario.hours,
+        ),
+        encoding="utf-8",
+    )
+
+
+def _policy(run: Run, number: int) -> dict[str, object]:
+    """What the page tells of one policy."""
+    moments = run.trail.moments
+    every = -(-len(moments) // MAX_MOMENTS)
+    return {
+        "name": run.policy.policy,
+        "file": run.policy.source.file,
+        "colour": colour(number),
+        "rules": [(bound.number, when(bound), says(bound.spans[0])) for bound in bounds(run.trail.spans)],
+        "spans": [[span.from_s, f"{clock_s(span.from_s / 3600)}  {says(span)}"] for span in run.trail.spans],
+        "moments": [_rounded(moment) for moment in moments[::every]],
+    }
+
+
+def _rounded(moment: Moment) -> list[float | None]:
+    values = (moment.soc_pct, moment.voltage_v, moment.current_a, moment.temperature_c)
+    return [moment.t_s, *(None if value is None else round(value, 2) for value in values)]

@@ -1,0 +1,115 @@
+"""Everything that a bay can come to, explored on all cores: does every property hold, and end all that must end?"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+from orchestrator.config.load import load_policy, load_station
+from orchestrator.config.policy import Policy
+from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits, Station
+from orchestrator.core.rules import Rules
+from orchestrator.errors import ConfigError
+from orchestrator.model import ControlMode
+from orchestrator.protocol.objects import ObjectMap
+from orchestrator.workbench.processes import cores
+from orchestrator.workbench.prove.endings import ENDINGS, reaches, settles
+from orchestrator.workbench.prove.explore import Each, Explorer, Walk
+from orchestrator.workbench.prove.inputs import StationInputs
+from orchestrator.workbench.prove.properties import PROPERTIES
+from orchestrator.workbench.prove.story import Counterexample
+
+T = TypeVar("T")
+
+#: A charger for a policy that no station names: what the shipped station files have.
+STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """What came of it."""
+
+    memories: int  #: that differ in what a bay can come to from there
+    steps: int  #: that led there; those that look for an end are not counted
+    counterexamples: Sequence[Counterexample]  #: at most one for each property
+    properties: int = len(PROPERTIES) + len(ENDINGS) + 2  #: and: no exception, no livelock
+
+
+def prove(rules: Rules, watch: Callable[[int], None], jobs: int | None = None) -> Proof:
+    """Every class of inputs that the bay's policy and limits cut, in every order.
+
+    In so many processes; None: one for each core. `watch` is called now and then with the number of steps so far.
+    """
+    with cores(jobs, _begin, rules) as pool:
+        explorer = Explorer(walk_of(rules), partial(_on, pool), watch)
+        explorer.run()
+        reaches(explorer)
+        settles(explorer)
+    return Proof(len(explorer.nodes), explorer.steps, tuple(explorer.found.values()))
+
+
+def walk_of(rules: Rules) -> Walk:
+    """All inputs, all properties."""
+    return Walk(rules, StationInputs.of(rules), PROPERTIES)
+
+
+def here(walk: Walk) -> Each:
+    """In this process, with this walk."""
+
+    def each(function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
+        return (function(walk, *job) for job in jobs)
+
+    return each
+
+
+def _on(pool: Executor, function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
+    return pool.map(partial(_with_the_walk, function), jobs)
+
+
+_walk: Walk | None = None  # of this process, so that it tells nothing twice
+
+
+def _begin(rules: Rules) -> None:
+    global _walk  # noqa: PLW0603 - what a process begins with
+    _walk = walk_of(rules)
+
+
+def _with_the_walk(function: Callable[..., T], job: tuple[Any, ...]) -> T:
+    return function(_walk, *job)
+
+
+def bay_of(policy: Policy) -> Bay:
+    """A bay for a policy that no station names: its limits are just as wide as the policy's, and all steps allowed."""
+    return Bay(
+        name=policy.policy,
+        charger=ChargerConfig(port="explored", control=ControlMode.MANUAL, steps_a=STEPS_A),
+        battery=BatteryConfig(can="explored", node_id=0x10, map=ObjectMap(map="explored", objects=())),
+        limits=Limits(
+            voltage_v=policy.pack.voltage_v.high, current_a=STEPS_A[-1], temperature_c=policy.pack.temperature_c
+        ),
+        policy=policy,
+        source=policy.source,
+    )
+
+
+def bays_in(file: str) -> Iterator[tuple[str, Bay]]:
+    """What there is to prove in a policy or a station file without errors, and how it is called."""
+    try:
+        station = load_station(file)
+    except ConfigError:
+        with suppress(ConfigError):  # an object map or a scenario decides nothing
+            yield file, bay_of(load_policy(file))
+        return
+    for bays in _alike(station):
+        yield f"{file}, {', '.join(bay.name for bay in bays)}", bays[0]
+
+
+def _alike(station: Station) -> Iterable[Sequence[Bay]]:
+    """The bays in groups that differ in nothing that is decided by: in name, port, bus or node only."""
+    groups: dict[object, list[Bay]] = {}
+    for bay in station.bays:
+        what = (bay.policy.source.file, bay.charger.control, bay.charger.steps_a, bay.limits)
+        groups.setdefault(what, []).append(bay)
+    return groups.values()

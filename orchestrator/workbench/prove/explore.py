@@ -1,0 +1,229 @@
+"""Walks everything that `step()` can come to, breadth-first, and holds properties against every step on the way.
+
+What goes in is cut into classes (`inputs.py`) and jumps of time; what is remembered is cut by `gist`, and the first
+memory of each gist stands for all of them. So what is found is real, with the shortest story that leads to it, and what
+is not found is absent up to these cuts. Properties are data (`properties.py`); nothing here knows what they mean.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from orchestrator.core.latches import effect, raised
+from orchestrator.core.machine import RESTING, UNVERIFIED
+from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import Persisted
+from orchestrator.core.rules import Rules
+from orchestrator.core.step import step
+from orchestrator.core.witnesses.standby import UNORDERED_S
+from orchestrator.model import ENERGISED, Decision, Snapshot, State
+from orchestrator.workbench.prove.properties import Property
+from orchestrator.workbench.prove.story import BEGIN_S, Counterexample, Move, Taken
+
+#: In these standby is yet to be proved.
+WAITS = frozenset({*UNVERIFIED, State.OFFLINE, State.QUALIFYING})
+
+Step = Callable[[float, Snapshot, Memory, Rules], tuple[Decision, Memory]]
+T = TypeVar("T")
+
+
+class Inputs(Protocol):
+    """The classes that inputs are cut into."""
+
+    def moves(self) -> Iterable[Move]:
+        """All that may happen next, one thing at a time."""
+
+    def pairs(self) -> Iterable[Move]:
+        """All that may happen next, a charger's and a battery's at once."""
+
+    def constants(self) -> Iterable[tuple[str, str]]:
+        """Charger and battery of each surrounding that may last for ever."""
+
+    def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
+        """What the step is given."""
+
+
+def outline(memory: Memory) -> tuple[object, ...]:
+    """The coarsest cut: where a bay is, and the worst fault's effect."""
+    faults = raised(memory.faults)
+    return memory.state, effect(*faults[0]) if faults else None
+
+
+def gist(memory: Memory) -> tuple[object, ...]:
+    """What tells two memories apart here: what decides where a bay can go, without times, values and texts."""
+    energised, witnessed = memory.state in ENERGISED, memory.witnessed
+    return (
+        *outline(memory),
+        any(fault.latched for fault in memory.faults.values()),
+        bool(memory.hold),
+        memory.paused,
+        memory.session is not None,
+        memory.full_pct is not None,
+        memory.qualified_s is not None,
+        energised and (memory.resumed, memory.ran, memory.order and memory.order.action, witnessed.proved),
+        memory.state in WAITS and bool(witnessed.proof),
+        memory.unverified,
+        memory.intends,
+        memory.state in RESTING and (witnessed.sees, witnessed.unordered_s >= UNORDERED_S),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A memory and its moment: where a step can be taken from."""
+
+    memory: Memory
+    now_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Expanded:
+    """What lies one step from a place."""
+
+    reached: Sequence[tuple[object, Move, Place]]  #: the first place of each gist, and the move that leads there
+    broken: Sequence[tuple[str, str, Move]]  #: properties that do not hold, by what, and the move that shows it
+    changes: frozenset[tuple[State, State]]
+    steps: int
+
+
+@dataclass(slots=True)
+class Walk:
+    """What may happen, and what must hold: takes steps, and keeps nothing but what it need not tell again."""
+
+    rules: Rules
+    inputs: Inputs
+    properties: Sequence[Property]
+    gist: Callable[[Memory], object] = gist
+    step: Step = step
+    _told: set[object] = field(default_factory=set)  # gists that were reached, and names of what was found broken
+
+    def take(self, place: Place, move: Move) -> Taken:
+        """One step from there."""
+        now_s = place.now_s + move.dt_s
+        memory = Persisted.of(place.memory, now_s).memory(now_s) if move.restart else place.memory
+        snapshot = self.inputs.snapshot(move, now_s, memory)
+        try:
+            decision, after = self.step(now_s, snapshot, memory, self.rules)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+            stays = Decision(place.memory.state, f"{type(error).__name__}: {error}")
+            return Taken(move, now_s, snapshot, place.memory, stays, place.memory, self.rules, error=repr(error))
+        return Taken(move, now_s, snapshot, place.memory, decision, after, self.rules)
+
+    def broken(self, taken: Taken) -> Iterator[tuple[str, str]]:
+        """Name of each property that the step breaks, and by what."""
+        if taken.error:
+            yield "no exception", f"step() raised {taken.error}"
+            return
+        for rule in self.properties:
+            wrong = rule.check(taken)
+            if wrong is not None:
+                yield rule.name, wrong
+
+    def news(self, taken: Taken) -> Iterator[tuple[str, str]]:
+        """What the step breaks and was not told of before."""
+        for name, text in self.broken(taken):
+            if name not in self._told:
+                self._told.add(name)
+                yield name, text
+
+    def follow(self, place: Place, moves: Iterable[Move]) -> Iterator[Taken]:
+        """Steps one after another from there, as far as none raises an exception."""
+        for move in moves:
+            taken = self.take(place, move)
+            yield taken
+            if taken.error:
+                return
+            place = Place(taken.after, taken.now_s)
+
+    def expand(self, place: Place, *, in_pairs: bool) -> Expanded:
+        """Every move from there. What it has told of before, it leaves out."""
+        reached, broken, changes, steps = [], [], set(), 0
+        for move in (*self.inputs.moves(), *(self.inputs.pairs() if in_pairs else ())):
+            taken = self.take(place, move)
+            steps += 1
+            broken += [(name, text, move) for name, text in self.news(taken)]
+            if taken.before.state is not taken.after.state and not move.restart:  # another life is no change of state
+                changes.add((taken.before.state, taken.after.state))
+            if not taken.error and (key := self.gist(taken.after)) not in self._told:
+                self._told.add(key)
+                reached.append((key, move, Place(taken.after, taken.now_s)))
+        return Expanded(reached, broken, frozenset(changes), steps)
+
+
+class Each(Protocol):
+    """Does one thing to each of many, in their order: here, or in many processes."""
+
+    def __call__(self, function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
+        """`function(walk, *job)` of each job."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A place that was reached, and how; the very first one has no way."""
+
+    place: Place
+    move: Move | None = None
+    parent: "Node | None" = None
+
+    @property
+    def way(self) -> tuple[Move, ...]:
+        """The moves that led there."""
+        return (*self.parent.way, self.move) if self.parent is not None and self.move is not None else ()
+
+
+@dataclass(slots=True)
+class Explorer:
+    """`run` explores; then `nodes` has what was reached, `found` at most one counterexample for each property."""
+
+    walk: Walk
+    each: Each
+    watch: Callable[[int], None] = lambda _: None  #: is called now and then with the number of steps so far
+    nodes: list[Node] = field(default_factory=list)
+    steps: int = 0
+    found: dict[str, Counterexample] = field(default_factory=dict)
+    changes: set[tuple[State, State]] = field(default_factory=set)  #: changes of state that were seen
+    _paired: set[object] = field(default_factory=set)  # outlines
+
+    def run(self, until: str = "", most: int = 1_000_000) -> None:
+        """Everything that can be reached; or until the property `until` is found not to hold, or `most` nodes."""
+        first = Node(Place(Memory(), BEGIN_S))
+        level, seen = [first], {self.walk.gist(first.place.memory)}
+        self.nodes = [first]
+        while level:
+            jobs = [(node.place, self._first_of_its_outline(node)) for node in level]
+            following: list[Node] = []
+            for node, expanded in zip(level, self.each(_expand, jobs), strict=True):
+                following += self._learn(node, expanded, seen)
+                if until in self.found or len(self.nodes) >= most:
+                    return
+            level = following
+
+    def _first_of_its_outline(self, node: Node) -> bool:
+        """Pairs are tried only once for each outline: they are many."""
+        shape = outline(node.place.memory)
+        new = shape not in self._paired
+        self._paired.add(shape)
+        return new
+
+    def _learn(self, node: Node, expanded: Expanded, seen: set[object]) -> Iterator[Node]:
+        self.steps += expanded.steps
+        self.watch(self.steps)
+        self.changes |= expanded.changes
+        for name, text, move in expanded.broken:
+            self.find(name, text, node, (move,))
+        for key, move, place in expanded.reached:
+            if key not in seen:
+                seen.add(key)
+                new = Node(place, move, node)
+                self.nodes.append(new)
+                yield new
+
+    def find(self, name: str, text: str, node: Node, more: Sequence[Move]) -> None:
+        """Keep a counterexample: the way to the node, and what followed."""
+        if name not in self.found:
+            story = self.walk.follow(Place(Memory(), BEGIN_S), (*node.way, *more))
+            self.found[name] = Counterexample(name, text, tuple(story))
+
+
+def _expand(walk: Walk, place: Place, in_pairs: bool) -> Expanded:  # noqa: FBT001 - a job's arguments have no names
+    return walk.expand(place, in_pairs=in_pairs)

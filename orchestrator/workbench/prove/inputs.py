@@ -1,0 +1,222 @@
+"""The classes of inputs: what a charger and a battery can show at the moment of a step, as tables.
+
+A battery's classes are cut by the policy's own thresholds: each bound, just below, at, just above. A charger's classes
+are what it may do with the order that it was given, and what it may say. Both are made fresh for each step, so that a
+story can leave any of them at any time.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
+from orchestrator.model import (
+    ENERGISED,
+    Action,
+    ChargeMode,
+    ChargerLink,
+    ChargerReading,
+    Command,
+    Connection,
+    ControlMode,
+    Operation,
+    Precharge,
+    Request,
+    Sent,
+    Snapshot,
+    State,
+)
+from orchestrator.workbench.prove.batteries import Shown, batteries
+from orchestrator.workbench.prove.story import Move
+
+#: Ages at the moment of the step: an order and a stop were written this long ago, readings were asked for after that.
+SENT_AGE_S, READ_AGE_S, OLD_S = 0.1, 0.05, 30.0
+TICK_S = 0.25
+#: Of two timers that are no farther apart than this, a jump past the longer one is past both.
+ALIKE = 1.1
+#: What flows in precharge.
+PRECHARGE_A = 1.0
+#: What a charger shows in each stage.
+STAGES = {
+    State.PRECHARGE_PULSE: (ChargeMode.PRECHARGE, Precharge.PULSE),
+    State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
+    State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
+}
+
+
+@dataclass(slots=True)
+class Said:
+    """What a charger's port shows, on the way to a snapshot."""
+
+    reading: dict[str, Any]
+    link: dict[str, Any]
+    silent: bool = False  #: there is no reading at all
+
+
+Charger = Callable[[Said, float], None]
+
+
+def _link(**changes: Any) -> Charger:  # noqa: ANN401 - fields of ChargerLink
+    return lambda said, now_s: said.link.update(
+        {name: value(now_s) if callable(value) else value for name, value in changes.items()}
+    )
+
+
+def _reading(**changes: Any) -> Charger:  # noqa: ANN401 - fields of ChargerReading
+    return lambda said, _: said.reading.update(changes)
+
+
+def _both(*parts: Charger) -> Charger:
+    def change(said: Said, now_s: float) -> None:
+        for part in parts:
+            part(said, now_s)
+
+    return change
+
+
+def _never(said: Said, _: float) -> None:
+    said.silent = True
+    said.link.update(online=False, misses=0, stop_sent_s=None, sent=None, problem="not opened yet")
+
+
+def _ran_by_itself(said: Said, _: float) -> None:
+    said.reading.update(operation=Operation.RUNNING, charge_mode=ChargeMode.CHARGE, current_a=said.reading["full_a"])
+
+
+def _switched(said: Said, _: float) -> None:
+    said.reading["control_mode"] = ControlMode(1 - said.reading["control_mode"])
+
+
+_STANDBY = _reading(operation=Operation.STOPPED, charge_mode=ChargeMode.FULL, current_a=0.0)
+
+#: How a charger differs from one that has just obeyed.
+CHARGERS: Mapping[str, Charger] = {
+    "obeys": _reading(),
+    "stands by, whatever it is told": _STANDBY,
+    "stands by, no stop written yet": _both(_STANDBY, _link(stop_sent_s=None, sent=None)),
+    "runs, whatever it is told": _ran_by_itself,
+    "delivers, though it says stopped": _reading(operation=Operation.STOPPED, current_a=2.0),
+    "stands by and was set up anew": _both(_STANDBY, _link(taken_over="9600 baud", taken_over_t_s=lambda now_s: now_s)),
+    "shares its port": _link(locked_by="gpsd (pid 812)"),
+    "runs without current": _both(_ran_by_itself, _reading(current_a=0.0)),
+    "searches": _reading(charge_mode=ChargeMode.BATTERY_SEARCH, current_a=0.0),
+    "recovers": _reading(charge_mode=ChargeMode.BATTERY_RECOVERY, current_a=0.0),
+    "full by itself": _reading(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED, current_a=0.0),
+    "stopped by an error": _both(_STANDBY, _reading(charge_mode=ChargeMode.ERROR_STOP)),
+    "stopped by its system": _both(_STANDBY, _reading(charge_mode=ChargeMode.SYSTEM_STOP)),
+    "reversed": _both(_STANDBY, _reading(charge_mode=ChargeMode.REVERSED, connection=Connection.REVERSED)),
+    "undocumented mode": _reading(charge_mode=None, illegal=("charge mode 9 (documented: 1 … 8)",)),
+    "undocumented operation": _reading(operation=None, illegal=("operation 2 (documented: 0, 1)",)),
+    "in the other control mode": _switched,
+    "too much current": _both(_ran_by_itself, _reading(current_a=40.0)),
+    "complains of commands": _link(error_bits=2, error_t_s=lambda now_s: now_s - READ_AGE_S),
+    "complains of checksums": _link(error_bits=8, error_t_s=lambda now_s: now_s - READ_AGE_S),
+    "silent": _both(_reading(age_s=OLD_S), _link(online=False, misses=9, problem="no answer")),
+    "just fell silent": _both(_reading(age_s=0.9), _link(online=False, misses=3, problem="no answer")),
+    "port gone": _both(_reading(age_s=OLD_S), _link(online=False, misses=9, problem="gone", stop_sent_s=None)),
+    "never heard": _never,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class StationInputs:
+    """The inputs of one bay: its charger's classes, its policy's battery classes, the jumps over timers."""
+
+    rules: Rules
+    jumps_s: tuple[float, ...] = ()
+    chargers: Mapping[str, Charger] = field(default_factory=lambda: CHARGERS)
+    batteries: Mapping[str, Shown] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, rules: Rules) -> "StationInputs":
+        """All classes that the bay's policy and station file cut."""
+        return cls(rules, jumps(rules), CHARGERS, batteries(rules))
+
+    def moves(self) -> Iterator[Move]:
+        """Each class in the next moment and after each jump, and every request in the plainest surroundings."""
+        for dt_s in (TICK_S, *self.jumps_s):
+            for charger, battery in self.constants():
+                yield Move(dt_s, charger, battery)
+        for request in Request:
+            for charger in ("obeys", "runs, whatever it is told", "silent", "stands by, whatever it is told"):
+                for battery in ("healthy", "absent", "full"):
+                    if charger in self.chargers and battery in self.batteries:
+                        yield Move(TICK_S, charger, battery, request)
+        yield Move(TICK_S, "obeys", "healthy", internal="seen by the checker")
+        yield Move(TICK_S, "obeys", "healthy", ending="the service ends: SIGTERM")
+        for charger in ("obeys", "runs, whatever it is told", "silent"):
+            if charger in self.chargers:
+                yield Move(TICK_S, charger, "healthy", restart=True)
+
+    def pairs(self) -> Iterator[Move]:
+        """Every charger with every battery in the next moment."""
+        return (Move(TICK_S, charger, battery) for charger in self.chargers for battery in self.batteries)
+
+    def constants(self) -> Iterator[tuple[str, str]]:
+        """Each charger with a healthy battery, each battery with an obedient charger."""
+        yield from ((charger, "healthy") for charger in self.chargers)
+        yield from (("obeys", battery) for battery in self.batteries)
+
+    def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
+        """What the step is given."""
+        shown = self.batteries[move.battery]
+        said = self._obedient(shown, now_s, memory)
+        self.chargers[move.charger](said, now_s)
+        amps = said.reading.pop("current_a")
+        said.reading.pop("full_a")
+        age_s = said.reading.pop("age_s")
+        reading = None if said.silent else ChargerReading(t_s=now_s - age_s, current_a=amps, **said.reading)
+        values, link = shown.at(now_s, memory, 0.0 if reading is None else amps)
+        link_of_charger = ChargerLink(**said.link)
+        return Snapshot(reading, link_of_charger, values, link, move.request, move.internal, ending=move.ending)
+
+    def _obedient(self, shown: Shown, now_s: float, memory: Memory) -> Said:
+        """A charger that has just done what the last step ordered."""
+        order = memory.order
+        values = {
+            "voltage_v": shown.volts + shown.differs_v if shown.connected else 0.0,
+            "control_mode": self.rules.bay.charger.control, "operation": Operation.STOPPED, "current_limit": 0,
+            "charge_mode": ChargeMode.FULL, "precharge": Precharge.OFF, "connection": Connection.NORMAL,
+        }  # fmt: skip
+        if memory.state in ENERGISED:
+            values |= _setpoint(memory, manual=self.rules.manual)
+        limit_a = self.rules.steps_a[int(values["current_limit"])] * shown.takes
+        charging = values["charge_mode"] is ChargeMode.CHARGE
+        flows_a = 0.0 if not values["operation"] else limit_a if charging else min(PRECHARGE_A, limit_a)
+        sent = order if memory.resumed and order is not None else Command(Action.RESUME)
+        return Said(
+            {**values, "current_a": flows_a, "full_a": limit_a, "age_s": READ_AGE_S},
+            {"online": True, "sent": Sent(sent, now_s - SENT_AGE_S), "stop_sent_s": now_s - SENT_AGE_S},
+        )
+
+
+#: The orders of a sequence, in its order; what stands before the present one has been obeyed.
+SEQUENCE = (Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE, Action.RUN)
+
+
+def _setpoint(memory: Memory, *, manual: bool) -> dict[str, Any]:
+    """What an obedient charger shows of the setpoint: all of it up to the present order."""
+    action = memory.order.action if memory.order is not None else Action.RUN
+    running = memory.ran or action is Action.RUN or (action is Action.RESUME and not manual)
+    done = len(SEQUENCE) if running or not manual else SEQUENCE.index(action)
+    shows: dict[str, Any] = {"operation": Operation(int(running)), "charge_mode": ChargeMode.CHARGE}
+    if manual:
+        shows["current_limit"] = memory.step.index if memory.step is not None else 0
+        shows["charge_mode"] = STAGES[memory.state][0] if done >= 1 else ChargeMode.FULL
+        shows["precharge"] = STAGES[memory.state][1] if done >= SEQUENCE.index(Action.SET_PRECHARGE) else Precharge.OFF
+    return shows
+
+
+def jumps(rules: Rules) -> tuple[float, ...]:
+    """Just beyond every timer of core and policy, so that none of them is walked through in steps."""
+    policy = rules.policy
+    timers = [2.0, 3.0, 5.0, 10.0, 70.0, 310.0, 3600.0]
+    timers.append(policy.finish.max_hours * 3600)
+    if policy.finish.taper is not None:
+        timers.append(policy.finish.taper.for_s)
+    if policy.precharge is not None:
+        rule = policy.precharge
+        timers += [m * 60 for m in (rule.pulse.max_min, rule.continuous.max_min, rule.rise.within_min)]
+    apart = [timer for timer in timers if not any(timer < other < timer * ALIKE for other in timers)]
+    return tuple(sorted({timer + 0.1 for timer in apart}))

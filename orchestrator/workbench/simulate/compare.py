@@ -1,0 +1,40 @@
+"""Several policies on one scenario: when they did different things."""
+
+from collections.abc import Iterator, Sequence
+
+from orchestrator.model import State
+from orchestrator.workbench.simulate.trail import Span
+
+#: A difference in time of less than this is none.
+SAME_S = 60.0
+
+#: States that last a moment are what comes before them.
+PASSING = frozenset({State.STARTING, State.QUALIFYING, State.STOPPING})
+
+
+def differences(all_spans: Sequence[Sequence[Span]]) -> list[tuple[float, float]]:
+    """The times (from, to, in s) in which not all were in one state on one step, longer than `SAME_S`."""
+    times = sorted({span.from_s for spans in all_spans for span in spans} | {spans[-1].to_s for spans in all_spans})
+    found: list[tuple[float, float]] = []
+    walks = [_walk(spans, times) for spans in all_spans]
+    for from_s, to_s, *did in zip(times, times[1:], *walks, strict=False):
+        if len(set(did)) == 1:
+            continue
+        if found and from_s - found[-1][1] < SAME_S:
+            found[-1] = (found[-1][0], to_s)
+        else:
+            found.append((from_s, to_s))
+    return [(from_s, to_s) for from_s, to_s in found if to_s - from_s >= SAME_S]
+
+
+def _walk(spans: Sequence[Span], times: Sequence[float]) -> Iterator[tuple[State, int | None] | None]:
+    """What was done from each of the times on."""
+    done: tuple[State, int | None] | None = None
+    rest = iter(spans)
+    span: Span | None = next(rest, None)
+    for from_s in times:
+        while span is not None and span.from_s <= from_s:
+            if span.state not in PASSING:
+                done = (span.state, span.step)
+            span = next(rest, None)
+        yield done

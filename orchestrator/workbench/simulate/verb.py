@@ -1,0 +1,24 @@
+"""`orchestrator simulate`: policies on a scenario, and the table of their figures."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from orchestrator.config.load import load_policy, load_scenario
+from orchestrator.workbench.simulate.figures import aligned, figures, table
+from orchestrator.workbench.simulate.simulation import Run, simulate
+
+
+def play(policies: Sequence[str], scenario: str, watch: Callable[[str, float], None]) -> list[Run]:
+    """Each policy on the scenario; both are shipped names or paths.
+
+    `watch` is called now and then with a policy's name and the share of it that is done. Raises ConfigError for what
+    is wrong in the files, UnsuitableError for a policy that is not for the batteries of the scenario.
+    """
+    what_happens = load_scenario(scenario)
+    loaded = [load_policy(name) for name in policies]
+    return [simulate(policy, what_happens, watch=partial(watch, policy.policy)) for policy in loaded]
+
+
+def as_table(runs: Sequence[Run]) -> str:
+    """The figures of all, for a terminal."""
+    return aligned(table([figures(run) for run in runs]))
