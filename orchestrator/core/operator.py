@@ -12,8 +12,13 @@ MAX_RESETS, RESETS_S = 3, 3600.0
 RESET = "reset by the operator; start to go on"
 
 
-def hear(memory: Memory, request: Request, now_s: float) -> str:
-    """Change the memory as the operator asks; "" when it was done, else why not."""
+def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> str:
+    """Change the memory as the operator asks; "" when it was done, else why not.
+
+    What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
+    """
+    if unkept and request in (Request.START, Request.RESET):
+        return f"not done: {unkept}"
     return VERBS[request](memory, now_s)
 
 

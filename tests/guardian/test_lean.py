@@ -13,7 +13,14 @@ from tests.test_imports import PACKAGE, ROOT, Module, product
 
 LINK = {"", "link"}
 PACKAGES = LINK | {"protocol", "service"}
-LINE = PACKAGES | {"lastresort.port_owner", "lastresort.line_settings", "protocol.standby", "lastresort.lastline"}
+LINE = PACKAGES | {
+    "lastresort.port_owner",
+    "lastresort.line_settings",
+    "protocol.standby",
+    "lastresort.bareport",
+    "lastresort.descriptors",
+    "lastresort.lastline",
+}
 STOP = LINE | {"lastresort.laststop"}
 #: Module → all of the product that is imported with it.
 LEAN: dict[str, set[str]] = {
@@ -21,6 +28,10 @@ LEAN: dict[str, set[str]] = {
     "lastresort.port_owner": LINK | {"lastresort.port_owner"},
     "lastresort.line_settings": LINK | {"lastresort.line_settings"},
     "lastresort.notify": {"", "service", "lastresort.notify"},
+    "lastresort.bareport": LINK
+    | {"service"}
+    | {"lastresort.port_owner", "lastresort.line_settings", "lastresort.bareport"},
+    "lastresort.descriptors": {"", "service", "lastresort.descriptors"},
     "lastresort.lastopen": {"", "service", "lastresort.lastopen"},
     "lastresort.lastline": LINE,
     "lastresort.laststop": STOP,

@@ -185,7 +185,7 @@ class Gateway:
             load_module.load_station: self._load,
             control.ControlSocket: partial(Door, self),
             control.ask: self._ask,
-            port_owner.control_sockets: self._holder,
+            port_owner.services: lambda ports: (self._holder(ports), []),
             running_service._listens: lambda _: self.door is not None,
             boot.boot_id: lambda: f"boot {self.boots}",
             can_module._open_bus: lambda _: Driver(self.bus, self.time),
