@@ -23,8 +23,13 @@ OUT_OF_CONTROL = (
 )
 
 
-def hear(memory: Memory, request: Request, now_s: float) -> str:
-    """Change the memory as the operator asks; "" when it was done, else why not."""
+def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> str:
+    """Change the memory as the operator asks; "" when it was done, else why not.
+
+    What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
+    """
+    if unkept and request in (Request.START, Request.RESET):
+        return f"not done: {unkept}"
     return VERBS[request](memory, now_s)
 
 

@@ -56,7 +56,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
         memory.since_s = now_s
     f = Facts(now_s, snapshot, memory, rules)
     follow(f, last_s)
-    answer = hear(memory, snapshot.request, now_s) if snapshot.request is not None else ""
+    answer = hear(memory, snapshot.request, now_s, snapshot.unkept) if snapshot.request is not None else ""
     memory.faults = latches.update(f)
     faults = latches.shown(memory.faults, now_s, at_rest=stands_by(f))
     ended = _move(f, faults)

@@ -83,7 +83,7 @@ class BayRunner:
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
         self._rules = Rules.of(bay)
-        self._store, self._say, self._answers = store, say, Answers(store)
+        self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
         self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
         self._revision = 0  # the one that keeps this bay's memory
         self._ending = ""
@@ -157,6 +157,10 @@ class BayRunner:
                 self._asked = [one for one in self._asked if one.request is Request.STOP]
             self._asked.append(asked)
 
+    def _withdraw(self) -> None:
+        """Hold, as after a stop: a start could not be kept."""
+        self.ask(Asked(Request.STOP))
+
     def _take_asked(self) -> list[Asked]:
         """The request whose turn it is, as often as it was made in a row: one step answers all of them."""
         with self._asking:
@@ -169,7 +173,7 @@ class BayRunner:
 
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
-        asked = self._take_asked()
+        asked, before = self._take_asked(), self._revision
         try:
             self._step(now_s, asleep_s, asked[0].request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
@@ -177,7 +181,8 @@ class BayRunner:
             self._failed(error, now_s, asked[0].request if asked else None)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         for one in asked:
-            self._answers.give(one, self.decision.answer if self.decision else "", self._revision, now_s)
+            answer, changed = self.decision.answer if self.decision else "", self._revision != before
+            self._answers.give(one, answer, self._revision, now_s, changed=changed)
         self._answers.look(now_s)
 
     def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:

@@ -97,7 +97,7 @@ LINES: tuple[Seed, ...] = (
         "line",
         "estop --leave-held leaves alone what a stranger has locked",
         ("tests/guardian/test_laststop.py::test_a_strangers_lock_keeps_no_stop_away",),
-        (f"{LASTRESORT}lastline.py", "        if holder(name, (os.getpid(),)).ours:", "        if True:"),
+        (f"{LASTRESORT}bareport.py", "        if holder(name, (os.getpid(),)).ours:", "        if True:"),
     ),
 )
 
