@@ -6,10 +6,12 @@ from orchestrator.core import latches
 from orchestrator.core.memory import Memory
 from orchestrator.model import Request, State
 
-STOPPED = "stopped by the operator; start to go on"
+STOPPED = "stopped by the operator"
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
-RESET = "reset by the operator; start to go on"
+RESET = "reset by the operator"
+#: The holds that are an operator's own doing.
+OWN = frozenset({STOPPED, RESET})
 
 
 def hear(memory: Memory, request: Request, now_s: float) -> str:

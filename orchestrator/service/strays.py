@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from orchestrator.devices.charger import ChargerPort
-from orchestrator.model import STOP, ChargerReading, Operation
+from orchestrator.model import STOP, Alarm, ChargerReading, Operation
 from orchestrator.service.closing import close_all
-from orchestrator.service.past import START, Place, shown
+from orchestrator.service.past import Place, shown
 from orchestrator.service.store import Store
 
 #: A charger that delivers no more than this delivers nothing: its measurement is no better.
@@ -86,13 +86,20 @@ class Strays:
 
     def _remember(self, stray: _Stray, *, running: bool) -> None:
         persisted = self._store.past(stray.place)
-        why = f"the station file had no bay on {shown(stray.place.port)} while its charger was running{START}"
+        why = f"the station file had no bay on {shown(stray.place.port)} while its charger was running"
         self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
 
     @property
     def unverified(self) -> list[str]:
         """Those that may be running still."""
         return [str(stray.place) for stray in self._strays if stray.verified_s is None]
+
+    @property
+    def alarm(self) -> Alarm:
+        """Somebody must find out why such a charger is there, also when it stands by."""
+        if self.unverified:
+            return Alarm.DANGER
+        return Alarm.ATTENTION if self._strays else Alarm.NONE
 
     @property
     def ports(self) -> Iterable[ChargerPort]:
@@ -105,7 +112,7 @@ class Strays:
             {
                 "bay": stray.place.bay,
                 "port": stray.place.port,
-                "state": "STOPPING" if stray.verified_s is None else "IDLE",
+                "state": "STOPPING" if stray.verified_s is None else "HELD",
                 "verified": stray.verified_s is not None,
                 "problem": stray.port.view[1].problem,
             }
