@@ -11,6 +11,7 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import finished
 from orchestrator.core.machine import RESTING, Trigger
+from orchestrator.core.operator import RESET
 from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, verified
 from orchestrator.core.witnesses.standby import current_without_order, sees_current
 from orchestrator.model import ENERGISED, ActiveFault, Effect, State
@@ -29,6 +30,7 @@ RECHARGE_DROP_PCT = 3.0
 LEADS = {
     Trigger.LOSE: State.OFFLINE,
     Trigger.REST: State.IDLE,
+    Trigger.HOLD: State.HELD,
     Trigger.SUSPEND: State.SUSPENDED,
     Trigger.FILL: State.FULL,
     Trigger.TRIP: State.TRIPPED,
@@ -161,10 +163,10 @@ def _rest(f: Facts, faults: Faults) -> Course:
     if state is State.TRIPPED:
         if trigger is Trigger.TRIP:
             return None, reason
-        return Trigger.RESET, "reset by the operator"
+        return Trigger.RESET, _to_go_on(f, RESET)
     if state is State.QUALIFYING and trigger is Trigger.QUALIFY:
         return _qualifying(f)
-    if trigger is Trigger.QUALIFY and state not in (State.IDLE, State.FULL, State.SUSPENDED):
+    if trigger is Trigger.QUALIFY and state not in (State.IDLE, State.HELD, State.FULL, State.SUSPENDED):
         return (Trigger.REST if f.memory.session is None else Trigger.SUSPEND), reason
     return (None if LEADS.get(trigger) is state else trigger), reason
 
@@ -178,10 +180,10 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
     if lost:  # a trip promises a stop that was verified: first the line
         return Trigger.LOSE, _offline_reason(f)
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
-    if waits is not None:
-        return Trigger.REST, waits.text
+    if waits is not None:  # its advice ends with the start
+        return Trigger.HOLD, f"{waits.text}: {_start(f)}"
     if memory.hold:
-        return Trigger.REST, memory.hold
+        return Trigger.HOLD, _to_go_on(f, memory.hold)
     if f.snapshot.ending:  # the charge goes on after it
         return (Trigger.REST if memory.session is None else Trigger.SUSPEND), f.snapshot.ending
     if memory.paused:
@@ -197,6 +199,15 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
     if worst is not None and worst.effect >= Effect.NO_START:
         return Trigger.SUSPEND, worst.text + latches.goes_on(f)
     return (Trigger.QUALIFY if wanted else Trigger.REST), why
+
+
+def _to_go_on(f: Facts, held: str) -> str:
+    """Why a person must start, and how."""
+    return f"{held}; to go on: {_start(f)}"
+
+
+def _start(f: Facts) -> str:
+    return f"orchestrator start {f.rules.bay.name}"
 
 
 def _absent(f: Facts) -> tuple[Trigger, str] | None:

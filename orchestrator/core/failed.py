@@ -10,7 +10,7 @@ from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.safestop import OBEY_STOP_S
-from orchestrator.model import STOP, Decision, Request, Snapshot, State
+from orchestrator.model import STOP, Alarm, Decision, Request, Snapshot, State
 
 FAULT = "internal"
 ANSWERS = "this is a defect of the software; the charger is being stopped"
@@ -42,8 +42,9 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     )
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
     answer = f"internal error: {error}; {ANSWERS}" if refused else ""
+    level = Alarm.DANGER if out else Alarm.NONE
     decision = Decision(
-        memory.state, memory.reason, STOP, faults=shown(memory.faults, now_s), alarm=out, closed=memory.closed,
+        memory.state, memory.reason, STOP, faults=shown(memory.faults, now_s), alarm=level, closed=memory.closed,
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory

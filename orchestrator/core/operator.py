@@ -13,10 +13,12 @@ from orchestrator.model import ENERGISED, Request, State
 
 #: A charge has been started already.
 AT_WORK = ENERGISED | {State.QUALIFYING}
-STOPPED = "stopped by the operator; start to go on"
+STOPPED = "stopped by the operator"
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
-RESET = "reset by the operator; start to go on"
+RESET = "reset by the operator"
+#: The holds that are an operator's own doing.
+OWN = frozenset({STOPPED, RESET})
 OUT_OF_CONTROL = (
     "the charger was not seen to stop: cut its mains; nothing can be started or reset here before it has stood by for "
     f"{LASTS_S:g} s"

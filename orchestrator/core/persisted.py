@@ -102,7 +102,7 @@ class Persisted:
         faults = {name: _fault(fault, now_s) for name, fault in self.faults.items() if name in ROW}
         if self.running:
             faults["found_running"] = FaultMemory(raised_s=now_s, text=UNFINISHED)
-        unknown = [f"{one.text or name}; start to go on" for name, one in self.faults.items() if name not in ROW]
+        unknown = [one.text or name for name, one in self.faults.items() if name not in ROW]
         session = self.session
         memory = Memory(
             hold=self.hold or "; ".join(unknown),

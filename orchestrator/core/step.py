@@ -6,6 +6,7 @@ facts → what has lasted → the operator's request → faults → the trigger,
 from dataclasses import replace
 
 from orchestrator.core import latches, limits
+from orchestrator.core.alarm import alarm
 from orchestrator.core.contactor import closes
 from orchestrator.core.course import course
 from orchestrator.core.facts import Facts
@@ -41,7 +42,9 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
 }
 #: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
 #: not end it: its limits would begin anew with each of them.
-SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.TRIPPED})
+SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})
+#: … but who waits for a person, or no longer does, has come no farther: what a restart has left open stays open.
+ALIKE = frozenset({State.IDLE, State.HELD})
 
 
 def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
@@ -70,20 +73,13 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
             setpoint=setpoint,
             step=chosen,
             faults=faults,
-            alarm=_alarm(memory),
+            alarm=alarm(memory, faults),
             closed=memory.closed,
             session=ended or memory.session,
             answer=answer,
         ),
         memory,
     )
-
-
-def _alarm(memory: Memory) -> bool:
-    """People must know: a charger does not obey, or nobody knows whether the one that ran has stopped."""
-    unknown = memory.unverified and memory.state in (State.STARTING, State.OFFLINE)
-    locked = memory.faults.get("port_locked")
-    return memory.state is State.UNCONTROLLABLE or unknown or (locked is not None and locked.raised_s is not None)
 
 
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
@@ -99,7 +95,8 @@ def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
             memory.stop_reason = reason
     if memory.session is None or not _is_over(f, before):
         return None
-    ended = replace(memory.session, result=memory.stop_reason if before is State.STOPPING else reason)
+    held = memory.hold if memory.state is State.HELD else ""  # the rest of that reason is what to do next
+    ended = replace(memory.session, result=memory.stop_reason if before is State.STOPPING else held or reason)
     memory.session = None
     return ended
 
@@ -108,8 +105,9 @@ def _is_over(f: Facts, before: State) -> bool:
     """Whether the open charge has ended. One that the last run of the service left open ends with its battery."""
     exchanged = f.memory.faults.get("battery_exchanged")
     another = f.departed or (exchanged is not None and exchanged.raised_s is not None)
-    goes_on = f.memory.state is before or before is State.STARTING
-    return f.memory.state in SESSION_ENDS and (another or not goes_on)
+    after = f.memory.state
+    goes_on = after is before or before is State.STARTING or {before, after} == ALIKE
+    return after in SESSION_ENDS and (another or not goes_on)
 
 
 def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step | None]:

@@ -19,6 +19,7 @@ from orchestrator.interlock import Grant, grant
 from orchestrator.model import (
     ENERGISED,
     STOP,
+    Alarm,
     BatteryLink,
     BatteryReading,
     ChargerLink,
@@ -41,7 +42,9 @@ from orchestrator.service.store import Store
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
 #: The states that a charger was verified for: it stands by.
-VERIFIED = frozenset({State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE})
+VERIFIED = frozenset(
+    {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE}
+)
 
 
 class Charger(Protocol):
@@ -107,6 +110,11 @@ class BayRunner:
         return decision is not None and decision.state in VERIFIED and decision.command is None
 
     @property
+    def alarm(self) -> Alarm:
+        """How urgently people must look at it."""
+        return self.decision.alarm if self.decision is not None else Alarm.NONE
+
+    @property
     def owes(self) -> bool:
         """Somebody waits for an answer."""
         return bool(self._asked or self._answers.waiting)
@@ -122,7 +130,7 @@ class BayRunner:
         """
         self._ending = f"the service ends: {why}"
         if not orderly and self.decision is not None and self.decision.state in ENERGISED:
-            self._waits = f"the last run ended in mid-charge: {why}; start to go on"
+            self._waits = f"the last run ended in mid-charge: {why}"
 
     def offer(self, bay: Bay | None) -> str:
         """Take another policy over at the next standby; what will come of it. From any thread.
@@ -198,7 +206,7 @@ class BayRunner:
             self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)
             self._keep(self._memory, now_s)
         except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
-            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
+            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=Alarm.DANGER)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         self._take_over()

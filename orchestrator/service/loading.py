@@ -8,13 +8,13 @@ from pathlib import Path
 
 from orchestrator.core.persisted import Persisted
 from orchestrator.service.disk import read_file
-from orchestrator.service.past import START, Entry, Place, past_of, settled
+from orchestrator.service.past import Entry, Place, past_of, settled
 from orchestrator.service.stateformat import Stamp, decode, decode_first
 
 FILE, FIRST_FILE = "persisted.json", "kept.json"
 #: Far more than any station needs.
 MOST_BYTES = 16_000_000
-NOBODY_KNOWS = f"nobody knows which faults were latched{START}"
+NOBODY_KNOWS = "nobody knows which faults were latched"
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,6 @@ from orchestrator.config.station import Bay, Rs485
 from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.model import ControlMode
 
-START = "; start to go on"
-
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -70,7 +68,7 @@ def past_of(place: Place, entries: Sequence[Entry], file: str) -> Persisted:
     if own is None and [entry.place for entry in others] == [Place(place.bay)]:
         return others[0].persisted  # the first format knew names only
     if not others:
-        return own.persisted if own else Persisted(hold=f"{place} is not in {file}: nobody knows its past{START}")
+        return own.persisted if own else Persisted(hold=f"{place} is not in {file}: nobody knows its past")
     sentences = [f"{_moved(entry.place, place)}: see what is wired where" for entry in others]
     return merged([*([own.persisted] if own else []), *(entry.persisted for entry in others)], sentences)
 
@@ -96,7 +94,7 @@ def shown(port: str) -> str:
 
 def merged(parts: Sequence[Persisted], sentences: Sequence[str]) -> Persisted:
     """All of them together, as the strictest would have it, held for `sentences` and for whatever held one of them."""
-    holds = [*sentences, *(part.hold.removesuffix(START) for part in parts if part.hold)]
+    holds = [*sentences, *(part.hold for part in parts if part.hold)]
     faults: dict[str, PersistedFault] = {}
     for part in parts:
         for name, fault in part.faults.items():
@@ -105,7 +103,7 @@ def merged(parts: Sequence[Persisted], sentences: Sequence[str]) -> Persisted:
     fulls = [part.full_pct for part in parts if part.full_pct is not None]
     return Persisted(
         running=any(part.running for part in parts),
-        hold="; ".join(dict.fromkeys(holds)) + START if holds else "",
+        hold="; ".join(dict.fromkeys(holds)),
         paused=any(part.paused for part in parts),
         faults=faults,
         resets=tuple(sorted({reset for part in parts for reset in part.resets}, reverse=True)),

@@ -21,7 +21,7 @@ from orchestrator.model import (
 Line = tuple[str, dict[str, object]]  #: kind, fields
 
 #: States in which every step is the same until something happens.
-QUIET = frozenset({State.IDLE, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
+QUIET = frozenset({State.IDLE, State.HELD, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
 #: What of a snapshot is about this service and its contactor.
 OURS = (
     "internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem", "waits", "moves",

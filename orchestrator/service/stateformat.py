@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from orchestrator.config.station import Rs485
 from orchestrator.core.persisted import Persisted, from_first_format
@@ -13,6 +13,8 @@ from orchestrator.service.typed import MOST, structure
 FORMAT = 2
 #: Before this moment (2024-01-01) no clock that was ever set can have been.
 NEVER_SET_S = 1_704_067_200.0
+#: Until there was the state HELD, a hold ended with what to do about it; the bay itself says that now.
+OLD_END = "; start to go on"
 #: What stands beside a bay's persisted state.
 PLACE = ("bay", "port", "can", "node_id", "control", "rs485", "run")
 TOO_DEEP = "it is nested deeper than anything that this service writes"
@@ -94,6 +96,7 @@ def _entries(values: object, age_s: float) -> Iterator[Entry]:
         if not value.keys() >= NEEDED:
             raise ValueError(f"{', '.join(sorted(NEEDED - value.keys()))} is missing")
         persisted: Persisted = structure({key: one for key, one in value.items() if key not in PLACE}, Persisted)
+        persisted = replace(persisted, hold=persisted.hold.removesuffix(OLD_END))
         yield Entry(place, persisted.aged(age_s), structure(value.get("run"), int))
 
 
@@ -128,4 +131,4 @@ def _first(value: object) -> Persisted:
     plain = structure({key: one for key, one in value.items() if key != "faults"}, _First)
     faults = {structure(name, str): structure(text, str) for name, text in value["faults"].items()}
     kept = {name: from_first_format(name, text) for name, text in faults.items()}
-    return Persisted(running=plain.running, hold=plain.hold, paused=plain.paused, faults=kept)
+    return Persisted(running=plain.running, hold=plain.hold.removesuffix(OLD_END), paused=plain.paused, faults=kept)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.config.station import Station
 from orchestrator.core.facts import CHARGER_STALE_S, FAST_STALE_S, SLOW_STALE_S
-from orchestrator.model import BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
+from orchestrator.model import Alarm, BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
 from orchestrator.service.records import command_fields, session_fields
 
 #: What of a charger's reading the status shows; `t_s` is when it was asked for, in monotonic seconds of this machine.
@@ -46,26 +46,35 @@ def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, 
             }
             for fault in decision.faults
         ],
-        "alarm": decision.alarm,
+        "alarm": _level(decision.alarm),
         "session": session_fields(decision.session) if decision.session else None,
     }
 
 
 def station_status(
     station: Station,
+    alarm: Alarm,
     bays: list[dict[str, object]],
     journal_problem: str,
     unkept: str = "",
     strays: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, object]:
-    """The whole station. `strays` are chargers of bays that the station file has not any more."""
+    """The whole station. `alarm` is the worst of all its bays and strays, also where `bays` are only some of them.
+
+    `strays` are chargers of bays that the station file has not any more.
+    """
     return {
         "station": station.station,
+        "alarm": _level(alarm),
         "bays": bays,
         "strays": list(strays),
         "journal": {"problem": journal_problem},
         "persisted": {"problem": unkept},
     }
+
+
+def _level(alarm: Alarm) -> str:
+    return alarm.name.lower()
 
 
 def _setpoint(setpoint: Setpoint) -> dict[str, object]:

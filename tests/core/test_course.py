@@ -13,6 +13,7 @@ from orchestrator.model import (
     ENERGISED,
     STOP,
     Action,
+    Alarm,
     ChargeMode,
     ControlMode,
     Effect,
@@ -205,7 +206,7 @@ def test_full_too_early_is_no_full() -> None:
     tapers_off(world)
     charger_says_full(world)
     world.run(2)
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
     assert "early_full" in world.raised
     assert world.memory.full_pct is None
 
@@ -217,7 +218,7 @@ def test_a_standby_that_somebody_orders_is_not_named_full() -> None:
     world.run(2)
     assert set(world.raised) == {"stopped_by_itself"}
     assert "not taken for full" in world.decision.reason
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
 
 
 def test_early_depends_on_where_the_policy_ends() -> None:
@@ -238,7 +239,7 @@ def test_a_charger_that_is_not_believed_stopped_by_itself() -> None:
     charger_says_full(world)
     world.run(2)
     assert set(world.raised) == {"stopped_by_itself"}
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
 
 
 def test_plain_standby_is_not_full() -> None:
@@ -380,15 +381,16 @@ def test_the_stricter_of_policy_and_station_counts() -> None:
 #: What becomes of each request in each state: the answer's beginning, and where the bay is ten seconds later.
 VERBS: dict[Request, dict[State, tuple[str, State]]] = {
     Request.STOP: {
-        S.STARTING: ("", S.IDLE),
-        S.OFFLINE: ("", S.IDLE),
-        S.IDLE: ("", S.IDLE),
-        S.QUALIFYING: ("", S.IDLE),
-        S.PRECHARGE_PULSE: ("", S.IDLE),
-        S.PRECHARGE_CONTINUOUS: ("", S.IDLE),
-        S.CHARGING: ("", S.IDLE),
-        S.FULL: ("", S.IDLE),
-        S.SUSPENDED: ("", S.IDLE),
+        S.STARTING: ("", S.HELD),
+        S.OFFLINE: ("", S.HELD),
+        S.IDLE: ("", S.HELD),
+        S.HELD: ("", S.HELD),
+        S.QUALIFYING: ("", S.HELD),
+        S.PRECHARGE_PULSE: ("", S.HELD),
+        S.PRECHARGE_CONTINUOUS: ("", S.HELD),
+        S.CHARGING: ("", S.HELD),
+        S.FULL: ("", S.HELD),
+        S.SUSPENDED: ("", S.HELD),
         S.STOPPING: ("", S.UNCONTROLLABLE),  # it is deaf in this world
         S.TRIPPED: ("", S.TRIPPED),
         S.UNCONTROLLABLE: ("", S.UNCONTROLLABLE),
@@ -397,6 +399,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.STARTING: ("", S.SUSPENDED),
         S.OFFLINE: ("", S.SUSPENDED),
         S.IDLE: ("", S.SUSPENDED),
+        S.HELD: ("not running: stopped by the operator", S.HELD),
         S.QUALIFYING: ("", S.SUSPENDED),
         S.PRECHARGE_PULSE: ("", S.SUSPENDED),
         S.PRECHARGE_CONTINUOUS: ("", S.SUSPENDED),
@@ -411,6 +414,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.STARTING: ("nothing to start: STARTING: ", S.CHARGING),
         S.OFFLINE: ("nothing to start: OFFLINE: ", S.OFFLINE),
         S.IDLE: ("nothing to start: IDLE: ", S.IDLE),  # 99 %: nothing to do
+        S.HELD: ("", S.CHARGING),
         S.QUALIFYING: ("", S.CHARGING),
         S.PRECHARGE_PULSE: ("", S.PRECHARGE_PULSE),
         S.PRECHARGE_CONTINUOUS: ("", S.PRECHARGE_CONTINUOUS),
@@ -425,6 +429,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.STARTING: ("nothing to reset: STARTING: ", S.CHARGING),
         S.OFFLINE: ("nothing to reset: OFFLINE: ", S.OFFLINE),
         S.IDLE: ("nothing to reset: IDLE: ", S.IDLE),
+        S.HELD: ("nothing to reset: HELD: ", S.HELD),
         S.QUALIFYING: ("nothing to reset: QUALIFYING: ", S.CHARGING),
         S.PRECHARGE_PULSE: ("nothing to reset: PRECHARGE_PULSE: ", S.PRECHARGE_PULSE),
         S.PRECHARGE_CONTINUOUS: ("nothing to reset: PRECHARGE_CONTINUOUS: ", S.PRECHARGE_CONTINUOUS),
@@ -432,7 +437,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.FULL: ("nothing to reset: FULL: ", S.FULL),
         S.SUSPENDED: ("nothing to reset: SUSPENDED: ", S.SUSPENDED),
         S.STOPPING: ("nothing to reset: STOPPING: ", S.UNCONTROLLABLE),
-        S.TRIPPED: ("", S.IDLE),
+        S.TRIPPED: ("", S.HELD),
         S.UNCONTROLLABLE: ("the charger was not seen to stop: cut its mains", S.UNCONTROLLABLE),
     },
 }
@@ -459,14 +464,14 @@ def test_a_stop_holds_until_a_start() -> None:
         world.ask(Request.STOP)
         world.values["soc_pct"] = 40.0
         world.run(100)
-        assert world.is_in(S.IDLE)
-        assert world.decision.reason == STOPPED
+        assert world.is_in(S.HELD)
+        assert world.decision.reason == f"{STOPPED}; to go on: orchestrator start bay-1"
         assert world.ask(Request.PAUSE) == f"not running: {STOPPED}"
         world.leave()
         world.run(5)
         world.arrive()
         world.run(20)
-        assert world.is_in(S.IDLE)  # also for another battery
+        assert world.is_in(S.HELD)  # also for another battery
         assert world.ask(Request.START) == ""
         world.until(S.CHARGING, 10)
 
@@ -487,7 +492,7 @@ def test_a_stop_while_tripped_is_remembered_over_the_reset() -> None:
     world.ask(Request.STOP)
     world.ask(Request.RESET)
     world.run(20)
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
 
@@ -505,7 +510,7 @@ def test_a_charger_that_comes_back_running_is_stopped_and_waits_for_a_person() -
     assert world.tick().state is S.STOPPING
     world.deaf.clear()
     world.run(20)
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
     assert "found running" in world.decision.reason
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
@@ -539,7 +544,7 @@ def test_a_line_that_dies_in_mid_charge_and_comes_back() -> None:
     assert not sessions(world)  # its limits go on, too
     world.charger_answers = True
     world.until(S.SUSPENDED, 11)
-    assert not world.decision.alarm
+    assert world.decision.alarm is Alarm.NONE
     world.until(S.CHARGING, 30)
     assert world.decision.session is not None
     assert world.decision.session.charged_ah > 0  # that of before
@@ -571,7 +576,7 @@ def test_a_new_fault_at_rest_has_the_charger_stopped_and_verified_again() -> Non
     assert world.tick().state is S.STOPPING
     assert world.decision.command == STOP
     assert world.tick().state is S.STOPPING  # one reply is not enough
-    assert world.tick().state is S.IDLE
+    assert world.tick().state is S.HELD
 
 
 def test_a_trip_is_verified_again_when_another_fault_comes() -> None:
@@ -664,7 +669,7 @@ def test_nothing_is_counted_in_standby() -> None:
 
 
 ENDS: tuple[tuple[Callable[[World], object], State, str], ...] = (
-    (lambda world: world.ask(Request.STOP), S.IDLE, STOPPED),
+    (lambda world: world.ask(Request.STOP), S.HELD, STOPPED),
     (lambda world: world.values.update(soc_pct=100.0), S.FULL, "full: SOC 100 %"),
     (lambda world: setattr(world, "internal", "KeyError()"), S.TRIPPED, "this is a defect of the software"),
     (lambda world: world.leave(), S.IDLE, "the BMU (node 0x10) has stopped answering"),

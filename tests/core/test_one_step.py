@@ -59,7 +59,8 @@ SILENT_BMU: dict[str, Any] = {
     "bmu": dict.fromkeys(("voltage_v", "current_a", "status", "temperature_c", "soc_pct", "soh_pct")),
     "bmu_link": {"online": False},
 }
-FULL, SUSPENDED, OFFLINE, IDLE = State.FULL, State.SUSPENDED, State.OFFLINE, State.IDLE
+FULL, SUSPENDED, OFFLINE = State.FULL, State.SUSPENDED, State.OFFLINE
+IDLE, HELD = State.IDLE, State.HELD
 QUALIFYING, STOPPING, STARTING, TRIPPED = State.QUALIFYING, State.STOPPING, State.STARTING, State.TRIPPED
 NO_RULE = "precharge without a rule for it, or without the pack's voltage"
 CHECKING = "checking charger and battery before a charge"
@@ -113,10 +114,10 @@ GOES = (
     *(Edge(goes, (None, "the charger on /dev/ttyX does not answer"), {}, OFFLINE, **how) for how in (
         {"charger": {**STANDS_BY, "t_s": ago(9)}}, {"charger": STANDS_BY, "charger_link": {"online": False}})),
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, IDLE, charger={"t_s": ago(9)}),
-    Edge(goes, (Trigger.REST, "held"), {"hold": "held"}, FULL, **AT_REST),
-    Edge(goes, (None, "held"), {"hold": "held"}, IDLE, **AT_REST),
+    Edge(goes, (Trigger.HOLD, "held; to go on: orchestrator start bay-1"), {"hold": "held"}, FULL, **AT_REST),
+    Edge(goes, (None, "held; to go on: orchestrator start bay-1"), {"hold": "held"}, HELD, **AT_REST),
     Edge(goes, (Trigger.SUSPEND, "paused by the operator; start to go on"), {"paused": True}, IDLE, **AT_REST),
-    Edge(goes, (Trigger.RESET, "reset by the operator"), {}, TRIPPED, **AT_REST),
+    Edge(goes, (Trigger.RESET, "reset by the operator; to go on: orchestrator start bay-1"), {}, TRIPPED, **AT_REST),
     Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer"), {}, IDLE,
          **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0}, charger_link=STOP_SENT, snapshot={"connected": False}),
     Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted"), {}, IDLE, **AT_REST,
@@ -394,7 +395,7 @@ def test_from_stage_to_stage_the_charge_goes_on() -> None:
 def test_a_charge_that_ends_at_rest_says_why_it_ends_there() -> None:
     memory = {"session": BEGUN, "hold": "held", "stop_reason": "of before"}
     decision, after = whole(Edge(goes, None, memory, SUSPENDED, **AT_REST))
-    assert decision.state is IDLE
+    assert decision.state is HELD
     assert decision.session is not None
     assert decision.session.result == "held"
     assert after.session is None

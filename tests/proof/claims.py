@@ -59,9 +59,13 @@ def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterat
         yield "not told", f"another program has set its port up otherwise, and the status says {shown}"
     locked = tty.lock is charger.rig.wire and tty.present
     told.locked_s = (told.locked_s or now_s) if locked else None
-    if told.locked_s is not None and now_s - max(told.locked_s, judge.booted_s) > 2 * TOLD_S and not bay["alarm"]:
+    if (
+        told.locked_s is not None
+        and now_s - max(told.locked_s, judge.booted_s) > 2 * TOLD_S
+        and bay["alarm"] != "danger"
+    ):
         yield "not told", f"another program has its port, nobody is alarmed, and the status says {shown}"
-    if _runs_on(judge, charger) and now_s - judge.booted_s > UNHEARD_S and not bay["alarm"]:
+    if _runs_on(judge, charger) and now_s - judge.booted_s > UNHEARD_S and bay["alarm"] != "danger":
         yield "nobody is told", f"it runs since the last life, nobody is alarmed, and the status says {shown}"
     if any(fault["id"] == "internal" for fault in bay["faults"]):
         yield "exception", shown

@@ -273,7 +273,7 @@ class Judge:
                 continue
             for name, text in claims(self, charger, bay):
                 self.find(charger.number, name, text)
-            if bay["alarm"]:
+            if bay["alarm"] == "danger":
                 charger.named_s = self.time.now_s
             if bay["state"] == "TRIPPED":
                 charger.tripped_s = self.time.now_s if charger.tripped_s is None else charger.tripped_s

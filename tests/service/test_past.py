@@ -19,7 +19,7 @@ A = Place("bay-1", "/dev/a", "can0", 16)
 B = Place("bay-2", "/dev/b", "can0", 17)
 TRIPPED = Persisted(faults={"emergency": PersistedFault("EMCY 0x5000", latched=True, raised=60.0)})
 RUNNING = Persisted(running=True)
-HELD = Persisted(hold="stopped by the operator; start to go on")
+HELD = Persisted(hold="stopped by the operator")
 FILE = "persisted.json"
 
 
@@ -38,7 +38,7 @@ def test_its_own_past_is_taken_as_it_is() -> None:
 
 def test_a_bay_that_nobody_knows_is_held() -> None:
     past = past_of(Place("bay-3", "/dev/c", "can0", 18), [Entry(A, TRIPPED, 3)], FILE)
-    assert past == Persisted(hold=f"bay-3 on /dev/c is not in {FILE}: nobody knows its past; start to go on")
+    assert past == Persisted(hold=f"bay-3 on /dev/c is not in {FILE}: nobody knows its past")
 
 
 LAST = "when this service last ran, and"
@@ -64,7 +64,7 @@ MOVED = {
 def test_who_was_moved_is_held_with_all_that_was(name: str) -> None:
     place, said = MOVED[name]
     past = past_of(place, [Entry(A, replace(TRIPPED, running=True, paused=True), 3), Entry(B, HELD, 3)], FILE)
-    assert past.hold == f"{said}: see what is wired where; start to go on"
+    assert past.hold == f"{said}: see what is wired where"
     assert (past.running, past.paused, past.faults) == (True, True, TRIPPED.faults)
 
 

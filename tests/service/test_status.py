@@ -11,6 +11,7 @@ from orchestrator.config.shipped import shipped_dir
 from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S
 from orchestrator.model import (
     ActiveFault,
+    Alarm,
     BatteryLink,
     BatteryReading,
     ChargeMode,
@@ -88,7 +89,7 @@ def test_nothing_known_is_null() -> None:
         assert known.pop("old") == old
         ages_s = known.pop("age_s")
         assert {*known.values(), *(ages_s.values() if ages_s else (ages_s,))} == {None}
-    assert (status["step"], status["session"], status["faults"], status["alarm"]) == (None, None, [], False)
+    assert (status["step"], status["session"], status["faults"], status["alarm"]) == (None, None, [], "none")
 
 
 def test_what_is_known_is_in_the_devices_own_values() -> None:
@@ -139,8 +140,9 @@ def test_since_is_the_wall_clock() -> None:
 def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
     station = load_station(shipped_dir() / Path("configs/stations/one-bay.yaml"))
     stray = {"bay": "bay-9", "port": "/dev/x", "state": "STOPPING", "verified": False, "problem": ""}
-    assert station_status(station, [], "disk full", "worn", [stray]) == {
+    assert station_status(station, Alarm.DANGER, [], "disk full", "worn", [stray]) == {
         "station": "depot-1",
+        "alarm": "danger",
         "bays": [],
         "strays": [stray],
         "journal": {"problem": "disk full"},

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.core.faults import FAULTS, Clear
+from orchestrator.core.operator import OWN
 from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.errors import ServiceError
 from orchestrator.model import Session
@@ -23,7 +24,7 @@ from tests.service.disks import FULL, WornDisk
 from tests.waiting import wait_until
 
 A, B, C = (Place(f"bay-{number}", f"/dev/{number}", "can0", 15 + number) for number in (1, 2, 3))
-HELD = Persisted(hold="stopped by the operator; start to go on")
+HELD = Persisted(hold="stopped by the operator")
 TRIPPED = Persisted(faults={"emergency": PersistedFault("EMCY 0x5000", latched=True, raised=1.0)})
 CALLS = ("open", "write", "fsync", "replace", "close")
 
@@ -317,12 +318,27 @@ def test_the_first_format_is_read_once_and_moved_away(tmp_path: Path) -> None:
         assert store.past(A).hold == ""
 
 
+def test_a_hold_of_a_version_before_held_loses_the_end_that_said_what_to_do(tmp_path: Path) -> None:
+    """The bay says it now; the rest is what the operator did, and no alarm."""
+    with running(tmp_path, A) as store:
+        kept(store, store.put(A, HELD))
+    path = tmp_path / FILE
+    path.write_text(path.read_text().replace(HELD.hold, f"{HELD.hold}; start to go on"))
+    with running(tmp_path, A) as store:
+        assert store.past(A).hold == HELD.hold in OWN
+    path.unlink()
+    first = {"running": False, "hold": f"{HELD.hold}; start to go on", "paused": False, "faults": {}}
+    (tmp_path / FIRST_FILE).write_text(json.dumps({"bay-1": first}))
+    with running(tmp_path, A) as store:
+        assert store.past(A).hold == HELD.hold
+
+
 def test_what_is_lost_is_no_first_start(tmp_path: Path) -> None:
     (tmp_path / "events.jsonl").write_text("{}\n")
     with running(tmp_path) as store:
         assert store.past(A).hold == (
             f"{tmp_path / FILE} is lost, though this service has run here before: "
-            "nobody knows which faults were latched; start to go on"
+            "nobody knows which faults were latched"
         )
 
 
