@@ -60,7 +60,7 @@ def will_not_stop(f: Facts) -> str | None:
     if not sees_current(f):
         return None
     return (
-        f"the stop, which is repeated, is not obeyed: the BMU still sees {f.pack_a:.2f} A, the charger says "
+        f"nothing proves the stop, which is repeated: the BMU still sees {f.pack_a:.2f} A, the charger says "
         f"{f.reading.current_a:.2f} A"
     )
 
