@@ -123,13 +123,21 @@ def _out_of_control(f: Facts) -> str:
             "If the BMU shows it with the mains off too, restart the BMU"
         )
     since_s = memory.stopping_s if memory.stopping_s is not None else f.now_s - f.state_s
-    return f"{do} now: it has not obeyed the stop for {f.now_s - since_s:.0f} s: {_why(f)}"
+    so_long = f"{f.now_s - since_s:.0f} s"
+    if _heard(f) and f.runs:
+        return f"{do} now: it has not obeyed the stop for {so_long}: {_why(f)}"
+    return f"{do} now: nothing has proved for {so_long} that it obeyed the stop: {_why(f)}"
+
+
+def _heard(f: Facts) -> bool:
+    """What the charger says is of now. Only then may it be said not to obey: one that is not heard may have stopped."""
+    return f.charger.online and not f.charger.problem and f.reading is not None
 
 
 def _why(f: Facts) -> str:
     """What each witness says, the old marked as old."""
     sees = f"; the BMU sees {f.pack_a:.1f} A" if f.pack_a is not None else "; the BMU is not heard"
-    if f.charger.problem or not f.charger.online or f.reading is None:
+    if not _heard(f) or f.reading is None:
         heard = f.snapshot.charger
         last = f"; {heard.current_a:.2f} A, last heard {f.now_s - heard.t_s:.0f} s ago" if heard is not None else ""
         return (f.charger.problem or f"no answer on {f.rules.bay.charger.port}") + last + sees

@@ -538,8 +538,8 @@ def test_a_line_that_dies_in_mid_charge_and_comes_back() -> None:
     assert world.until(S.STOPPING, 2).reason.startswith("/dev/ttyX: no answer; check")
     world.until(S.UNCONTROLLABLE, 4)
     assert world.decision.reason == (
-        "CUT THE MAINS of this charger (/dev/ttyX) now: it has not obeyed the stop for 3 s: /dev/ttyX: no answer; "
-        "14.00 A, last heard 4 s ago; the BMU sees 0.0 A"
+        "CUT THE MAINS of this charger (/dev/ttyX) now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: "
+        "no answer; 14.00 A, last heard 4 s ago; the BMU sees 0.0 A"
     )
     assert not sessions(world)  # its limits go on, too
     world.charger_answers = True
@@ -555,7 +555,8 @@ def test_a_port_that_says_what_is_wrong_is_quoted() -> None:
     world.charger_link = replace(world.charger_link, online=False, problem="/dev/ttyX: no such port")
     world.charger_answers = False
     assert (
-        "now: it has not obeyed the stop for 3 s: /dev/ttyX: no such port; " in world.until(S.UNCONTROLLABLE, 5).reason
+        "now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: no such port; "
+        in world.until(S.UNCONTROLLABLE, 5).reason
     )
 
 

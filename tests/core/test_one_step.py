@@ -64,7 +64,9 @@ IDLE, HELD = State.IDLE, State.HELD
 QUALIFYING, STOPPING, STARTING, TRIPPED = State.QUALIFYING, State.STOPPING, State.STARTING, State.TRIPPED
 NO_RULE = "precharge without a rule for it, or without the pack's voltage"
 CHECKING = "checking charger and battery before a charge"
-NEVER = "CUT THE MAINS of this charger (/dev/ttyX) now: it has not obeyed the stop for 3 s: {}; the BMU sees 0.0 A"
+CUT = "CUT THE MAINS of this charger (/dev/ttyX) now: {} {}; the BMU sees 0.0 A"
+RUNS_ON = CUT.format("it has not obeyed the stop for 3 s:", "{}")
+NEVER = CUT.format("nothing has proved for 3 s that it obeyed the stop:", "{}")
 
 GOES = (
     Edge(goes, (None, "step 2 (8.0 A): because"), holding()),
@@ -96,7 +98,7 @@ GOES = (
     *(Edge(goes, (Trigger.STOP, NO_RULE), precharged(0), PULSE, **how)
       for how in ({"policy": NO_PRECHARGE}, {"bmu": {"voltage_v": None}})),
     Edge(goes, (None, "stopped for it"), {"reason": "stopped for it"}, STOPPING, 2.9),
-    Edge(goes, (Trigger.GIVE_UP, NEVER.format("it delivers 10.00 A")), state=STOPPING, state_s=3),
+    Edge(goes, (Trigger.GIVE_UP, RUNS_ON.format("it delivers 10.00 A")), state=STOPPING, state_s=3),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 0 s ago")), state=STOPPING,
          state_s=3, charger_link={"online": False}),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 9 s ago")), state=STOPPING,

@@ -1,11 +1,13 @@
 """What a status must say, or must not: held against the plant, which the service knows by its witnesses only."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from orchestrator.sim.charger_frames import Kind
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.recording import read
 
@@ -18,6 +20,8 @@ TOLD_S = 3.0
 UNHEARD_S = 6.0
 #: Who stands by with less than this is not full; with more than that it is not deeply discharged.
 FULL_SOC, DEEP_SOC = 0.86, 0.3
+#: What no status may say of a charger that has stood by for so long, and has said so.
+DISOBEYS, STOOD_S = re.compile("not obeyed|does not obey|still delivers"), 1.5
 LINE_FAULTS = frozenset({"line_taken_over", "line_changed"})
 #: The charges of a station begin this far apart.
 APART_S = 1.0
@@ -67,6 +71,8 @@ def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterat
         yield "not told", f"another program has its port, nobody is alarmed, and the status says {shown}"
     if _runs_on(judge, charger) and now_s - judge.booted_s > UNHEARD_S and bay["alarm"] != "danger":
         yield "nobody is told", f"it runs since the last life, nobody is alarmed, and the status says {shown}"
+    if DISOBEYS.search(shown) and _stands(charger, now_s) and _says(charger):
+        yield "false words", f"it stands since {now_s - charger.stood_s:.1f} s and says so, and the status says {shown}"
     if any(fault["id"] == "internal" for fault in bay["faults"]):
         yield "exception", shown
 
@@ -104,6 +110,18 @@ def _runs_on(judge: "Judge", charger: "Charger") -> bool:
     ours = charger.stopped_s < charger.told.ran_s < (judge.booted_s or 0.0)
     bad_disk = any(one.what == "slow" and ":disk" in one.detail for one in judge.script.hazards)
     return charger.flows and ours and not bad_disk
+
+
+def _stands(charger: "Charger", now_s: float) -> bool:
+    """It has not run for a moment since then."""
+    still_s = charger.rig.bay.charger.still_s
+    return bool(charger.stood_s) and now_s - charger.stood_s > STOOD_S and still_s > STOOD_S and not charger.flows
+
+
+def _says(charger: "Charger") -> bool:
+    """The charger can be heard, and tells the truth of its current."""
+    wire = charger.rig.wire
+    return not ({Kind.OPERATION, Kind.CURRENT} & {*wire.lies, *wire.liars} or wire.mute_tx or wire.mute_rx)
 
 
 def _honest(charger: "Charger") -> bool:

@@ -695,8 +695,8 @@ WORDS: tuple[Seed, ...] = (
         ("says standby", "cut off, then killed"),
         (
             f"{CORE}course.py",
-            '    return f"{do} now: it has not obeyed the stop for {f.now_s - since_s:.0f} s: {_why(f)}"',
-            "    return _why(f)",
+            '    so_long = f"{f.now_s - since_s:.0f} s"\n',
+            "    return _why(f)\n",
         ),
     ),
     scene(
