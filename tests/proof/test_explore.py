@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import pytest
 
 from orchestrator.model import ControlMode, State
+from orchestrator.workbench.gist import outline
 from orchestrator.workbench.processes import cores
 from orchestrator.workbench.prove.endings import reaches, settles
 from orchestrator.workbench.prove.exhaustive import here
-from orchestrator.workbench.prove.explore import Explorer, outline
+from orchestrator.workbench.prove.explore import Explorer
 from tests.proof.exploring import NEVER, changes_of_table, rules, small, walk_on
 
 
