@@ -36,9 +36,12 @@ def precharge_too_long(f: Facts) -> str | None:
 def time_limit(f: Facts) -> str | None:
     """FAULTS C17."""
     session, hours = f.memory.session, f.rules.policy.finish.max_hours
-    if session is None or session.energised_s <= hours * 3600:
+    if session is None:
         return None
-    return f"charging has taken {session.energised_s / 3600:.2f} h ({f.rules.policy.source.at('finish.max_hours')})"
+    took_s = session.energised_s + session.unseen_s
+    if took_s <= hours * 3600:
+        return None
+    return f"charging has taken {took_s / 3600:.2f} h ({f.rules.policy.source.at('finish.max_hours')})"
 
 
 def ah_limit(f: Facts) -> str | None:
@@ -48,10 +51,11 @@ def ah_limit(f: Facts) -> str | None:
         return None
     begun_pct = session.soc_start_pct or 0.0
     need = min(1.0, (100.0 - begun_pct + SOC_ERROR_PCT) / 100.0)
-    if session.charged_ah <= need * max_ah:
+    charged_ah = session.charged_ah + session.unseen_s / 3600 * f.rules.bay.limits.current_a
+    if charged_ah <= need * max_ah:
         return None
     at = f.rules.policy.source.at("finish.max_ah")
     return (
-        f"{session.charged_ah:.2f} Ah were charged since SOC {begun_pct:.0f} %: a whole charge may take {max_ah:g} Ah "
+        f"{charged_ah:.2f} Ah were charged since SOC {begun_pct:.0f} %: a whole charge may take {max_ah:g} Ah "
         f"({at}), so from there {need * max_ah:.2f} Ah"
     )
