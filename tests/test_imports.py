@@ -23,7 +23,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "protocol": ("errors", "keys", "model"),
     "config": ("errors", "keys", "model", "protocol.objects"),
     "interlock": ("config.policy", "config.station", "errors", "keys", "model"),
-    "core": ("config.policy", "config.station", "errors", "keys", "model"),
+    "core": ("config.amperes", "config.policy", "config.station", "errors", "keys", "model"),
     "link": ("errors", "keys", "model", "protocol"),
     # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from orchestrator.config.amperes import ranges
 from orchestrator.config.station import Limits
 from orchestrator.core.cells import chemistry
 from orchestrator.core.memory import Memory
@@ -128,16 +129,20 @@ def _bounds(rules: Rules) -> dict[str, set[float]]:
     volts = {policy.pack.voltage_v.low, rules.max_v}
     if policy.precharge is not None:
         volts |= {policy.precharge.below_v, policy.precharge.pulse.until_v}
-    if policy.finish.taper is not None:
-        volts.add(policy.finish.taper.above_v)
+    if rules.taper is not None:
+        volts.add(rules.taper.above_v)
     bounds = {
         "voltage_v": volts,
         "temperature_c": {rules.temperature_c.low, rules.temperature_c.high, policy.faults.temperature_trip_c},
-        "soc_pct": {policy.start.soc_below_pct, policy.recharge.soc_below_pct, policy.finish.soc_pct, 80.0},
+        "soc_pct": {policy.start.soc_below_pct, policy.recharge.soc_below_pct, policy.finish.target_soc_pct, 80.0},
         "soh_pct": {policy.pack.soh_min_pct},
     }
     for name, limits in bounds.items():
-        limits |= {band.from_ for band in getattr(policy.current, name) or ()}
+        if (table := getattr(policy.current, name)) is not None:
+            limits.update(band.from_ for band in table.rows)
+    for rule in policy.current.where:
+        for name, span in ranges(rule).items():
+            bounds[name] |= {span.low, span.high}
     return bounds
 
 
@@ -150,18 +155,26 @@ def _beyond(limits: Limits) -> dict[str, dict[str, float]]:
     }
 
 
+def _full(base: Shown, rules: Rules) -> Shown:
+    """At the target, or full: its current has tapered off at the end voltage."""
+    full = {**base.values, **_with(rules, "soc_pct", rules.policy.finish.target_soc_pct)}
+    if rules.policy.finish.target_soc_pct < 100 or rules.taper is None:
+        return replace(base, values=full)
+    end_v = min(max(full["voltage_v"], rules.taper.above_v + WITHIN_V), rules.max_v - NEAR["voltage_v"])
+    return replace(base, takes=0.01, values={**full, "voltage_v": end_v})
+
+
 def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
     """What no threshold cuts: a battery that leaves, falls silent, complains or lies."""
     pack, precharge = rules.policy.pack, rules.policy.precharge
     status = {**base.values, "status": float(1 << BatteryStatus.BMU_ERROR)}
     limit = {**base.values, "status": float(1 << BatteryStatus.LOW_TEMPERATURE)}
-    full = {**base.values, **_with(rules, "soc_pct", rules.policy.finish.soc_pct)}
     deep: dict[str, Shown] = {}
     if precharge is not None and rules.manual:
         low_v = (pack.voltage_v.low + precharge.below_v) / 2
         deep["deeply discharged"] = replace(base, values={**base.values, "voltage_v": low_v, "soc_pct": 1.0})
     return deep | {
-        "full": replace(base, values=full),
+        "full": _full(base, rules),
         "takes nothing": replace(base, takes=0.0),
         "tapers": replace(base, takes=0.01, values={**base.values, **_with(rules, "voltage_v", rules.max_v - 0.1)}),
         "of another kind": replace(base, values={**base.values, "voltage_v": pack.voltage_v.low, "soc_pct": 50.0}),
