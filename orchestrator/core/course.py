@@ -9,7 +9,7 @@ from dataclasses import replace
 from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
-from orchestrator.core.finish import finished
+from orchestrator.core.finish import finished, full_due, goes_full, target
 from orchestrator.core.machine import RESTING, Trigger
 from orchestrator.core.operator import RESET
 from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, verified
@@ -23,6 +23,8 @@ Faults = tuple[ActiveFault, ...]
 QUALIFY_S = 2.0
 #: A stage's voltage must have been reached for this long before the next stage begins.
 REACHED_S = 2.0
+#: A battery that is to be charged all the way once in so many days, and has this much, is as good as full.
+FULL_DUE_PCT = 98.0
 #: A full battery must have lost this much before it is charged again, however high the policy's threshold.
 RECHARGE_DROP_PCT = 3.0
 
@@ -57,6 +59,8 @@ def _energised(f: Facts, faults: Faults) -> Course:
         full = finished(f)
         if full is not None:
             f.memory.full_pct = f.soc
+            if goes_full(f):
+                f.memory.full_s = f.now_s
             return Trigger.STOP, f"full: {full}"
         return None, _charging_reason(f, faults)
     return _precharging(f)
@@ -71,7 +75,17 @@ def _charging_reason(f: Facts, faults: Faults) -> str:
     if f.memory.raise_s is not None:
         hold_s, at = f.rules.policy.current.raise_after_s, f.rules.policy.source.at("current.raise_after_s")
         rises = f"; a higher step is allowed, and taken after {hold_s:g} s ({at})"
-    return f"step {chosen.index} ({chosen.current_a:.1f} A): {chosen.rule}{limited}{rises}"
+    holds = _holds(f)
+    return f"{chosen.label}: {chosen.rule}{limited}{rises}{holds}"
+
+
+def _holds(f: Facts) -> str:
+    """A full pack stays on, to balance: for how long still."""
+    session, finish = f.memory.session, f.rules.policy.finish
+    if session is None or not session.full:
+        return ""
+    left_min, at = finish.hold_min - session.held_s / 60, f.rules.policy.source.at("finish.hold_min")
+    return f"; full, and held at the top for another {max(left_min, 0):.0f} min ({at})"
 
 
 def _precharging(f: Facts) -> Course:
@@ -235,9 +249,11 @@ def _wanted(f: Facts) -> tuple[bool, str]:
     if f.soc is None:
         return False, "a battery is there; its SOC is not known yet"
     if full_pct is None and f.memory.session is not None:  # what was interrupted is brought to its end
-        key, threshold = "finish.soc_pct", policy.finish.soc_pct
+        threshold, key = target(f)
     elif full_pct is None:
         key, threshold = "start.soc_below_pct", policy.start.soc_below_pct
+    elif full_due(f):  # it is full by its target only
+        key, threshold = "finish.full_every_days", FULL_DUE_PCT
     else:  # it may have been full by taper at less than the policy's SOC: it must have fallen since
         key, threshold = "recharge.soc_below_pct", min(policy.recharge.soc_below_pct, full_pct - RECHARGE_DROP_PCT)
     below = f.soc < threshold

@@ -1,28 +1,75 @@
-"""When a charge is over, by the policy. Time and Ah limits are faults and stand in the fault table."""
+"""When a charge is over, by the policy. Time and Ah limits are faults and stand in the fault table.
 
+A charge goes to the policy's target, or all the way: with a target of 100 %, and once in so many days. What is all the
+way, the pack tells: its current has tapered off at the end voltage, the charger says full after a taper, the BMU's SOC
+if the policy trusts it. Then it may stay on for a while, to balance.
+"""
+
+from orchestrator.config.amperes import END_SHARE, end_v
+from orchestrator.config.policy import Needs
 from orchestrator.core.facts import Facts
 
 #: A charger that ends a charge below this state of charge is wrong, or the BMU is.
 EARLY_FULL_PCT = 80.0
-#: Where a policy says nothing else, a full pack has this share of its highest voltage.
-END_SHARE = 0.97
 #: Less than this share of what was set is a current that has tapered off.
 TAPERED_SHARE = 0.5
 #: A current that has just begun is low, too: it must have flowed for this long.
 SEEN_TAPER_S = 5.0
+#: A pack that was found full and has lost this much is not full any more.
+FALLEN_PCT = 3.0
+DAY_S = 86400.0
 
 
 def finished(f: Facts) -> str | None:
-    """Why the battery is full, with the policy's line; None while it is not."""
+    """Why the charge is over, with the policy's line; None while it is not."""
     rule, source = f.rules.policy.finish, f.rules.policy.source
-    if f.soc is not None and f.soc >= rule.soc_pct:
-        return f"SOC {f.soc:.0f} % reached {rule.soc_pct:g} % ({source.at('finish.soc_pct')})"
-    if rule.charger_full and f.full_mode and f.soc is not None and f.soc >= early_below_pct(f) and ends_full(f):
-        return f"the charger reports full (mode 5) ({source.at('finish.charger_full')})"
-    taper, since_s = rule.taper, f.memory.taper_s
-    if taper is not None and since_s is not None and f.now_s - since_s >= taper.for_s:
-        return f"{f.amps:.2f} A, tapered below {taper.below_a:g} A for {taper.for_s:g} s ({source.at('finish.taper')})"
-    return None
+    if not goes_full(f) and f.soc is not None and f.soc >= rule.target_soc_pct:
+        return f"SOC {f.soc:.0f} % reached {rule.target_soc_pct:g} % ({source.at('finish.target_soc_pct')})"
+    ended = _by_charger(f)
+    if ended is not None:
+        return ended
+    session = f.memory.session
+    full = known_full(f) if session is None else session.full
+    if not full or session is None or not goes_full(f):  # above a target nothing is held
+        return full or None
+    if session.held_s < rule.hold_min * 60:
+        return None
+    held = f", held for {rule.hold_min:g} min ({source.at('finish.hold_min')})" if rule.hold_min else ""
+    return full + held
+
+
+def known_full(f: Facts) -> str:
+    """By what the pack is known to be full now; "" while it is not."""
+    rule = f.rules.policy.finish.full
+    signs = {"soc_pct": _by_soc(f), "taper": _by_taper(f), "charger": _by_charger(f) or ""}
+    if rule.needs is Needs.ANY:
+        return next((text for text in signs.values() if text), "")
+    needed = [name for name in signs if getattr(rule, name) not in (None, False)]
+    return " and ".join(signs[name] for name in needed) if all(signs[name] for name in needed) else ""
+
+
+def _by_soc(f: Facts) -> str:
+    full_pct, source = f.rules.policy.finish.full.soc_pct, f.rules.policy.source
+    if full_pct is None or f.soc is None or f.soc < full_pct:
+        return ""
+    return f"SOC {f.soc:.0f} % reached {full_pct:g} % ({source.at('finish.full.soc_pct')})"
+
+
+def _by_taper(f: Facts) -> str:
+    taper, since_s = f.rules.taper, f.memory.taper_s
+    if taper is None or since_s is None or f.amps is None or f.now_s - since_s < taper.for_s:
+        return ""
+    at = f.rules.policy.source.at("finish.full.taper")
+    return f"{f.amps:.2f} A, tapered below {tapered_a(f):g} A for {taper.for_s:g} s ({at})"
+
+
+def _by_charger(f: Facts) -> str | None:
+    """A charger that ends an honest charge by itself has ended it, whatever else is needed to call the pack full."""
+    if f.rules.policy.finish.full.charger is False or not f.full_mode or f.soc is None:
+        return None
+    if f.soc < early_below_pct(f) or not ends_full(f):
+        return None
+    return f"the charger reports full (mode 5) ({f.rules.policy.source.at('finish.full.charger')})"
 
 
 def ends_full(f: Facts) -> bool:
@@ -30,9 +77,9 @@ def ends_full(f: Facts) -> bool:
 
     Mode 5 is also what a charger shows that somebody has stopped by other means.
     """
-    rule, high_v, trail = f.rules.policy.finish, f.rules.policy.pack.voltage_v.high, f.memory.witnessed.trail
-    end_v = rule.taper.above_v if rule.taper is not None else END_SHARE * high_v
-    if max((sample.pack_v for sample in trail), default=f.pack_v or 0.0) >= end_v:
+    pack, trail = f.rules.policy.pack, f.memory.witnessed.trail
+    full_v = f.rules.taper.above_v if f.rules.taper is not None else END_SHARE * end_v(pack)
+    if max((sample.pack_v for sample in trail), default=f.pack_v or 0.0) >= full_v:
         return True
     flowed = [sample for sample in trail if sample.charger_a > 0]
     if not flowed or flowed[-1].t_s - flowed[0].t_s < SEEN_TAPER_S:
@@ -43,12 +90,39 @@ def ends_full(f: Facts) -> bool:
 
 def early_below_pct(f: Facts) -> float:
     """Below this state of charge the charger's own "full" is not believed: the fault table has a row for it."""
-    return min(EARLY_FULL_PCT, f.rules.policy.finish.soc_pct)
+    return min(EARLY_FULL_PCT, f.rules.policy.finish.target_soc_pct)
+
+
+def tapered_a(f: Facts) -> float:
+    """Below this the current has tapered off: on a low step, whose own current is as low, only well below that."""
+    below_a = f.rules.taper.below_a if f.rules.taper is not None else 0.0
+    return min(below_a, TAPERED_SHARE * f.memory.step.current_a) if f.memory.step is not None else below_a
 
 
 def tapers(f: Facts) -> bool:
     """The current is low because the pack is nearly full, not because the charge has not begun."""
-    taper = f.rules.policy.finish.taper
+    taper = f.rules.taper
     if taper is None or f.amps is None or f.pack_v is None or f.memory.runs_s is None:
         return False
-    return f.amps < taper.below_a and f.pack_v > taper.above_v
+    return f.amps < tapered_a(f) and f.pack_v > taper.above_v
+
+
+# --- all the way, once in so many days --------------------------------------------------------------------------------
+
+
+def full_due(f: Facts) -> bool:
+    """The battery was not charged all the way for as long as the policy says."""
+    days, full_s = f.rules.policy.finish.full_every_days, f.memory.full_s
+    return days is not None and full_s is not None and f.now_s - full_s >= days * DAY_S
+
+
+def goes_full(f: Facts) -> bool:
+    """Whether this charge goes all the way."""
+    return f.rules.policy.finish.target_soc_pct >= 100 or full_due(f)
+
+
+def target(f: Facts) -> tuple[float, str]:
+    """To which state of charge, and the key that says so."""
+    if full_due(f):
+        return 100.0, "finish.full_every_days"
+    return f.rules.policy.finish.target_soc_pct, "finish.target_soc_pct"

@@ -103,11 +103,23 @@ STANDBY = Setpoint()
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The current-limit step in force, and the rule that bound it."""
+    """The current step in force, and the rule that bound it."""
 
-    index: int  #: 0 (lowest) … 4
+    index: int  #: as the charger's protocol counts them: 0 (lowest) … 4
     current_a: float
-    rule: str  #: "temperature 8.4 °C is in 0 … 10 °C, policies/li-ion-48v.yaml:31"
+    rule: str  #: "temperature 8.4 °C in 0 … 10 allows 2.0 A (0.05 C), policies/li-ion-48v.yaml:31"
+    key: str = ""  #: what bound it, the same however it is worded: "current.temperature_c.rows[0]"; "": nothing did
+    place: str = ""  #: where that stands, FILE:LINE
+
+    @property
+    def number(self) -> int:
+        """As people count them, on the charger's display too: 1 (lowest) … 5."""
+        return self.index + 1
+
+    @property
+    def label(self) -> str:
+        """For people: "step 2 (5.0 A)"."""
+        return f"step {self.number} ({self.current_a:.1f} A)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +138,9 @@ class Session:
     continuous_s: float = 0.0  #: … and in continuous precharge, pauses not counted
     rise_s: float = 0.0  #: spent in precharge since the pack's rise was last counted from the beginning …
     rise_v: float | None = None  #: … at this pack voltage; None: precharge has not begun
+    full: str = ""  #: by what the pack was found full; "" while it is not …
+    full_pct: float | None = None  #: … at which SOC …
+    held_s: float = 0.0  #: … and for how long it has stayed on since
     unseen_s: float = 0.0  #: for so long it may have gone on before a kill, uncounted: the limits count it as charged
     result: str = ""  #: why it ended; "" while it goes on
 

@@ -26,6 +26,8 @@ def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, 
         "step": decision.step.index if decision.step else None,
         "step_current_a": decision.step.current_a if decision.step else None,
         "step_rule": decision.step.rule if decision.step else "",
+        "step_key": decision.step.key if decision.step else "",
+        "step_place": decision.step.place if decision.step else "",
         "command": {**_setpoint(decision.setpoint), "order": command_fields(decision.command)},
         "charger": {
             "online": snapshot.charger_link.online,

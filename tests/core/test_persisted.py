@@ -405,7 +405,11 @@ def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, 
         assert after.session is not None
         aged = after_s - after.session.started_s
         assert aged == pytest.approx(before_s - before.session.started_s + gap_s)
-        assert replace(after.session, started_s=0.0) == replace(before.session, started_s=0.0)
+        counted = dict.fromkeys(("started_s", "unseen_s", "pulse_s", "continuous_s", "rise_s"), 0.0)
+        assert replace(after.session, **counted) == replace(before.session, **counted)
+        assert all(
+            getattr(after.session, name) >= getattr(before.session, name) for name in counted if name != "started_s"
+        )
 
 
 # --- forms ------------------------------------------------------------------------------------------------------------

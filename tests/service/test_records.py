@@ -68,13 +68,23 @@ def test_a_change_of_state_of_order_and_of_step() -> None:
         "decision": {"state": "STOPPING", "reason": "hot", "step": None},
     }
     four = Decision(State.CHARGING, "a", Command(Action.SET_LIMIT, 4), step=Step(4, 14.0, "rule of four"))
-    three = replace(four, command=Command(Action.SET_LIMIT, 3), step=Step(3, 11.0, "rule of three"))
+    three = replace(
+        four,
+        command=Command(Action.SET_LIMIT, 3),
+        step=Step(3, 11.0, "rule of three", "current.soc_pct.rows[1]", "p.yaml:7"),
+    )
     assert kinds(four, three) == {
         "command": {"action": "set_limit", "value": 3},
         "decision": {
             "state": "CHARGING",
             "reason": "a",
-            "step": {"index": 3, "current_a": 11.0, "rule": "rule of three"},
+            "step": {
+                "index": 3,
+                "current_a": 11.0,
+                "rule": "rule of three",
+                "key": "current.soc_pct.rows[1]",
+                "place": "p.yaml:7",
+            },
         },
     }
 

@@ -1,5 +1,6 @@
 """Faults of the charge itself: it takes too long, too much, or leads nowhere."""
 
+from orchestrator.core import limits
 from orchestrator.core.facts import Facts
 from orchestrator.model import State
 
@@ -33,9 +34,26 @@ def precharge_too_long(f: Facts) -> str | None:
     return f"continuous precharge has taken {minutes:.1f} min and the pack is below {rule.below_v:g} V ({at})"
 
 
+def no_step_allowed(f: Facts) -> str | None:
+    """FAULTS P12: `max_a: 0`, or a charger whose lowest step is too much."""
+    return limits.none_allowed(f)
+
+
+def precharge_too_strong(f: Facts) -> str | None:
+    """FAULTS P12: precharge is always on the charger's lowest step."""
+    rule, lowest_a = f.rules.policy.precharge, f.rules.worst_a[0]
+    if not f.rules.manual or rule is None or f.pack_v is None or f.pack_v >= rule.below_v or lowest_a <= rule.max_a:
+        return None
+    at = f.rules.policy.source.at("precharge.max_a")
+    return (
+        f"the pack has {f.pack_v:.2f} V and needs precharge with at most {rule.max_a:g} A ({at}); the lowest step of "
+        f"this charger is {lowest_a:g} A"
+    )
+
+
 def time_limit(f: Facts) -> str | None:
     """FAULTS C17."""
-    session, hours = f.memory.session, f.rules.policy.finish.max_hours
+    session, hours = f.memory.session, f.rules.max_hours
     if session is None:
         return None
     took_s = session.energised_s + session.unseen_s
@@ -46,7 +64,7 @@ def time_limit(f: Facts) -> str | None:
 
 def ah_limit(f: Facts) -> str | None:
     """FAULTS C17."""
-    session, max_ah = f.memory.session, f.rules.policy.finish.max_ah
+    session, max_ah = f.memory.session, f.rules.max_ah
     if session is None:
         return None
     begun_pct = session.soc_start_pct or 0.0

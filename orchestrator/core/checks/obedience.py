@@ -91,7 +91,7 @@ def stopped_by_itself(f: Facts) -> str | None:
         return None
     if not f.full_mode:
         return "the charger stopped though it was told to run"
-    if early_full(f) is not None or (f.rules.policy.finish.charger_full and ends_full(f)):
+    if early_full(f) is not None or (f.rules.policy.finish.full.charger is not False and ends_full(f)):
         return None
     return (
         "the charger stopped though it was told to run, and its mode 5 is not taken for full: the current had not "

@@ -115,7 +115,7 @@ def bmu_frozen(f: Facts) -> str | None:
     if frozen is None or session is None or f.volts is None or f.now_s - frozen.t_s < STILL_S:
         return None
     moved_v, moved_ah = abs(f.volts - frozen.charger_v), session.charged_ah - frozen.charged_ah
-    if moved_v <= MOVED_V and moved_ah < MOVED_SHARE * f.rules.policy.finish.max_ah:
+    if moved_v <= MOVED_V and moved_ah < MOVED_SHARE * f.rules.max_ah:
         return None
     return (
         f"the BMU has said the same in every word for {f.now_s - frozen.t_s:.0f} s, while the charger's voltage moved "

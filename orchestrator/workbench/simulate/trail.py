@@ -36,11 +36,12 @@ class Span:
     step_a: float | None
     why: str  #: the rule that bound it, with its line in the policy; else why the bay is in this state
     faults: tuple[str, ...] = ()  #: the ids of those in force
+    key: str = ""  #: of the policy's row that bound it, where one did
 
     @property
     def rule(self) -> tuple[State, int | None, str]:
         """What bound it, without the numbers that were measured: equal for the same rule at another time."""
-        return self.state, self.step, _NUMBERS.sub("#", self.why)
+        return self.state, self.step, self.key or _NUMBERS.sub("#", self.why)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +87,11 @@ class Trail:
                 decision.state,
             )
         )
-        why = step.rule if step is not None and decision.state is State.CHARGING else decision.reason
+        charging = step is not None and decision.state is State.CHARGING
+        why, key = (step.rule, step.key) if step is not None and charging else (decision.reason, "")
         faults = tuple(fault.id for fault in decision.faults)
         index, amps = (step.index, step.current_a) if step else (None, None)
-        span = Span(plant.t_s, plant.t_s, decision.state, index, amps, why, faults)
+        span = Span(plant.t_s, plant.t_s, decision.state, index, amps, why, faults, key)
         if self.spans and (span.rule, span.faults) == (self.spans[-1].rule, self.spans[-1].faults):
             return
         self.close(plant.t_s)
