@@ -409,7 +409,7 @@ def test_a_row_that_comes_back_again_and_again_stays_for_the_rest_of_the_charge(
     assert world.decision.step is not None
     assert world.decision.step.key == "current.voltage_v.rows[2]"
     world.ask(Request.STOP)
-    world.until(State.IDLE)
+    world.until(State.HELD)
     world.ask(Request.START)
     world.charging()
     world.run(62)

@@ -171,7 +171,7 @@ def test_a_start_that_no_disk_takes_is_answered_no_and_starts_nothing_later(benc
     bench.step()
     assert again.answer.startswith("not done: a restart would forget what changes: ")
     bench.disk = True
-    assert bench.step(100) is State.IDLE, "the disk is well again, and nobody has started it since"
+    assert bench.step(100) is State.HELD, "the disk is well again, and nobody has started it since"
     assert kept(bench)[1] == HELD
     assert bench.ask(Request.START) == ""
     bench.until(State.CHARGING)

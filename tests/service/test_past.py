@@ -205,7 +205,15 @@ NOW = Stamp(1_800_000_000.0, 500.0, "this boot")
 
 @given(entry_lists)
 def test_what_is_written_is_read(entries: list[Entry]) -> None:
-    assert decode(encode(NOW, 7, entries), NOW) == (7, entries)
+    moment = replace(NOW, clock_s=NOW.clock_s + 2**-30)  # none at all would be an age that cannot be told
+    run, read = decode(encode(NOW, 7, entries), moment)
+    assert run == 7
+    assert [(one.place, one.persisted.gist, one.run) for one in read] == [
+        (one.place, one.persisted.gist, one.run) for one in entries
+    ]
+    assert encode(moment, 7, read) == encode(
+        moment, 7, [replace(one, persisted=one.persisted.aged(2**-30)) for one in entries]
+    )
 
 
 AGES = {
