@@ -9,7 +9,7 @@ from dataclasses import replace
 from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
-from orchestrator.core.finish import finished, full_due, goes_full, target
+from orchestrator.core.finish import finished, full_due, goes_full, goes_on, target
 from orchestrator.core.machine import RESTING, Trigger
 from orchestrator.core.operator import RESET
 from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, verified
@@ -59,7 +59,7 @@ def _energised(f: Facts, faults: Faults) -> Course:
         full = finished(f)
         if full is not None:
             f.memory.full_pct = f.soc
-            if goes_full(f):
+            if goes_full(f) or (f.memory.session is not None and f.memory.session.full):
                 f.memory.full_s = f.now_s
             return Trigger.STOP, f"full: {full}"
         return None, _charging_reason(f, faults)
@@ -249,6 +249,8 @@ def _wanted(f: Facts) -> tuple[bool, str]:
     if f.soc is None:
         return False, "a battery is there; its SOC is not known yet"
     if full_pct is None and f.memory.session is not None:  # what was interrupted is brought to its end
+        if unfinished := goes_on(f):
+            return True, unfinished
         threshold, key = target(f)
     elif full_pct is None:
         key, threshold = "start.soc_below_pct", policy.start.soc_below_pct

@@ -126,3 +126,16 @@ def target(f: Facts) -> tuple[float, str]:
     if full_due(f):
         return 100.0, "finish.full_every_days"
     return f.rules.policy.finish.target_soc_pct, "finish.target_soc_pct"
+
+
+def goes_on(f: Facts) -> str:
+    """Why a charge that was interrupted on its way to full goes on, whatever the SOC says; "" where the SOC decides."""
+    rule, source, session = f.rules.policy.finish, f.rules.policy.source, f.memory.session
+    if session is None or not goes_full(f):
+        return ""
+    if session.full and session.held_s < rule.hold_min * 60:
+        at = source.at("finish.hold_min")
+        return f"the pack is full, and was not yet held at the top for {rule.hold_min:g} min ({at})"
+    if not session.full and rule.full.soc_pct is None:
+        return f"the charge was interrupted, and the pack is not known to be full ({source.at('finish.full')})"
+    return ""

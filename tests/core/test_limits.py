@@ -8,6 +8,7 @@ import pytest
 from orchestrator.config.policy import Band, Policy, Table, Where
 from orchestrator.core.facts import Facts
 from orchestrator.core.limits import choose
+from orchestrator.core.rules import Rules
 from orchestrator.keys import Range, Source
 from orchestrator.model import BatteryStatus, ChargeMode, Precharge, Request, Setpoint, Snapshot, State, Step
 from tests.core.bays import POLICY, charging
@@ -122,8 +123,8 @@ def test_two_tables_on_one_line_are_told_apart() -> None:
     assert world.decision.step.rule == "temperature 20.0 °C in 0 … 45 allows 8.0 A, p.yaml:7"
     less = Table(rows=(Band(from_=0, to=100, max_a=8.0),))
     more = Table(rows=(Band(from_=0, to=45, max_a=9.0),))
-    world.rules = replace(world.rules, policy=replace(one_line, current=replace(one_line.current, temperature_c=more,
-                                                                                soc_pct=less)))  # fmt: skip
+    swapped = replace(one_line, current=replace(one_line.current, temperature_c=more, soc_pct=less))
+    world.rules = Rules.of(bay(swapped))
     world.tick()
     assert (world.decision.step.key, world.decision.step.place) == ("current.soc_pct.rows[0]", "p.yaml:7")
     assert world.decision.step.rule == "SOC 50 % in 0 … 100 allows 8.0 A, p.yaml:7"

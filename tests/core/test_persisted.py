@@ -405,10 +405,10 @@ def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, 
         assert after.session is not None
         aged = after_s - after.session.started_s
         assert aged == pytest.approx(before_s - before.session.started_s + gap_s)
-        was, now = asdict(before.session), asdict(after.session)
+        old, new = asdict(before.session), asdict(after.session)
         counts = ("unseen_s", "pulse_s", "continuous_s", "rise_s")  # more may have come to these
-        assert all(now.pop(name) >= was.pop(name) for name in counts)
-        assert {**now, "started_s": 0.0} == {**was, "started_s": 0.0}
+        assert all(new.pop(name) >= old.pop(name) for name in counts)
+        assert {**new, "started_s": 0.0} == {**old, "started_s": 0.0}
 
 
 # --- forms ------------------------------------------------------------------------------------------------------------

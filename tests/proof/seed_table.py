@@ -610,8 +610,8 @@ CONDITIONS: tuple[Seed, ...] = (
 #: An arithmetic on a reading without its bounds.
 DIVIDES: Change = (
     f"{CORE}witnesses/measured.py",
-    "    if abs(volts - pack_v) <= max(limits.volts_differ_v, limits.volts_differ_pct / 100 * pack_v):",
-    "    if abs(volts - pack_v) / pack_v <= max(limits.volts_differ_v / pack_v, limits.volts_differ_pct / 100):",
+    "    if abs(volts - pack_v) <= volts_differ(f.rules.policy.faults, pack_v):",
+    "    if abs(volts - pack_v) / pack_v <= volts_differ(f.rules.policy.faults, pack_v) / pack_v:",
 )
 #: A row that raises takes the whole step with it.
 NOT_CAUGHT: Change = (

@@ -147,7 +147,10 @@ def setting_not_obeyed(f: Facts) -> str | None:
     order = f.memory.order
     if order is None or order.action in (Action.RUN, Action.RESUME, Action.STOP) or not f.energised:
         return None
-    return _unconfirmed(f, f"{order.action.value.removeprefix('set_')} {order.value}")
+    step = order.action is Action.SET_LIMIT
+    return _unconfirmed(
+        f, f"step {order.value + 1}" if step else f"{order.action.value.removeprefix('set_')} {order.value}"
+    )
 
 
 def contactor_lost(f: Facts) -> str | None:
