@@ -1,6 +1,7 @@
 """The status document as text for a terminal: what to do first, then one line a bay, and why."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import cast
 
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
@@ -51,8 +52,18 @@ def table(bays: Sequence[Bay]) -> str:
 
 def other_faults(bay: Bay) -> list[Mapping[str, object]]:
     """The faults that the reason does not tell already."""
-    faults = cast("list[Mapping[str, object]]", bay["faults"])
-    return [fault for fault in faults if str(fault["text"]) not in str(bay["reason"])]
+    faults, told = cast("list[Mapping[str, object]]", bay["faults"]), set(_told(bay.get("cause")))
+    return [fault for fault in faults if told.isdisjoint(islice(_told(fault.get("cause")), 1))]
+
+
+def _told(cause: object) -> Iterator[tuple[object, ...]]:
+    """Which causes a cause in the document tells: itself, then those in its parameters."""
+    if isinstance(cause, Mapping):
+        yield cause.get("id"), cause.get("key"), cause.get("advice")
+        params = cause.get("params")
+        yield from (one for value in (params.values() if isinstance(params, Mapping) else ()) for one in _told(value))
+    elif isinstance(cause, list):
+        yield from (one for value in cause for one in _told(value))
 
 
 def is_alarming(bay: Bay) -> bool:

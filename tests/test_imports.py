@@ -20,6 +20,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     "errors": (),
     "keys": (),
     "model": (),
+    # Core makes causes; sentences are made of them at the edges only.
+    "text": ("model",),
     "protocol": ("errors", "keys", "model"),
     "config": ("errors", "keys", "model", "protocol.objects"),
     "interlock": ("config.policy", "config.station", "errors", "keys", "model"),
@@ -29,20 +31,22 @@ EDGES: dict[str, tuple[str, ...]] = {
     "link": ("errors", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
     # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
-    "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol"),
+    "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol",
+        "text",
+    ),
     "commissioning": ("config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile"),
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
     # What it checks and tries is the core itself, on the models of the emulators, without any line between them.
     "workbench": (
         "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
-        "sim.chemistry", "sim.pack",
+        "sim.chemistry", "sim.pack", "text",
     ),
-    "show": (),
-    "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim"),
+    "show": ("model", "text"),
+    "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
         "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort", "link",
-        "model", "protocol", "service", "show", "sim", "workbench",
+        "model", "protocol", "service", "show", "sim", "text", "workbench",
     ),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
@@ -65,7 +69,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
 }
 
 #: These give the same answer to the same arguments, for ever: of the standard library they may use only LIBRARY.
-PURE = ("core", "errors", "interlock", "keys", "model", "protocol")
+PURE = ("core", "errors", "interlock", "keys", "model", "protocol", "text")
 LIBRARY = frozenset({
     "abc", "bisect", "collections", "contextlib", "dataclasses", "decimal", "enum", "fractions", "functools", "heapq",
     "itertools", "math", "operator", "re", "statistics", "string", "struct", "types", "typing",

@@ -12,9 +12,9 @@ from orchestrator.core.finish import finished
 from orchestrator.core.machine import RESTING, Trigger
 from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, proved_to_last
 from orchestrator.core.witnesses.standby import current_without_order, sees_current
-from orchestrator.model import ENERGISED, ActiveFault, Effect, State
+from orchestrator.model import ENERGISED, ActiveFault, Cause, Effect, State
 
-Course = tuple[Trigger | None, str]
+Course = tuple[Trigger | None, Cause | str]
 Faults = tuple[ActiveFault, ...]
 
 #: Everything must have spoken for a charge for this long, with a second, newer sample of each value.
@@ -46,29 +46,34 @@ def course(f: Facts, faults: Faults) -> Course:
 
 def _energised(f: Facts, faults: Faults) -> Course:
     if faults and faults[0].effect >= Effect.PAUSE:
-        return Trigger.STOP, faults[0].text
-    asked = f.memory.hold or f.snapshot.ending or ("paused by the operator" if f.memory.paused else "")
-    if asked:
+        return Trigger.STOP, faults[0].cause
+    asked = f.memory.hold or _ending(f) or (Cause("operator_pause") if f.memory.paused else None)
+    if asked is not None:
         return Trigger.STOP, asked
     if f.memory.state is State.CHARGING:
         full = finished(f)
         if full is not None:
             f.memory.full_pct = f.soc
             return Trigger.STOP, f"full: {full}"
-        return None, _charging_reason(f, faults)
+        return None, _charging(f, faults)
     return _precharging(f)
 
 
-def _charging_reason(f: Facts, faults: Faults) -> str:
-    chosen = f.memory.step
+def _ending(f: Facts) -> Cause | None:
+    return Cause.of("service_ends", why=f.snapshot.ending) if f.snapshot.ending else None
+
+
+def _charging(f: Facts, faults: Faults) -> Cause:
+    chosen, rises = f.memory.step, None
     if chosen is None:
-        return "the charger charges by itself (automatic mode)" if not f.rules.manual else f.memory.reason
-    limited = f"; {faults[0].text}" if faults and faults[0].effect >= Effect.LIMIT else ""
-    rises = ""
+        return Cause("charges_by_itself") if not f.rules.manual else f.memory.cause
+    limited = faults[0].cause if faults and faults[0].effect >= Effect.LIMIT else None
     if f.memory.raise_s is not None:
-        hold_s, at = f.rules.policy.current.raise_after_s, f.rules.policy.source.at("current.raise_after_s")
-        rises = f"; a higher step is allowed, and taken after {hold_s:g} s ({at})"
-    return f"step {chosen.index} ({chosen.current_a:.1f} A): {chosen.rule}{limited}{rises}"
+        rises = f.rules.by_policy("rises", "current.raise_after_s", hold_s=f.rules.policy.current.raise_after_s)
+    return Cause.of(
+        "charging", key=chosen.rule.key, place=chosen.rule.place,
+        step=chosen.index, step_a=chosen.current_a, rule=chosen.rule, limited=limited, rises=rises,
+    )  # fmt: skip
 
 
 def _precharging(f: Facts) -> Course:
@@ -105,7 +110,7 @@ def _stopping(f: Facts, faults: Faults) -> Course:
         return None, _out_of_control(f)
     if state is State.STARTING and not memory.unverified and not f.charger.online and f.state_s >= LOST_S:
         return Trigger.LOSE, _offline_reason(f)
-    return None, memory.reason
+    return None, memory.cause
 
 
 def _out_of_control(f: Facts) -> str:
@@ -139,11 +144,11 @@ def _offline_reason(f: Facts) -> str:
 def _resting(f: Facts, faults: Faults) -> Course:
     fresh = next((x for x in faults if x.since_s == f.now_s and x.effect >= Effect.STOP), None)
     if fresh is not None and f.charger.online:
-        return Trigger.STOP, fresh.text
+        return Trigger.STOP, fresh.cause
     if f.runs:
         return Trigger.STOP, "the charger runs though it was not commanded to"
     if f.unordered:
-        return Trigger.STOP, current_without_order(f) or f.memory.reason
+        return Trigger.STOP, current_without_order(f) or f.memory.cause
     if f.memory.state is State.OFFLINE and not f.stopped:
         answers = f.charger.online and f.reading is not None
         return None, "the charger is being stopped before anything else" if answers else _offline_reason(f)
@@ -165,23 +170,24 @@ def _rest(f: Facts, faults: Faults) -> Course:
     return (None if LEADS.get(trigger) is state else trigger), reason
 
 
-def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
+def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, Cause | str]:
     memory = f.memory
     worst = faults[0] if faults else None
     lost = not f.charger.online or f.reading is None
     if worst is not None and worst.effect is Effect.TRIP and (memory.state is State.TRIPPED or not lost):
-        return Trigger.TRIP, worst.text
+        return Trigger.TRIP, worst.cause
     if lost:  # a trip promises a stop that was verified: first the line
         return Trigger.LOSE, _offline_reason(f)
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
     if waits is not None:
-        return Trigger.REST, waits.text
+        return Trigger.REST, waits.cause
     if memory.hold:
         return Trigger.REST, memory.hold
-    if f.snapshot.ending:  # the charge goes on after it
-        return (Trigger.REST if memory.session is None else Trigger.SUSPEND), f.snapshot.ending
+    ending = _ending(f)
+    if ending is not None:  # the charge goes on after it
+        return (Trigger.REST if memory.session is None else Trigger.SUSPEND), ending
     if memory.paused:
-        return Trigger.SUSPEND, "paused by the operator; start to go on"
+        return Trigger.SUSPEND, Cause("operator_pause", advice="start")
     absent = _absent(f)
     if absent is not None:
         return absent
@@ -191,7 +197,7 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, str]:
     if f.soc is not None and not wanted:
         return Trigger.REST, why
     if worst is not None and worst.effect >= Effect.NO_START:
-        return Trigger.SUSPEND, worst.text
+        return Trigger.SUSPEND, worst.cause
     return (Trigger.QUALIFY if wanted else Trigger.REST), why
 
 
@@ -224,10 +230,10 @@ def _wanted(f: Facts) -> tuple[bool, str]:
 
 def _qualifying(f: Facts) -> Course:
     memory = f.memory
-    not_yet = f"waiting for fresh values: {f.missing}" if not f.present else ""
+    not_yet = Cause.of("waits_for_values", missing=f.missing) if not f.present else None
     if not f.connected:
-        not_yet = not_yet or "waiting for the contactor, behind which charger and battery cannot be compared"
-    if not_yet:
+        not_yet = not_yet or Cause("waits_for_contactor")
+    if not_yet is not None:
         memory.qualified_s, memory.ready, memory.intends = None, False, False
         return None, not_yet
     if memory.qualified_s is None:
@@ -235,7 +241,7 @@ def _qualifying(f: Facts) -> Course:
     if f.now_s - memory.qualified_s < QUALIFY_S or not _seen_twice(f, memory.qualified_s) or not f.stopped:
         return None, "checking charger and battery before a charge"
     memory.ready = True
-    if f.snapshot.waits:
+    if f.snapshot.waits is not None:
         memory.intends = False
         return None, f.snapshot.waits
     memory.intends = True

@@ -16,9 +16,9 @@ from orchestrator.core.checks import battery, charge, obedience, ourselves, repo
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import OBEY_STOP_S
 from orchestrator.core.witnesses import measured, pack, paired, standby
-from orchestrator.model import ENERGISED, Effect, State
+from orchestrator.model import ENERGISED, Cause, Effect, State
 
-Check = Callable[[Facts], str | None]
+Check = Callable[[Facts], Cause | None]
 
 
 class Clear(Enum):

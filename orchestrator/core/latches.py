@@ -15,7 +15,7 @@ from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
 from orchestrator.core.memory import FaultMemory
-from orchestrator.model import ActiveFault, Effect
+from orchestrator.model import ActiveFault, Cause, Effect
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
@@ -52,12 +52,12 @@ def update(f: Facts) -> dict[str, FaultMemory]:
     return after
 
 
-def _seen(row: Row, f: Facts) -> str | None:
+def _seen(row: Row, f: Facts) -> Cause | None:
     """What the row's predicate sees."""
     try:
         return row.check(f)
     except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
-        f.broken.append(f"{row.id} cannot be judged: {error!r}")
+        f.broken.append(Cause.of("not_judged", fault=row.id, error=repr(error)))
         return None
 
 
@@ -69,7 +69,7 @@ def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
     return (fault.polls + 1 if holds else max(0.0, fault.polls - DRAIN)), poll_t_s
 
 
-def _present(row: Row, fault: FaultMemory, seen: str, f: Facts, passed_s: float) -> FaultMemory:
+def _present(row: Row, fault: FaultMemory, seen: Cause, f: Facts, passed_s: float) -> FaultMemory:
     polls, poll_t_s = _polls(fault, f, holds=True)
     # The time before its first look is nobody's: the condition may have come just now.
     seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
@@ -80,7 +80,7 @@ def _present(row: Row, fault: FaultMemory, seen: str, f: Facts, passed_s: float)
     if row.clear is Clear.BACKOFF:
         strikes = (*(t for t in strikes if f.now_s - t < STRIKES_S), f.now_s)
     latched = row.clear is Clear.RESET or len(strikes) > len(BACKOFF_S)
-    return replace(fault, raised_s=f.now_s, text=seen, latched=latched, strikes=strikes)
+    return replace(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes)
 
 
 def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMemory | None:
@@ -122,48 +122,44 @@ def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
 
 
 def shown(faults: dict[str, FaultMemory]) -> tuple[ActiveFault, ...]:
-    """The faults in force, for people: what was seen and what to do. What has tripped begins with what to do."""
+    """The faults in force: what was seen, and as its advice the row, which says what to do."""
     return tuple(
-        ActiveFault(name, effect(name, fault), _text(name, fault), fault.raised_s or 0.0)
+        ActiveFault(name, effect(name, fault), _cause(name, fault), fault.raised_s or 0.0)
         for name, fault in raised(faults)
     )
 
 
-def _text(name: str, fault: FaultMemory) -> str:
-    advice = _advice(ROW[name], fault)
-    return f"{advice} – {fault.text}" if effect(name, fault) is Effect.TRIP else f"{fault.text}; {advice}"
-
-
-def _advice(row: Row, fault: FaultMemory) -> str:
-    if fault.latched and row.clear is not Clear.RESET:
-        return f"{row.advice}; it came {len(fault.strikes)} times within an hour: reset by a person"
-    return row.advice
+def _cause(name: str, fault: FaultMemory) -> Cause:
+    cause, does = fault.cause or Cause(name), effect(name, fault).name
+    if fault.latched and ROW[name].clear is not Clear.RESET:
+        return cause.with_(name, effect=does, strikes=len(fault.strikes))
+    return cause.with_(name, effect=does)
 
 
 def release(
     faults: dict[str, FaultMemory], now_s: float, *, by_reset: bool
-) -> tuple[dict[str, FaultMemory], list[str]]:
+) -> tuple[dict[str, FaultMemory], list[Cause]]:
     """Clear what a person may clear: by a reset everything, by a start what waits for a start.
 
-    Returns the faults that are left and the reasons why some of them cannot be cleared; then none is.
+    Returns the faults that are left and the causes why some of them cannot be cleared; then none is.
     """
     waiting = {
         name: fault
         for name, fault in faults.items()
         if fault.raised_s is not None and clear_after_s(ROW[name], fault) is None
     }
-    reasons = [reason for name, fault in waiting.items() if (reason := _kept_by(name, fault, now_s, by_reset=by_reset))]
-    left = {name: fault for name, fault in faults.items() if reasons or name not in waiting}
-    return left, reasons
+    causes = [cause for name, fault in waiting.items() if (cause := _kept_by(name, fault, now_s, by_reset=by_reset))]
+    left = {name: fault for name, fault in faults.items() if causes or name not in waiting}
+    return left, causes
 
 
-def _kept_by(name: str, fault: FaultMemory, now_s: float, *, by_reset: bool) -> str:
-    """Why a person may not clear this fault now; "" if they may."""
+def _kept_by(name: str, fault: FaultMemory, now_s: float, *, by_reset: bool) -> Cause | None:
+    """Why a person may not clear this fault now; None if they may."""
     row = ROW[name]
     if not by_reset and fault.latched:
-        return f"{name} is latched and needs a reset: {fault.text}"
+        return Cause.of("needs_reset", fault=name, what=fault.cause)
     if fault.clean_s is None:
-        return f"{name} is still there: {fault.text}"
+        return Cause.of("still_there", fault=name, what=fault.cause)
     if now_s - fault.clean_s < row.clean_s:
-        return f"{name} must be gone for {row.clean_s:g} s first"
-    return ""
+        return Cause.of("gone_first", fault=name, clean_s=row.clean_s)
+    return None

@@ -2,7 +2,7 @@
 
 from orchestrator.config.policy import Table
 from orchestrator.core.facts import Facts
-from orchestrator.model import ActiveFault, Effect, Step
+from orchestrator.model import ActiveFault, Cause, Effect, Step
 
 #: (step, what limits it, for whom: the key in policy or station, the value)
 Bound = tuple[int, str, str, float | None]
@@ -18,7 +18,7 @@ def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
     if before is None or bound[0] < before.index:
         return _step(f, bound), None
     if bound[0] == before.index:
-        return (before if _same_rule(before, f, bound) else _step(f, bound)), None
+        return (before if _same_rule(before, bound) else _step(f, bound)), None
     raise_s = raise_s if raise_s is not None else f.now_s
     if f.now_s - raise_s >= f.rules.policy.current.raise_after_s:
         return _step(f, bound), None
@@ -71,7 +71,12 @@ def _step(f: Facts, bound: Bound) -> Step:
     return Step(index, f.rules.steps_a[index], _rule(f, what, path, value))
 
 
-def _rule(f: Facts, what: str, path: str, value: float | None) -> str:
+def _rule(f: Facts, what: str, path: str, value: float | None) -> Cause:
+    place = f.rules.policy.source.at(path) if what in WORDS else f.rules.bay.source.at(path) if path else ""
+    return Cause.of("limit", key=path, place=place, text=_text(f, what, path, value))
+
+
+def _text(f: Facts, what: str, path: str, value: float | None) -> str:
     if what not in WORDS:
         return f"{what}, {f.rules.bay.source.at(path)}" if path else what
     name, form = WORDS[what]
@@ -84,7 +89,7 @@ def _rule(f: Facts, what: str, path: str, value: float | None) -> str:
     return f"{name} {form.format(value)} {where}, {place}"
 
 
-def _same_rule(before: Step, f: Facts, bound: Bound) -> bool:
+def _same_rule(before: Step, bound: Bound) -> bool:
     """Whether the step that is in force is bound by the same line of a table; its sentence then keeps its value."""
     _, what, path, _ = bound
-    return what in WORDS and before.rule.endswith(f.rules.policy.source.at(path))
+    return what in WORDS and before.rule.key == path

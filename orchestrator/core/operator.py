@@ -4,68 +4,66 @@ from collections.abc import Callable
 
 from orchestrator.core import latches
 from orchestrator.core.memory import Memory
-from orchestrator.model import Request, State
+from orchestrator.model import Cause, Request, State
+from orchestrator.model.cause import together
 
-STOPPED = "stopped by the operator; start to go on"
+STOPPED = Cause("operator_stop", advice="start")
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
-RESET = "reset by the operator; start to go on"
+RESET = Cause("operator_reset", advice="start")
 
 
-def hear(memory: Memory, request: Request, now_s: float) -> str:
-    """Change the memory as the operator asks; "" when it was done, else why not."""
+def hear(memory: Memory, request: Request, now_s: float) -> Cause | None:
+    """Change the memory as the operator asks; None when it was done, else why not."""
     return VERBS[request](memory, now_s)
 
 
-def _stop(memory: Memory, _now_s: float) -> str:
+def _stop(memory: Memory, _now_s: float) -> Cause | None:
     memory.hold = STOPPED
-    return ""
+    return None
 
 
-def _pause(memory: Memory, _now_s: float) -> str:
+def _pause(memory: Memory, _now_s: float) -> Cause | None:
     if memory.hold:
-        return f"not running: {memory.hold}"
+        return Cause.of("not_running", what=memory.hold)
     memory.paused = True
-    return ""
+    return None
 
 
-def _start(memory: Memory, now_s: float) -> str:
+def _start(memory: Memory, now_s: float) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
-        return "the charger does not obey: cut its mains; nothing can start here"
-    memory.faults, reasons = latches.release(memory.faults, now_s, by_reset=False)
-    if reasons:
-        return "; ".join(reasons)
-    memory.hold, memory.paused = "", False
-    return ""
+        return Cause("out_of_control")
+    memory.faults, refusals = latches.release(memory.faults, now_s, by_reset=False)
+    if refusals:
+        return together(refusals)
+    memory.hold, memory.paused = None, False
+    return None
 
 
-def _reset(memory: Memory, now_s: float) -> str:
+def _reset(memory: Memory, now_s: float) -> Cause | None:
     before = memory.faults
-    faults, reasons = latches.release(before, now_s, by_reset=True)
+    faults, refusals = latches.release(before, now_s, by_reset=True)
     cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
     resets = tuple(reset for reset in memory.resets if now_s - reset[0] < RESETS_S)
-    reasons = reasons or [text for name in cleared if (text := _too_often(name, resets, now_s))]
-    if reasons:
-        return "; ".join(reasons)
+    refusals = refusals or [cause for name in cleared if (cause := _too_often(name, resets, now_s))]
+    if refusals:
+        return together(refusals)
     memory.faults, memory.resets = faults, resets + tuple((now_s, name) for name in cleared)
     if len(memory.faults) < len(before):  # in whatever state: the way on is a start, also while the stop is verified
         memory.hold = RESET
-    return ""
+    return None
 
 
-def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> str:
+def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> Cause | None:
     """FAULTS P6: what comes again after every reset is not mended by resetting it."""
     times = [t_s for t_s, fault in resets if fault == name]
     if len(times) < MAX_RESETS:
-        return ""
-    minutes = (times[-MAX_RESETS] + RESETS_S - now_s) / 60
-    return (
-        f"{name} was reset {len(times)} times within an hour and came again each time: remove its cause; "
-        f"it can be reset again in {minutes:.0f} min"
-    )
+        return None
+    wait_min = (times[-MAX_RESETS] + RESETS_S - now_s) / 60
+    return Cause.of("reset_too_often", fault=name, times=len(times), wait_min=wait_min)
 
 
-VERBS: dict[Request, Callable[[Memory, float], str]] = {
+VERBS: dict[Request, Callable[[Memory, float], Cause | None]] = {
     Request.START: _start,
     Request.PAUSE: _pause,
     Request.STOP: _stop,

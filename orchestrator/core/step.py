@@ -21,6 +21,7 @@ from orchestrator.model import (
     STANDBY,
     STOP,
     ActiveFault,
+    Cause,
     ChargeMode,
     Command,
     Decision,
@@ -39,6 +40,7 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
     State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
     State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
 }
+PRECHARGE = Cause("precharge_step")
 #: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
 #: not end it: its limits would begin anew with each of them.
 SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.TRIPPED})
@@ -56,7 +58,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
         memory.since_s = now_s
     f = Facts(now_s, snapshot, memory, rules)
     follow(f, last_s)
-    answer = hear(memory, snapshot.request, now_s) if snapshot.request is not None else ""
+    answer = hear(memory, snapshot.request, now_s) if snapshot.request is not None else None
     memory.faults = latches.update(f)
     faults = latches.shown(memory.faults)
     ended = _move(f, faults)
@@ -65,7 +67,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     return (
         Decision(
             state=memory.state,
-            reason=memory.reason,
+            cause=memory.cause,
             command=_order(f, setpoint, faults),
             setpoint=setpoint,
             step=chosen,
@@ -89,17 +91,18 @@ def _alarm(memory: Memory) -> bool:
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
     """Let the state follow the facts; the session that has ended by it, if any."""
     memory, before = f.memory, f.memory.state
-    trigger, reason = course(f, faults)
-    memory.reason = reason
+    trigger, why = course(f, faults)
+    memory.cause = why if isinstance(why, Cause) else Cause.of("said", text=why)
     memory.state = fire(before, trigger) if trigger is not None else before
     if memory.state is not before:
         follow_stop(f, before)
         follow_state(f, before)
         if memory.state is State.STOPPING:
-            memory.stop_reason = reason
+            memory.stop_cause = memory.cause
     if memory.session is None or not _is_over(f, before):
         return None
-    ended = replace(memory.session, result=memory.stop_reason if before is State.STOPPING else reason)
+    stopped_by = memory.stop_cause if before is State.STOPPING else None
+    ended = replace(memory.session, result=stopped_by or memory.cause)
     memory.session = None
     return ended
 
@@ -123,7 +126,7 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step
     if memory.state is State.CHARGING:
         chosen, memory.raise_s = limits.choose(f, faults[0] if faults else None)
     else:
-        chosen, memory.raise_s = Step(0, rules.steps_a[0], "precharge is always on the lowest step"), None
+        chosen, memory.raise_s = Step(0, rules.steps_a[0], PRECHARGE), None
     if memory.step is not None and memory.session is not None and chosen.index != memory.step.index:
         memory.session = replace(memory.session, step_changes=memory.session.step_changes + 1)
         memory.confirmed = False  # it is told another one

@@ -2,16 +2,16 @@
 
 from threading import Event
 
-from orchestrator.model import Request
+from orchestrator.model import Cause, Request
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 
 
 class Asked:
-    """`answer` is set when `done` is: "" is yes."""
+    """`answer` is set when `done` is: None is yes."""
 
     def __init__(self, request: Request) -> None:
         self.request = request
-        self.answer = ""
+        self.answer: Cause | None = None
         self.done = Event()
 
 
@@ -22,10 +22,10 @@ class Answers:
         self._store = store
         self.waiting: list[tuple[Asked, int, float]] = []  #: with the revision that keeps it, and until when to wait
 
-    def give(self, asked: Asked, answer: str, revision: int, now_s: float) -> None:
+    def give(self, asked: Asked, answer: Cause | None, revision: int, now_s: float) -> None:
         """Answer it: a refusal at once, what was done when the disk has it."""
         asked.answer = answer
-        if answer:
+        if answer is not None:
             asked.done.set()
         else:
             self.waiting.append((asked, revision, now_s + KEPT_WITHIN_S))
@@ -39,7 +39,7 @@ class Answers:
                 left.append((asked, revision, until_s))
                 continue
             if revision > kept:
-                why = self._store.unkept(now_s) or "the disk has not taken it"
-                asked.answer = f"done, but not kept: {why}"
+                problem = self._store.unkept(now_s)
+                asked.answer = Cause.of("not_kept", problem=problem) if problem else Cause("not_taken")
             asked.done.set()
         self.waiting = left

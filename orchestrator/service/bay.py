@@ -21,6 +21,7 @@ from orchestrator.model import (
     STOP,
     BatteryLink,
     BatteryReading,
+    Cause,
     ChargerLink,
     ChargerReading,
     Command,
@@ -37,6 +38,7 @@ from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status
 from orchestrator.service.store import Store
+from orchestrator.text.catalogue import say
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
@@ -78,16 +80,17 @@ class BayRunner:
         contactor: Contactor | None = None,
         starts: Starts | None = None,
         snapshots: bool = True,
+        language: str = "en",
     ) -> None:
         self.name, self.place = bay.name, Place.of(bay)
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
-        self._rules = Rules.of(bay)
+        self._rules, self._language = Rules.of(bay), language
         self._store, self._say, self._answers = store, say, Answers(store)
         self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
         self._revision = 0  # the one that keeps this bay's memory
         self._ending = ""
-        self._waits = ""  # why the next run has to wait for an operator
+        self._waits: Cause | None = None  # why the next run has to wait for an operator
         self._offered: Bay | None = None  # with a policy that is not in force yet
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
@@ -120,9 +123,9 @@ class BayRunner:
 
         Unless it is not `orderly` and ends a charge: that one waits for an operator, as after any other failure (G3).
         """
-        self._ending = f"the service ends: {why}"
+        self._ending = why
         if not orderly and self.decision is not None and self.decision.state in ENERGISED:
-            self._waits = f"the last run ended in mid-charge: {why}; start to go on"
+            self._waits = Cause.of("ended_in_charge", why=why).with_("start")
 
     def offer(self, bay: Bay | None) -> str:
         """Take another policy over at the next standby; what will come of it. From any thread.
@@ -152,7 +155,7 @@ class BayRunner:
         with self._asking:
             if asked.request is Request.STOP:
                 for early in (one for one in self._asked if one.request is not Request.STOP):
-                    early.answer = "a stop came meanwhile: ask again if it is still wanted"
+                    early.answer = Cause("overtaken")
                     early.done.set()
                 self._asked = [one for one in self._asked if one.request is Request.STOP]
             self._asked.append(asked)
@@ -177,7 +180,7 @@ class BayRunner:
             self._failed(error, now_s, asked[0].request if asked else None)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         for one in asked:
-            self._answers.give(one, self.decision.answer if self.decision else "", self._revision, now_s)
+            self._answers.give(one, self.decision.answer if self.decision else None, self._revision, now_s)
         self._answers.look(now_s)
 
     def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:
@@ -193,7 +196,7 @@ class BayRunner:
             self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)
             self._keep(self._memory, now_s)
         except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
-            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=True)
+            self.decision = Decision(State.STOPPING, Cause.of("failed", error=internal), STOP, alarm=True)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         self._take_over()
@@ -205,7 +208,7 @@ class BayRunner:
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
         self.decision, self._internal, self.last_s = decision, "", now_s
-        lines = list(decision_lines(before, decision)) if before is None or decision != before else []
+        lines = list(decision_lines(before, decision, self._language)) if before is None or decision != before else []
         if self._recorder is not None:
             recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
             lines += [recorded] if recorded is not None else []
@@ -213,7 +216,7 @@ class BayRunner:
             self._journal.put(self.name, line)
         if before is None or before.state is not decision.state:
             came_from = f"{before.state} → " if before else ""
-            self._say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
+            self._say(f"{self.name}: {came_from}{decision.state}: {say(decision.cause, self._language)}")
         self._keep(self._memory, now_s)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
@@ -274,8 +277,8 @@ class BayRunner:
         """The bay's part of the status document."""
         decision = self.decision
         if decision is None:
-            decision = Decision(State.STARTING, "the service has just started")
-        status = bay_status(self.name, self._snapshot, decision, monotonic(), time())
+            decision = Decision(State.STARTING, Memory().cause)
+        status = bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language)
         bay, offered, contactor = self._rules.bay, self._offered, self._contactor
         return {
             **status,

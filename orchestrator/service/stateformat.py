@@ -6,11 +6,14 @@ from dataclasses import asdict, dataclass
 
 from orchestrator.config.station import Rs485
 from orchestrator.core.persisted import Persisted, from_first_format
-from orchestrator.model import ControlMode
+from orchestrator.model import Cause, ControlMode
 from orchestrator.service.past import Entry, Place
+from orchestrator.service.sentences import of_sentences, said
 from orchestrator.service.typed import MOST, structure
 
-FORMAT = 2
+FORMAT = 3
+#: The format before had sentences in the place of causes.
+SENTENCES = 2
 #: Before this moment (2024-01-01) no clock that was ever set can have been.
 NEVER_SET_S = 1_704_067_200.0
 #: What stands beside a bay's persisted state.
@@ -61,12 +64,12 @@ def decode(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
     """The newest run of the service and all entries, as old as they are `now`; ValueError for what is none of ours."""
     try:
         document = json.loads(data)
-        if not isinstance(document, dict) or document.get("format") != FORMAT:
+        if not isinstance(document, dict) or document.get("format") not in (FORMAT, SENTENCES):
             raise ValueError("it is not of a format that this version knows")
         figures = {name: structure(document.get(name), float) for name in ("written", "clock_s")}
         stamp = Stamp(figures["written"], figures["clock_s"], structure(document.get("boot"), str))
         run, age_s = structure(document.get("run"), int), stamp.age_s(now)
-        entries = list(_entries(document.get("entries"), age_s))
+        entries = list(_entries(document.get("entries"), age_s, sentences=document["format"] == SENTENCES))
     except (ArithmeticError, LookupError, RecursionError) as error:
         raise ValueError(repr(error)) from None
     if len({entry.place for entry in entries}) < len(entries):
@@ -74,7 +77,7 @@ def decode(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
     return run, entries
 
 
-def _entries(values: object, age_s: float) -> Iterator[Entry]:
+def _entries(values: object, age_s: float, *, sentences: bool) -> Iterator[Entry]:
     if not isinstance(values, list):
         raise ValueError("it has no list of entries")
     for value in values:
@@ -90,7 +93,8 @@ def _entries(values: object, age_s: float) -> Iterator[Entry]:
         )
         if not value.keys() >= NEEDED:
             raise ValueError(f"{', '.join(sorted(NEEDED - value.keys()))} is missing")
-        persisted: Persisted = structure({key: one for key, one in value.items() if key not in PLACE}, Persisted)
+        plain = {key: one for key, one in value.items() if key not in PLACE}
+        persisted: Persisted = structure(of_sentences(plain) if sentences else plain, Persisted)
         yield Entry(place, persisted.aged(age_s), structure(value.get("run"), int))
 
 
@@ -125,4 +129,5 @@ def _first(value: object) -> Persisted:
     plain = structure({key: one for key, one in value.items() if key != "faults"}, _First)
     faults = {structure(name, str): structure(text, str) for name, text in value["faults"].items()}
     kept = {name: from_first_format(name, text) for name, text in faults.items()}
-    return Persisted(running=plain.running, hold=plain.hold, paused=plain.paused, faults=kept)
+    hold = structure(said(plain.hold), Cause | None)
+    return Persisted(running=plain.running, hold=hold, paused=plain.paused, faults=kept)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from orchestrator.devices.charger import ChargerPort
-from orchestrator.model import STOP, ChargerReading, Operation
+from orchestrator.model import STOP, Cause, ChargerReading, Operation
 from orchestrator.service.closing import close_all
 from orchestrator.service.past import START, Place, shown
 from orchestrator.service.store import Store
@@ -86,7 +86,7 @@ class Strays:
 
     def _remember(self, stray: _Stray, *, running: bool) -> None:
         persisted = self._store.past(stray.place)
-        why = f"the station file had no bay on {shown(stray.place.port)} while its charger was running{START}"
+        why = Cause.of("stray_ran", advice=START, port=shown(stray.place.port))
         self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
 
     @property

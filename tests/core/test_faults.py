@@ -14,6 +14,7 @@ from orchestrator.keys import Range, Source
 from orchestrator.model import ENERGISED, STOP, Effect, Request, State
 from tests.core.bays import IN, running_at_the_start
 from tests.core.fault_scenes import SCENES, Scene
+from tests.core.said import reason_of, say
 from tests.core.world import TICK_S, World, bay
 
 # --- the table itself -------------------------------------------------------------------------------------------------
@@ -120,7 +121,7 @@ def test_a_stop_is_ordered_in_the_very_same_step(scene: Scene) -> None:
     assert world.state not in ENERGISED
     if scene.begin is not running_at_the_start and world.states()[-2] in ENERGISED:
         assert world.is_in(State.STOPPING)
-        assert world.decision.reason == world.decision.faults[0].text
+        assert reason_of(world.decision) == say(world.decision.faults[0].cause)
 
 
 def effect_of(scene: Scene) -> Effect:
@@ -137,7 +138,7 @@ def test_it_leads_where_its_effect_says(scene: Scene) -> None:
         lowest = scene.then is not State.CHARGING or effect_of(scene) >= Effect.LIMIT
         assert (world.decision.step is not None and world.decision.step.index == 0) is lowest
     elif effect_of(scene) >= Effect.NO_START and scene.then not in (State.UNCONTROLLABLE, State.OFFLINE):
-        assert world.raised[scene.fault] in world.decision.reason or world.decision.faults[0].id != scene.fault
+        assert world.raised[scene.fault] in reason_of(world.decision) or world.decision.faults[0].id != scene.fault
 
 
 DEBOUNCED = [scene for scene in SCENES if scene.lapse and scene.after_s > TICK_S]
@@ -194,7 +195,7 @@ def test_it_waits_for_a_start(scene: Scene) -> None:
     world = healed(scene)
     world.run(30)
     assert world.is_in(State.IDLE)
-    assert world.decision.reason == world.raised[scene.fault]
+    assert reason_of(world.decision) == world.raised[scene.fault]
     assert world.ask(Request.START) == ""
     assert not world.raised
     world.until(State.CHARGING)
@@ -213,7 +214,7 @@ def test_it_waits_for_a_reset_and_then_for_a_start(scene: Scene) -> None:
     assert not world.raised
     world.run(30)
     assert world.is_in(State.IDLE)
-    assert world.decision.reason == "reset by the operator; start to go on"
+    assert reason_of(world.decision) == "reset by the operator; start to go on"
     world.values["soc_pct"] = 50.0
     assert world.ask(Request.START) == ""
     while world.tick().state not in ENERGISED:
@@ -273,4 +274,4 @@ def test_a_pause_for_the_temperature_names_the_line_of_the_stricter_limit(
     the_bay = replace(bay(), limits=replace(bay().limits, temperature_c=limits), source=source)
     world = World(the_bay, temperature_c=celsius)
     world.until(State.SUSPENDED)
-    assert f"({place})" in world.decision.reason
+    assert f"({place})" in reason_of(world.decision)

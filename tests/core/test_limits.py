@@ -7,9 +7,11 @@ import pytest
 from orchestrator.config.policy import Band, Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.limits import choose
+from orchestrator.core.step import PRECHARGE
 from orchestrator.keys import Range, Source
 from orchestrator.model import BatteryStatus, ChargeMode, Precharge, Request, Setpoint, Snapshot, State, Step
 from tests.core.bays import POLICY, charging
+from tests.core.said import reason_of, say
 from tests.core.world import STEPS_A, TICK_S, World, bay
 
 VOLTAGE = (
@@ -56,12 +58,13 @@ def test_the_lowest_wins_and_has_a_name(values: dict[str, float], index: int, pa
     step = world.decision.step
     assert step is not None
     assert (step.index, step.current_a) == (index, STEPS_A[index])
-    assert step.rule.startswith(words)
-    assert step.rule.endswith(f", {the_policy.source.at('current.' + path)}" if path else words)
+    rule = say(step.rule)
+    assert rule.startswith(words)
+    assert rule.endswith(f", {the_policy.source.at('current.' + path)}" if path else words)
     assert world.charger.limit == index
     assert world.decision.setpoint == Setpoint(True, index, ChargeMode.CHARGE, Precharge.OFF)
-    assert world.decision.answer == ""
-    assert world.decision.reason == f"step {index} ({STEPS_A[index]:.1f} A): {step.rule}"
+    assert world.decision.answer is None
+    assert reason_of(world.decision) == f"step {index} ({STEPS_A[index]:.1f} A): {rule}"
 
 
 def test_a_table_that_is_not_there_hides_no_other() -> None:
@@ -73,7 +76,7 @@ def test_the_first_of_two_equal_limits_is_named() -> None:
     world = World(bay(replace(policy(), current=replace(policy().current, temperature_c=(
         Band(from_=0, to=45, step=2),)))), soc_pct=95.0).charging()  # fmt: skip
     assert world.decision.step is not None
-    assert world.decision.step.rule.startswith("temperature")
+    assert say(world.decision.step.rule).startswith("temperature")
 
 
 @pytest.mark.parametrize(("current_a", "index"), [(15.0, 4), (14.0, 4), (13.99, 3), (11.0, 3), (2.0, 0), (1.0, 0)])
@@ -83,7 +86,7 @@ def test_no_step_is_above_the_stations_limit(current_a: float, index: int) -> No
     assert world.decision.step is not None
     assert world.decision.step.index == index
     if index < 4:
-        assert world.decision.step.rule == "the station's current limit, depot.yaml:12"
+        assert say(world.decision.step.rule) == "the station's current limit, depot.yaml:12"
 
 
 def test_a_table_is_not_left_without_a_limit() -> None:
@@ -96,7 +99,7 @@ def test_a_table_is_not_left_without_a_limit() -> None:
         assert step is not None
         assert step.index == 0
         at = wide.source.at("current.temperature_c")
-        assert step.rule == f"temperature {celsius:.1f} °C outside of its table, {at}"
+        assert say(step.rule) == f"temperature {celsius:.1f} °C outside of its table, {at}"
     world = World(the_bay, temperature_c=45.0).charging()
     assert world.decision.step is not None
     assert world.decision.step.index == 4  # the last row's end is included
@@ -121,11 +124,11 @@ def test_down_in_the_same_step_up_after_the_hold() -> None:
     world.run(60)
     assert index(world) == 0
     at = POLICY.source.at("current.raise_after_s")
-    assert world.decision.reason.endswith(f"; a higher step is allowed, and taken after 60 s ({at})")
+    assert reason_of(world.decision).endswith(f"; a higher step is allowed, and taken after 60 s ({at})")
     world.tick()
     assert index(world) == 4
     world.tick()
-    assert "a higher step is allowed" not in world.decision.reason
+    assert "a higher step is allowed" not in reason_of(world.decision)
     assert world.decision.session is not None
     assert world.decision.session.step_changes == 2
 
@@ -161,7 +164,7 @@ def test_the_sentence_changes_with_the_line() -> None:
     world.values["temperature_c"] = 6.0
     world.tick()
     assert world.decision.step is not None
-    assert world.decision.step.rule.startswith("temperature 6.0 °C in 5 … 10")
+    assert say(world.decision.step.rule).startswith("temperature 6.0 °C in 5 … 10")
 
 
 def test_a_new_charge_needs_no_hold() -> None:
@@ -179,7 +182,7 @@ def test_what_is_not_known_is_the_lowest_step() -> None:
     world = charging()
     step, raise_s = choose(Facts(world.now_s, Snapshot(), world.memory, world.rules), None)
     at = POLICY.source.at("current.temperature_c")
-    assert (step.index, step.rule, raise_s) == (0, f"temperature unknown, {at}", None)
+    assert (step.index, say(step.rule), raise_s) == (0, f"temperature unknown, {at}", None)
 
 
 # --- faults that limit ------------------------------------------------------------------------------------------------
@@ -191,9 +194,9 @@ def test_a_fault_that_limits_means_the_lowest_step_and_is_named() -> None:
     world.tick()
     assert world.decision.step is not None
     assert world.decision.step.index == 0
-    assert world.decision.step.rule == "the fault status_limit"
+    assert say(world.decision.step.rule) == "the fault status_limit"
     world.tick()
-    assert world.decision.reason == f"step 0 (2.0 A): the fault status_limit; {world.raised['status_limit']}"
+    assert reason_of(world.decision) == f"step 0 (2.0 A): the fault status_limit; {world.raised['status_limit']}"
     world.values["status"] = 0.0
     world.run(10 + 60)
     assert index(world) == 0
@@ -207,7 +210,7 @@ def test_a_warning_does_not_limit() -> None:
     world.run(1)
     assert set(world.raised) == {"noisy_line"}
     assert index(world) == 4
-    assert "noisy" not in world.decision.reason
+    assert "noisy" not in reason_of(world.decision)
 
 
 def test_precharge_is_always_on_the_lowest_step() -> None:
@@ -215,4 +218,4 @@ def test_precharge_is_always_on_the_lowest_step() -> None:
         world = World(voltage_v=volts).charging(state)
         assert index(world) == 0
         assert world.charger.limit == 0
-        assert world.decision.step == Step(0, STEPS_A[0], "precharge is always on the lowest step")
+        assert world.decision.step == Step(0, STEPS_A[0], PRECHARGE)

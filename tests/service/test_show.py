@@ -46,12 +46,15 @@ def test_no_bays_is_only_the_head() -> None:
     assert table([]) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"
 
 
-def fault(text: str) -> Mapping[str, object]:
-    return {"id": "x", "effect": "WARN", "text": text, "since": 0.0}
+def fault(id_: str, text: str) -> Mapping[str, object]:
+    cause = {"id": id_, "key": "", "advice": id_, "params": {"what": None}}
+    return {"id": id_, "effect": "WARN", "text": text, "cause": cause, "since": 0.0}
 
 
 def test_a_fault_that_is_not_the_reason_stands_below() -> None:
-    told = bay(reason="stopped: too hot", faults=[fault("too hot"), fault("a noisy line")])
+    hot, noisy = fault("hot_trip", "too hot"), fault("noisy_line", "a noisy line")
+    cause = {"id": "several", "key": "", "advice": "", "params": {"whats": [hot["cause"]]}}
+    told = bay(reason="stopped: too hot", cause=cause, faults=[hot, noisy])
     assert table([told]).splitlines()[2:] == ["  WARN: a noisy line"]
 
 

@@ -14,6 +14,7 @@ from orchestrator.model import STOP, ChargerLink, ChargerReading, Command, Contr
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.store import Store
 from orchestrator.service.strays import WATCHED_S, Strays
+from orchestrator.text.catalogue import say
 from tests.waiting import wait_until
 
 LOST = Place("bay-1", "/dev/lost", "can0", 16)
@@ -92,7 +93,7 @@ def test_two_replies_after_a_stop_verify_it_and_its_bay_stays_held(case: Case) -
     assert case.running
     assert case.sees(stopped_s=stop_s)
     assert not case.running
-    assert case.store.past(LOST).hold == (
+    assert say(case.store.past(LOST).hold) == (
         "the station file had no bay on /dev/lost while its charger was running; start to go on"
     )
 

@@ -16,6 +16,7 @@ from orchestrator.service.records import WHOLE_EVERY
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import Difference, compare, told
 from orchestrator.workbench.replay.recording import read
+from tests.core.said import reason_of
 from tests.service.bench import STEP_S, Bench
 
 
@@ -109,7 +110,7 @@ def test_a_policy_that_ends_earlier_parts_from_the_record(journal: Path, tmp_pat
     found = [one for one in differences(journal, earlier) if one.was.state is State.CHARGING and one.parted]
     (one,) = found
     assert one.now.state is State.STOPPING
-    assert "SOC 91 % reached 90 %" in one.now.reason
+    assert "SOC 91 % reached 90 %" in reason_of(one.now)
     assert one.ended_s - one.began_s > 10
     assert "would not have been charged" in list(told(one))[-1]
 
@@ -121,7 +122,7 @@ def test_a_policy_that_stops_for_cold_earlier_is_compared_anew_from_the_next_res
                             ("- {from: 0, to: 10, step: 0} ", "- {from: 9, to: 10, step: 0} "))  # fmt: skip
     found = differences(journal, colder)
     assert (found[0].was.state, found[0].now.state) == (State.CHARGING, State.STOPPING)
-    assert "the limit is 10 °C" in found[0].now.reason
+    assert "the limit is 10 °C" in reason_of(found[0].now)
     assert (found[1].was.state, found[1].now.state) == (State.QUALIFYING, State.SUSPENDED)
 
 

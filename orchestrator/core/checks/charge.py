@@ -1,13 +1,13 @@
 """Faults of the charge itself: it takes too long, too much, or leads nowhere."""
 
 from orchestrator.core.facts import Facts
-from orchestrator.model import State
+from orchestrator.model import Cause, State
 
 #: A charge that begins at this SOC or less may take all that the policy allows; from a higher one it needs less.
 SOC_ERROR_PCT = 20.0
 
 
-def precharge_no_rise(f: Facts) -> str | None:
+def precharge_no_rise(f: Facts) -> Cause | None:
     """FAULTS C15."""
     rule, session = f.rules.policy.precharge, f.memory.session
     if rule is None or f.pack_v is None or f.memory.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS):
@@ -17,31 +17,31 @@ def precharge_no_rise(f: Facts) -> str | None:
     lasted_s, rise_v = session.rise_s, f.pack_v - session.rise_v
     if lasted_s < rule.rise.within_min * 60 or rise_v >= rule.rise.volts:
         return None
-    at = f.rules.policy.source.at("precharge.rise")
-    return f"the pack rose by {rise_v:.2f} V in {lasted_s / 60:.1f} min, {rule.rise.volts:g} V were expected ({at})"
+    return f.rules.by_policy(
+        "precharge_no_rise", "precharge.rise", rise_v=rise_v, lasted_min=lasted_s / 60, expected_v=rule.rise.volts
+    )
 
 
-def precharge_too_long(f: Facts) -> str | None:
+def precharge_too_long(f: Facts) -> Cause | None:
     """FAULTS C15."""
     rule, session = f.rules.policy.precharge, f.memory.session
     if rule is None or session is None or f.memory.state is not State.PRECHARGE_CONTINUOUS:
         return None
     if session.continuous_s <= rule.continuous.max_min * 60:
         return None
-    at = f.rules.policy.source.at("precharge.continuous.max_min")
-    minutes = session.continuous_s / 60
-    return f"continuous precharge has taken {minutes:.1f} min and the pack is below {rule.below_v:g} V ({at})"
+    key, minutes = "precharge.continuous.max_min", session.continuous_s / 60
+    return f.rules.by_policy("precharge_too_long", key, lasted_min=minutes, below_v=rule.below_v)
 
 
-def time_limit(f: Facts) -> str | None:
+def time_limit(f: Facts) -> Cause | None:
     """FAULTS C17."""
     session, hours = f.memory.session, f.rules.policy.finish.max_hours
     if session is None or session.energised_s <= hours * 3600:
         return None
-    return f"charging has taken {session.energised_s / 3600:.2f} h ({f.rules.policy.source.at('finish.max_hours')})"
+    return f.rules.by_policy("time_limit", "finish.max_hours", lasted_h=session.energised_s / 3600, limit_h=hours)
 
 
-def ah_limit(f: Facts) -> str | None:
+def ah_limit(f: Facts) -> Cause | None:
     """FAULTS C17."""
     session, max_ah = f.memory.session, f.rules.policy.finish.max_ah
     if session is None:
@@ -50,8 +50,7 @@ def ah_limit(f: Facts) -> str | None:
     need = min(1.0, (100.0 - begun_pct + SOC_ERROR_PCT) / 100.0)
     if session.charged_ah <= need * max_ah:
         return None
-    at = f.rules.policy.source.at("finish.max_ah")
-    return (
-        f"{session.charged_ah:.2f} Ah were charged since SOC {begun_pct:.0f} %: a whole charge may take {max_ah:g} Ah "
-        f"({at}), so from there {need * max_ah:.2f} Ah"
-    )
+    return f.rules.by_policy(
+        "ah_limit", "finish.max_ah",
+        charged_ah=session.charged_ah, begun_pct=begun_pct, whole_ah=max_ah, limit_ah=need * max_ah,
+    )  # fmt: skip

@@ -16,7 +16,7 @@ from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.core.witnesses.standby import UNORDERED_S
-from orchestrator.model import ENERGISED, Decision, Snapshot, State
+from orchestrator.model import ENERGISED, Cause, Decision, Snapshot, State
 from orchestrator.workbench.prove.properties import Property
 from orchestrator.workbench.prove.story import BEGIN_S, Counterexample, Move, Taken
 
@@ -105,7 +105,7 @@ class Walk:
         try:
             decision, after = self.step(now_s, snapshot, memory, self.rules)
         except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
-            stays = Decision(place.memory.state, f"{type(error).__name__}: {error}")
+            stays = Decision(place.memory.state, Cause.of("failed", error=f"{type(error).__name__}: {error}"))
             return Taken(move, now_s, snapshot, place.memory, stays, place.memory, self.rules, error=repr(error))
         return Taken(move, now_s, snapshot, place.memory, decision, after, self.rules)
 

@@ -22,13 +22,16 @@ from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.errors import ConfigError, Finding
-from orchestrator.model import Snapshot
+from orchestrator.model import Cause, Snapshot
+from orchestrator.model.cause import from_plain
 
 #: What `decision_lines` writes of a step.
 EVENTS = frozenset({"transition", "command", "fault", "session", "decision"})
 STREAMS = ("events", "snapshots")
 #: With these, nothing that was there before goes on: another run of the service, lines that no disk took.
 BREAKS = frozenset({"run", "lost"})
+#: Why a record cannot be decided again: it has the sentences of a version before, and no causes.
+SENTENCES = "an older version of this service has recorded this step: only that version can decide it again"
 #: No step takes longer than this to be written down.
 STEP_S = 60.0
 
@@ -37,6 +40,7 @@ Event = tuple[str, Mapping[str, object]]  #: kind, fields
 
 _CONVERTER = Converter(detailed_validation=False)
 _CONVERTER.register_structure_hook(Path, lambda text, _: Path(text))
+_CONVERTER.register_structure_hook(Cause, lambda value, _: from_plain(value))
 
 
 @dataclass(slots=True)
@@ -129,6 +133,8 @@ class _Reader:
         rules: Rules | None = None
         bay, at_s, parts = line["bay"], float(line["at_s"]), self._stream.parts
         if line.get("whole"):
+            if "cause" not in line["memory"]:
+                raise ValueError(SENTENCES)
             plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
             memory = _CONVERTER.structure(line["memory"], Memory)
             rules = Rules.of(_CONVERTER.structure(line["config"], Bay))

@@ -1,0 +1,60 @@
+"""Why a bay is where it is, and what becomes of requests."""
+
+from collections.abc import Mapping
+
+TEXTS: Mapping[str, str] = {
+    "said": "{text}",
+    "several": "{whats}",
+    # the service
+    "service_started": "the service has just started",
+    "service_ends": "the service ends: {why}",
+    "no_answer": "the control loop has not answered: look at the service's log",
+    "not_kept": "done, but not kept: {problem}",
+    "not_taken": "done, but not kept: the disk has not taken it",
+    "overtaken": "a stop came meanwhile: ask again if it is still wanted",
+    # while current flows
+    "charging": "step {step} ({step_a:.1f} A): {rule}{limited:after}{rises:after}",
+    "rises": "a higher step is allowed, and taken after {hold_s:g} s{at}",
+    "charges_by_itself": "the charger charges by itself (automatic mode)",
+    "limit": "{text}",
+    "precharge_step": "precharge is always on the lowest step",
+    # before a charge
+    "waits_for_values": "waiting for fresh values: {missing:word}",
+    "waits_for_contactor": "waiting for the contactor, behind which charger and battery cannot be compared",
+    "waits_for_turn": "waits for its turn: {other} begins its charge",
+    "waits_for_stagger": "waits for its turn: charges of this station begin {stagger_s:g} s apart{at}",
+    # requests
+    "operator_stop": "stopped by the operator",
+    "operator_pause": "paused by the operator",
+    "operator_reset": "reset by the operator",
+    "not_running": "not running: {what}",
+    "out_of_control": "the charger does not obey: cut its mains; nothing can start here",
+    "needs_reset": "{fault} is latched and needs a reset: {what}",
+    "still_there": "{fault} is still there: {what}",
+    "gone_first": "{fault} must be gone for {clean_s:g} s first",
+    "reset_too_often": "{fault} was reset {times} times within an hour and came again each time: remove its cause; it "
+    "can be reset again in {wait_min:.0f} min",
+    # a defect of our own
+    "failed": "internal: {error}",
+    "failed_stopping": "stopping: internal: {error}",
+    "failed_uncontrollable": "CUT THE MAINS of this charger: this software has failed to judge the bay for "
+    "{tried_s:.0f} s, and cannot verify the stop that it repeats ({error})",
+    "failed_request": "internal error: {error}; this is a defect of the software; the charger is being stopped",
+    # what the last run has left
+    "unfinished": "the last run of this service ended in mid-charge; its charger was stopped first when it began again",
+    "fault_of_another_version": "{fault}",
+    "ended_in_charge": "the last run ended in mid-charge: {why}",
+    "stray_ran": "the station file had no bay on {port} while its charger was running",
+    "past_unknown": "{bay} on {port} is not in {file}: nobody knows its past",
+    "older_version_ran": "an older version of this service has run {bay} in the meantime: see what is wired where",
+    "port_was_of": "{port} was {old_bay}'s when this service last ran, and is {bay}'s now: see what is wired where",
+    "bmu_was_of": "the BMU on {can}, node {node_id}, was {old_bay}'s when this service last ran, and is {bay}'s now: "
+    "see what is wired where",
+    "bay_moved_port": "{bay} was on {old_port} when this service last ran, and is on {port} now: see what is wired "
+    "where",
+    "bay_moved_bmu": "{bay} had the BMU on {old_can}, node {old_node_id}, when this service last ran, and has {can}, "
+    "node {node_id}, now: see what is wired where",
+    "state_unreadable": "{file} cannot be read ({error}): nobody knows which faults were latched",
+    "state_lost": "{file} is lost, though this service has run here before: nobody knows which faults were latched",
+    "state_disk_silent": "the disk of {directory} does not answer: nobody knows which faults were latched",
+}

@@ -1,0 +1,59 @@
+"""Why a bay is where it is, and what becomes of requests."""
+
+from collections.abc import Mapping
+
+TEXTS: Mapping[str, str] = {
+    "said": "{text}",
+    "several": "{whats}",
+    # the service
+    "service_started": "서비스가 방금 시작되었습니다",
+    "service_ends": "서비스가 종료됩니다: {why}",
+    "no_answer": "제어 루프가 응답하지 않았습니다: 서비스의 로그를 확인하십시오",
+    "not_kept": "수행했으나 저장되지 않았습니다: {problem}",
+    "not_taken": "수행했으나 저장되지 않았습니다: 디스크가 아직 받아들이지 않았습니다",
+    "overtaken": "그 사이에 정지 요청이 있었습니다: 여전히 필요하면 다시 요청하십시오",
+    # while current flows
+    "charging": "단계 {step}({step_a:.1f} A): {rule}{limited:after}{rises:after}",
+    "rises": "더 높은 단계가 허용되어 {hold_s:g} s 후에 적용됩니다{at}",
+    "charges_by_itself": "충전기가 스스로 충전합니다(자동 모드)",
+    "limit": "{text}",
+    "precharge_step": "프리차지는 항상 가장 낮은 단계로 합니다",
+    # before a charge
+    "waits_for_values": "최신 값을 기다리고 있습니다: {missing:word}",
+    "waits_for_contactor": "접촉기를 기다리고 있습니다. 닫히기 전에는 충전기와 배터리를 비교할 수 없습니다",
+    "waits_for_turn": "차례를 기다리고 있습니다: {other}이(가) 충전을 시작하고 있습니다",
+    "waits_for_stagger": "차례를 기다리고 있습니다: 이 스테이션의 충전은 {stagger_s:g} s 간격으로 시작합니다{at}",
+    # requests
+    "operator_stop": "작업자가 정지했습니다",
+    "operator_pause": "작업자가 일시 정지했습니다",
+    "operator_reset": "작업자가 리셋했습니다",
+    "not_running": "동작 중이 아닙니다: {what}",
+    "out_of_control": "충전기가 명령에 따르지 않습니다: 주전원을 차단하십시오. 여기서는 아무것도 시작할 수 없습니다",
+    "needs_reset": "{fault} 장애가 래치되어 리셋이 필요합니다: {what}",
+    "still_there": "{fault} 장애가 아직 남아 있습니다: {what}",
+    "gone_first": "먼저 {fault} 장애가 {clean_s:g} s 동안 없어야 합니다",
+    "reset_too_often": "{fault} 장애를 1시간 안에 {times}회 리셋했으나 매번 다시 발생했습니다: 원인을 제거하십시오. "
+    "{wait_min:.0f}분 후에 다시 리셋할 수 있습니다",
+    # a defect of our own
+    "failed": "내부 에러: {error}",
+    "failed_stopping": "정지하고 있습니다: 내부 에러: {error}",
+    "failed_uncontrollable": "이 충전기의 주전원을 차단하십시오: 소프트웨어가 {tried_s:.0f} s 동안 이 베이를 판정하지 "
+    "못했고, 반복하는 정지를 확인할 수 없습니다({error})",
+    "failed_request": "내부 에러: {error}. 소프트웨어 결함입니다. 충전기를 정지하고 있습니다",
+    # what the last run has left
+    "unfinished": "이 서비스의 지난 실행이 충전 중에 끝났습니다. 다시 시작할 때 먼저 충전기를 정지시켰습니다",
+    "fault_of_another_version": "{fault}",
+    "ended_in_charge": "지난 실행이 충전 중에 끝났습니다: {why}",
+    "stray_ran": "충전기가 동작하는 동안 스테이션 파일에 {port}의 베이가 없었습니다",
+    "past_unknown": "{port}의 {bay}이(가) {file}에 없습니다: 이전 상태를 알 수 없습니다",
+    "older_version_ran": "그 사이에 이 서비스의 이전 버전이 {bay}을(를) 운전했습니다: 배선을 확인하십시오",
+    "port_was_of": "{port}은(는) 지난 실행 때 {old_bay}의 것이었고 지금은 {bay}의 것입니다: 배선을 확인하십시오",
+    "bmu_was_of": "{can}의 BMU(노드 {node_id})는 지난 실행 때 {old_bay}의 것이었고 지금은 {bay}의 것입니다: 배선을 "
+    "확인하십시오",
+    "bay_moved_port": "{bay}은(는) 지난 실행 때 {old_port}에 있었고 지금은 {port}에 있습니다: 배선을 확인하십시오",
+    "bay_moved_bmu": "{bay}의 BMU는 지난 실행 때 {old_can}의 노드 {old_node_id}였고 지금은 {can}의 노드 {node_id}입니다: "
+    "배선을 확인하십시오",
+    "state_unreadable": "{file}을(를) 읽을 수 없습니다({error}): 어떤 장애가 래치되어 있었는지 알 수 없습니다",
+    "state_lost": "이 서비스가 여기서 실행된 적이 있는데 {file}이(가) 없습니다: 어떤 장애가 래치되어 있었는지 알 수 없습니다",
+    "state_disk_silent": "{directory}의 디스크가 응답하지 않습니다: 어떤 장애가 래치되어 있었는지 알 수 없습니다",
+}
