@@ -1,7 +1,12 @@
 """`orchestrator`, and `python -m orchestrator`: two verbs that must not wait for anybody's imports, then the rest."""
 
+import _signal  # type: ignore[import-not-found]  # what `signal` is made of, without the time that its import takes
 import os
 import sys
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 def main() -> int:
@@ -16,9 +21,10 @@ def main() -> int:
 
 def _run(arguments: list[str]) -> int:
     if arguments[:1] == ["estop"]:
+        _signal.signal(_signal.SIGINT, _signal.SIG_IGN)  # until it can say what it has stopped
         from orchestrator.lastresort.estop import main as estop
 
-        return estop(arguments[1:])
+        return estop(arguments[1:], _catch)
     if arguments[:1] == ["run"] and not any(word.startswith("-") for word in arguments) and len(arguments) <= 2:
         from orchestrator.lastresort.guardian import guard
 
@@ -26,6 +32,13 @@ def _run(arguments: list[str]) -> int:
     from orchestrator.cli import main as command_line
 
     return command_line(arguments)
+
+
+def _catch(wish: "Callable[[], None]") -> None:
+    """Ctrl-C, `kill` and a closed terminal do not end an emergency stop in silence. `nohup` stays what it is."""
+    for number in (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP):
+        if number == _signal.SIGINT or _signal.getsignal(number) is not _signal.SIG_IGN:
+            _signal.signal(number, lambda *_: wish())
 
 
 def _import_from_no_working_directory() -> None:

@@ -32,6 +32,8 @@ REQUESTS = {
 #: not obey is uncontrollable after 3 s.
 STOPS = ("stop", "pause")
 STANDBY_S, LOOK_S = 4.0, 0.1
+#: `status --watch` looks this often.
+WATCH_S = 1.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -82,6 +84,8 @@ def _add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParse
         request = verbs.add_parser(verb, help=about)
         request.add_argument("bay", nargs="*", help="the bays")
         request.add_argument("--all", action="store_true", help="every bay of the station")
+        if verb == "reset":
+            request.add_argument("--port", help="forget the charger on this port, which no bay has and which is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
 
@@ -150,14 +154,25 @@ def _status(arguments: argparse.Namespace) -> int:
     from orchestrator.lastresort.asking import ask
     from orchestrator.service.where import find_socket
 
-    path = find_socket(arguments.socket)
+    path, seen, lost = find_socket(arguments.socket), False, ""
     while True:
-        answer = ask(path, {"verb": "status", "bay": arguments.bay})
-        answer.pop("ok")
-        _show_status(answer, as_json=arguments.json, clear=arguments.watch and sys.stdout.isatty())
+        try:
+            answer = ask(path, {"verb": "status", "bay": arguments.bay})
+        except NoServiceError as error:
+            if not (arguments.watch and seen):  # one that has never answered may be the wrong one
+                raise
+            if not lost:
+                lost = str(error)
+                print(f"orchestrator: still watching: {error}", file=sys.stderr, flush=True)
+        else:
+            answer.pop("ok")
+            _show_status(answer, as_json=arguments.json, clear=arguments.watch and sys.stdout.isatty())
+            if lost:
+                print("orchestrator: the service answers again", file=sys.stderr, flush=True)
+            seen, lost = True, ""
         if not arguments.watch:
             return 0
-        time.sleep(1.0)
+        time.sleep(WATCH_S)
 
 
 def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
@@ -174,11 +189,13 @@ def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.lastresort.asking import ask
     from orchestrator.service.where import find_socket
 
-    if bool(arguments.bay) == arguments.all:
-        raise UsageError(f"{arguments.verb}: name bays, or --all")
+    port = getattr(arguments, "port", None)
+    if bool(arguments.bay) + arguments.all + (port is not None) != 1:
+        raise UsageError(f"{arguments.verb}: name bays, or --all{', or --port' if arguments.verb == 'reset' else ''}")
     bays, path = None if arguments.all else arguments.bay, find_socket(arguments.socket)
+    request = {"verb": arguments.verb, "bays": bays} | ({} if port is None else {"port": os.path.abspath(port)})  # noqa: PTH100 - not resolved
     try:
-        results = cast("dict[str, str]", ask(path, {"verb": arguments.verb, "bays": bays})["results"])
+        results = cast("dict[str, str]", ask(path, request)["results"])
     except NoServiceError as error:
         without = "; to stop chargers without a service: orchestrator estop" if arguments.verb in STOPS else ""
         raise ServiceError(f"{error}{without}") from None

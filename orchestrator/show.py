@@ -51,9 +51,10 @@ def table(bays: Sequence[Bay]) -> str:
 
 
 def other_faults(bay: Bay) -> list[Mapping[str, object]]:
-    """The faults that the reason does not tell already."""
+    """The faults that the reason does not tell already, as its cause or as the state."""
     faults, told = cast("list[Mapping[str, object]]", bay["faults"]), set(_told(bay.get("cause")))
-    return [fault for fault in faults if told.isdisjoint(islice(_told(fault.get("cause")), 1))]
+    said = {"will_not_stop"} if bay["state"] == "UNCONTROLLABLE" else set()
+    return [one for one in faults if one["id"] not in said and told.isdisjoint(islice(_told(one.get("cause")), 1))]
 
 
 def _told(cause: object) -> Iterator[tuple[object, ...]]:
@@ -142,7 +143,7 @@ def _row(bay: Bay) -> tuple[str, ...]:
         _marked(figure(charger["current_a"], "{:.2f} A"), old=bool(charger.get("old"))),
         _marked(figure(battery["temperature_c"], "{:.1f} °C"), old="temperature_c" in old),
         "–" if step is None else f"{step} ({figure(bay.get('step_current_a'), '{:g} A')})",
-        str(bay["reason"]),
+        "see ALARM" if is_alarming(bay) else str(bay["reason"]),
     )
 
 

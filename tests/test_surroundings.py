@@ -14,7 +14,22 @@ from tests.whole.station import die_with_parent
 ROOT = Path(__file__).resolve().parent.parent
 STATION = shipped_dir() / "configs" / "stations" / "one-bay.yaml"
 #: Names of what any of our verbs imports sooner or later.
-TRAPS = ("serial", "yaml", "can", "canopen", "transitions", "durand", "rich", "json", "argparse", "selectors", "queue")
+TRAPS = (
+    "serial",
+    "yaml",
+    "can",
+    "canopen",
+    "transitions",
+    "durand",
+    "rich",
+    "json",
+    "argparse",
+    "selectors",
+    "queue",
+    "logging",
+    "signal",
+    "socket",
+)
 
 #: As a console script, and by the interpreter.
 WAYS = {
@@ -71,6 +86,22 @@ def test_nothing_in_the_working_directory_is_run(way: str, words: tuple[str, ...
     done = run(way, folder, *words, env={"PYTHONPATH": path})
     assert not (folder / "RAN").exists(), (folder / "RAN").read_text(encoding="utf-8")
     assert "Traceback" not in done.stderr
+
+
+def test_with_p_not_even_what_python_itself_begins_with(tmp_path: Path) -> None:
+    """Under `-m` alone, Python has imported these from the working directory before a line of ours is run."""
+    for name in ("pkgutil", "collections", "functools", "warnings", "types"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'RAN')!r}, 'a').write('{name}')", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-P", *WAYS["module"], "schema", "station"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        cwd=tmp_path,
+        capture_output=True,
+        timeout=30,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert not (tmp_path / "RAN").exists()
 
 
 def test_nor_by_the_processes_that_are_started(folder: Path) -> None:

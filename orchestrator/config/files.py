@@ -57,7 +57,7 @@ def find(kind: Kind, text: str, base: Path) -> Place:
     if "/" in text or text.endswith((".yaml", ".yml")):
         path = Path(os.path.normpath(base / text))
         try:
-            if (base / text).is_file():
+            if (base / text).exists():  # what is no file is told when it is read
                 return Place(base / text, str(path))
         except OSError as error:  # e.g. a name that is too long
             raise UnfitError(f"{shown(text)}: {error.strerror}") from None

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from orchestrator.config.change import changed
 from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
+from orchestrator.config.plainfile import read_plain
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems
 from orchestrator.config.scenario import Scenario
@@ -23,6 +24,8 @@ T = TypeVar("T")
 Lint = Callable[[Mapping[str, object]], Problems]  #: a file's values by their paths → what can hardly be meant
 #: So many hexadecimal digits tell two versions of a file apart.
 DIGEST = 12
+#: What is expected wherever a file is named.
+OURS = "a YAML file: a station, a policy, an object map or a scenario"
 
 
 def load_station(path: str | Path) -> Station:
@@ -153,8 +156,7 @@ class _Loader:
         real = os.path.realpath(where.path)
         if real not in self._trees:
             try:
-                with where.path.open("rb") as stream:
-                    text = stream.read(MAX_BYTES + 1)
+                text = read_plain(where.path, MAX_BYTES, OURS)
                 self._digests[real] = sha256(text).hexdigest()[:DIGEST]
                 node, findings = parse(self._name(where), text)
             except OSError as error:

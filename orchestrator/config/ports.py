@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.config.plainfile import read_plain
 from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Items, Node, Scalar, parse
 
 _COMMENT = re.compile(rb"(?:^|(?<=\s))#.*", re.MULTILINE)
@@ -40,8 +41,7 @@ def wiring(path: Path) -> Wiring:
     What looks like `port: /dev/…` counts wherever it stands, in a file that is not even YAML, too. Raises `OSError` if
     the file cannot be read.
     """
-    with path.open("rb") as stream:
-        data = stream.read(MAX_BYTES)
+    data = read_plain(path, MAX_BYTES, "a station file")
     node, wrong = parse(str(path), data)
     ports = {} if node is None else _ports(node)
     bare = _COMMENT.sub(b"", data)

@@ -162,7 +162,10 @@ def _filters(buses: Mapping[str, Mapping[str, object]], bays: Mapping[str, Value
         for bay in bays.values():
             node_id = bay.get("battery.node_id")
             if bay.get("battery.can") == name and isinstance(node_id, int) and not passed(_SDO_ANSWERS + node_id):
-                yield at, f"keeps back 0x{_SDO_ANSWERS + node_id:X}, the answers of the BMU with node id {node_id}"
+                yield (
+                    at,
+                    f"keeps back 0x{_SDO_ANSWERS + node_id:X}, the answers of the BMU with node id 0x{node_id:02X}",
+                )
 
 
 def _passed(filters: object) -> Callable[[int], bool] | None:

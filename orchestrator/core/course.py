@@ -6,11 +6,12 @@ the charger be trusted to stand by, does something keep us from charging, does t
 
 from dataclasses import replace
 
+from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import finished
 from orchestrator.core.machine import RESTING, Trigger
-from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, proved_to_last
+from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, verified
 from orchestrator.core.witnesses.standby import current_without_order, sees_current
 from orchestrator.model import ENERGISED, ActiveFault, Cause, Effect, State
 
@@ -102,7 +103,7 @@ def _precharging(f: Facts) -> Course:
 
 def _stopping(f: Facts, faults: Faults) -> Course:
     state, memory = f.memory.state, f.memory
-    if proved_to_last(f) if state is State.UNCONTROLLABLE else f.stopped:
+    if verified(f):
         return _rest(f, faults)
     if gives_up(f):
         return Trigger.GIVE_UP, _out_of_control(f)
@@ -119,6 +120,11 @@ def _out_of_control(f: Facts) -> str:
     if f.stopped:
         lasts_s = f.now_s - memory.witnessed.proof[0]
         return f"{do} unless it stays off: it has stood by for {lasts_s:.0f} s, {LASTS_S:g} s are believed"
+    if f.charger.online and f.reading is not None and not f.runs and sees_current(f):
+        return (  # a BMU with an offset, or one that stands still, looks the same as a charger that lies
+            f"{do}: it says {f.reading.current_a:.2f} A, the BMU still sees {f.pack_a:.1f} A; one of them is wrong. "
+            "If the BMU shows it with the mains off too, restart the BMU"
+        )
     since_s = memory.stopping_s if memory.stopping_s is not None else f.now_s - f.state_s
     return f"{do} now: it has not obeyed the stop for {f.now_s - since_s:.0f} s: {_why(f)}"
 
@@ -132,8 +138,6 @@ def _why(f: Facts) -> str:
         return (f.charger.problem or f"no answer on {f.rules.bay.charger.port}") + last + sees
     if f.runs:
         return f"it delivers {f.reading.current_a:.2f} A{sees}"
-    if sees_current(f):
-        return f"it says {f.reading.current_a:.2f} A{sees}: believe the BMU"
     return f"its status does not show a standby that lasts{sees}"
 
 
@@ -175,7 +179,7 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, Cause | str]:
     worst = faults[0] if faults else None
     lost = not f.charger.online or f.reading is None
     if worst is not None and worst.effect is Effect.TRIP and (memory.state is State.TRIPPED or not lost):
-        return Trigger.TRIP, worst.cause
+        return Trigger.TRIP, _then(worst.cause, latches.goes_on(f))
     if lost:  # a trip promises a stop that was verified: first the line
         return Trigger.LOSE, _offline_reason(f)
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
@@ -197,8 +201,12 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, Cause | str]:
     if f.soc is not None and not wanted:
         return Trigger.REST, why
     if worst is not None and worst.effect >= Effect.NO_START:
-        return Trigger.SUSPEND, worst.cause
+        return Trigger.SUSPEND, _then(worst.cause, latches.goes_on(f))
     return (Trigger.QUALIFY if wanted else Trigger.REST), why
+
+
+def _then(cause: Cause, then: Cause | None) -> Cause:
+    return cause.with_(then=then) if then is not None else cause
 
 
 def _absent(f: Facts) -> tuple[Trigger, str] | None:
@@ -207,7 +215,7 @@ def _absent(f: Facts) -> tuple[Trigger, str] | None:
         return None
     if not f.departed:
         does_not = "has just booted" if f.just_booted else "does not answer"
-        problem = f.battery.problem or f"the BMU (node {f.rules.bay.battery.node_id}) {does_not}"
+        problem = f.battery.problem or f"the BMU (node 0x{f.rules.bay.battery.node_id:02X}) {does_not}"
         return Trigger.LOSE, f"{f.volts or 0:.1f} V at the charger, but {problem}"
     return Trigger.REST, "no battery"
 

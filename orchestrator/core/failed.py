@@ -40,7 +40,7 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
     answer = Cause.of("failed_request", error=error) if refused else None
     decision = Decision(
-        memory.state, memory.cause, STOP, faults=shown(memory.faults), alarm=out, closed=memory.closed,
+        memory.state, memory.cause, STOP, faults=shown(memory.faults, now_s), alarm=out, closed=memory.closed,
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory

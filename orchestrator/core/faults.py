@@ -19,6 +19,7 @@ from orchestrator.core.witnesses import measured, pack, paired, standby
 from orchestrator.model import ENERGISED, Cause, Effect, State
 
 Check = Callable[[Facts], Cause | None]
+Past = Callable[[Cause, float], Cause]
 
 
 class Clear(Enum):
@@ -59,6 +60,9 @@ class Row:
     polls: int = 1  #: … and be seen in this many charger readings; both drain while it is away
     clean_s: float = 0.0  #: AUTO, RESET: how long the condition must be gone
     departs: bool = False  #: a battery that leaves in mid-charge looks like this; once it has left, it was no fault
+    moment: bool = False  #: it tells of a moment, not of what is: said with how long ago
+    at_rest: str = ""  #: the id of what to do once the charger stands by, verified, where that is something else
+    past: Past | None = None  #: what is said of it from then on, made of its evidence and of how long it lasted, in s
 
 
 E = Effect
@@ -95,10 +99,11 @@ FAULTS: tuple[Row, ...] = (
     Row("rogue_run", "C5", E.TRIP, Clear.RESET, obedience.rogue_run, AT_REST,
         "somebody else commands this charger, or it is defective: find out, then reset"),
     Row("current_without_order", "C29", E.TRIP, Clear.RESET, standby.current_without_order, AT_REST | UNSEEN,
-        "cut the charger's mains if the current goes on; check the bay's serial cable and what else charges this pack, "
-        "then reset", clean_s=5),
+        "cut the charger's mains if the current goes on; if the BMU shows it with the mains off too, restart the BMU, "
+        "else check the bay's serial cable and what else charges this pack, then reset", clean_s=5),
     Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNSTOPPED,
-        "cut the charger's mains now; reset after it was repaired", for_s=OBEY_STOP_S),
+        "cut the charger's mains now; reset after it was repaired", for_s=OBEY_STOP_S,
+        at_rest="stands_by_now", past=obedience.did_not_stop),
     Row("contactor_lost", "C6", E.STOP, Clear.BACKOFF, obedience.contactor_lost, ALWAYS,
         "check the GPIO chip and the line that the station file names (gpioinfo shows who uses it)"),
     Row("will_not_start", "C7", E.STOP, Clear.BACKOFF, obedience.will_not_start, ENERGISED,
@@ -184,7 +189,7 @@ FAULTS: tuple[Row, ...] = (
     Row("soh_low", "B17", E.NO_START, Clear.AUTO, battery.soh_low, ALWAYS,
         "the pack is worn out: replace it", clean_s=5),
     Row("soc_jump", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_jump, ALWAYS,
-        "the BMU may have corrected itself; if it happens often, have it calibrated", clean_s=5),
+        "the BMU may have corrected itself; if it happens often, have it calibrated", clean_s=5, moment=True),
     Row("soc_falls", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_falls, ENERGISED,
         "look for a load on the battery, and have the BMU calibrated", clean_s=60),
     Row("figures_disagree", "B17", E.WARN, Clear.AUTO, state_of_charge.figures_disagree, ENERGISED,

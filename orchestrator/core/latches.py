@@ -10,16 +10,20 @@ which is judged last, and all the others go on.
 """
 
 from dataclasses import replace
+from math import ceil
 
 from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
+from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory
+from orchestrator.core.safestop import verified
 from orchestrator.model import ActiveFault, Cause, Effect
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
 BACKOFF_S = (10.0, 60.0, 300.0)
+MINUTE_S = 60.0
 #: Strikes are forgotten after this long; one more than there are backoffs latches.
 STRIKES_S = 3600.0
 
@@ -97,7 +101,10 @@ def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMem
     wait_s = clear_after_s(row, fault)
     if wait_s is not None and now_s - clean_s >= wait_s:
         return FaultMemory(strikes=fault.strikes) if fault.strikes else None
-    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s)
+    cause = fault.cause
+    if row.past is not None and cause is not None and f.memory.state in UNVERIFIED and verified(f):
+        cause = row.past(cause, row.for_s + clean_s - fault.raised_s)
+    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause)
 
 
 def clear_after_s(row: Row, fault: FaultMemory) -> float | None:
@@ -121,19 +128,57 @@ def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
     return live
 
 
-def shown(faults: dict[str, FaultMemory]) -> tuple[ActiveFault, ...]:
-    """The faults in force: what was seen, and as its advice the row, which says what to do."""
+def shown(faults: dict[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
+    """The faults in force: what was seen, and the id of what to do.
+
+    `at_rest`: the charger stands by, verified.
+    """
     return tuple(
-        ActiveFault(name, effect(name, fault), _cause(name, fault), fault.raised_s or 0.0)
+        ActiveFault(name, effect(name, fault), _cause(ROW[name], fault, now_s, at_rest=at_rest), fault.raised_s or 0.0)
         for name, fault in raised(faults)
     )
 
 
-def _cause(name: str, fault: FaultMemory) -> Cause:
-    cause, does = fault.cause or Cause(name), effect(name, fault).name
-    if fault.latched and ROW[name].clear is not Clear.RESET:
-        return cause.with_(name, effect=does, strikes=len(fault.strikes))
-    return cause.with_(name, effect=does)
+def _cause(row: Row, fault: FaultMemory, now_s: float, *, at_rest: bool) -> Cause:
+    """What a person reads of it: the evidence, the advice, and what bears on either."""
+    more: dict[str, object] = {"effect": effect(row.id, fault).name}
+    if fault.latched and row.clear is not Clear.RESET:
+        more["strikes"] = len(fault.strikes)
+    if row.moment:
+        more["ago_min"] = _whole_min(now_s - (fault.raised_s or 0.0))
+    return (fault.cause or Cause(row.id)).with_(row.at_rest if at_rest and row.at_rest else row.id, **more)
+
+
+def _whole_min(age_s: float) -> int:
+    return round(age_s / MINUTE_S) if age_s >= MINUTE_S else 0
+
+
+def goes_on(f: Facts) -> Cause | None:
+    """When a bay goes on whose worst fault has a backoff, or what a person types for that.
+
+    None for all other faults, whose own words say it. Made anew in each step, and part of no fault: who looks for news
+    compares ids.
+    """
+    name, fault = raised(f.memory.faults)[0]
+    if ROW[name].clear is not Clear.BACKOFF:
+        return None
+    if fault.latched:
+        return Cause.of("goes_on_by_reset", bay=f.rules.bay.name) if fault.clean_s is not None else None
+    others = [(one, other) for one, other in raised(f.memory.faults) if effect(one, other) >= Effect.NO_START]
+    lefts_s = [_left_s(ROW[one], other, f.now_s) for one, other in others]
+    own_s, strike = _left_s(ROW[name], fault, f.now_s), max(len(fault.strikes), 1)
+    if own_s is None:
+        wait_s = clear_after_s(ROW[name], fault)
+        return Cause.of("goes_on_after", wait_s=wait_s, strike=strike, of=len(BACKOFF_S))
+    known_s = [left_s for left_s in lefts_s if left_s is not None]
+    id_ = "goes_on_in_at_the_earliest" if len(known_s) < len(lefts_s) else "goes_on_in"
+    return Cause.of(id_, left_s=ceil(max(known_s)), strike=strike, of=len(BACKOFF_S))
+
+
+def _left_s(row: Row, fault: FaultMemory, now_s: float) -> float | None:
+    """After how long a fault clears by itself, by what is known now."""
+    wait_s = clear_after_s(row, fault)
+    return None if wait_s is None or fault.clean_s is None else max(0.0, wait_s - (now_s - fault.clean_s))
 
 
 def release(

@@ -50,6 +50,7 @@ class Memory:
     verified_s: float | None = None  #: … and when standby was last proved
     returns: int = 0  #: how often the charger has run again since that stop began
     left_s: float | None = None  #: when the battery left in mid-charge; None: it did not, or that is dealt with
+    left_as: tuple[float | None, float | None] = (None, None)  #: … and with which SOC and volts
     returned_s: float | None = None  #: when a battery came back so soon that only its plug can have been loose
     reverts: tuple[float, ...] = ()  #: when a setting that the charger had confirmed went back by itself
     confirmed: bool = False  #: the charger's newest reply showed the step that it was told

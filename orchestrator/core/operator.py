@@ -1,20 +1,33 @@
-"""What becomes of an operator's request. A refusal names its cause; a reset permits a start, it does not make one."""
+"""What becomes of an operator's request. A refusal names its cause; a reset permits a start, it does not make one.
+
+Accepted is what has an effect, or what is so already. Any other request that would change nothing is refused with what
+the bay does, or waits for; a stop alone is always accepted.
+"""
 
 from collections.abc import Callable
 
 from orchestrator.core import latches
 from orchestrator.core.memory import Memory
-from orchestrator.model import Cause, Request, State
+from orchestrator.core.safestop import LASTS_S
+from orchestrator.model import ENERGISED, Cause, Request, State
 from orchestrator.model.cause import together
 
+#: A charge has been started already.
+AT_WORK = ENERGISED | {State.QUALIFYING}
 STOPPED = Cause("operator_stop", advice="start")
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
 RESET = Cause("operator_reset", advice="start")
+OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 
-def hear(memory: Memory, request: Request, now_s: float) -> Cause | None:
-    """Change the memory as the operator asks; None when it was done, else why not."""
+def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Cause | None:
+    """Change the memory as the operator asks; None when it was done, else why not.
+
+    What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
+    """
+    if unkept and request in (Request.START, Request.RESET):
+        return Cause.of("not_done", problem=unkept)
     return VERBS[request](memory, now_s)
 
 
@@ -24,6 +37,9 @@ def _stop(memory: Memory, _now_s: float) -> Cause | None:
 
 
 def _pause(memory: Memory, _now_s: float) -> Cause | None:
+    latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
+    if latched:  # its reset leads to a start, which would end the pause
+        return Cause.of("reset_first", faults=latched)
     if memory.hold:
         return Cause.of("not_running", what=memory.hold)
     memory.paused = True
@@ -32,15 +48,20 @@ def _pause(memory: Memory, _now_s: float) -> Cause | None:
 
 def _start(memory: Memory, now_s: float) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
-        return Cause("out_of_control")
-    memory.faults, refusals = latches.release(memory.faults, now_s, by_reset=False)
+        return OUT_OF_CONTROL
+    before = memory.faults
+    memory.faults, refusals = latches.release(before, now_s, by_reset=False)
     if refusals:
         return together(refusals)
+    if not (memory.hold or memory.paused) and len(memory.faults) == len(before) and memory.state not in AT_WORK:
+        return Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause)
     memory.hold, memory.paused = None, False
     return None
 
 
 def _reset(memory: Memory, now_s: float) -> Cause | None:
+    if memory.state is State.UNCONTROLLABLE:
+        return OUT_OF_CONTROL
     before = memory.faults
     faults, refusals = latches.release(before, now_s, by_reset=True)
     cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
@@ -48,9 +69,10 @@ def _reset(memory: Memory, now_s: float) -> Cause | None:
     refusals = refusals or [cause for name in cleared if (cause := _too_often(name, resets, now_s))]
     if refusals:
         return together(refusals)
+    if len(faults) == len(before):
+        return Cause.of("nothing_to_reset", state=memory.state.value, what=memory.cause)
     memory.faults, memory.resets = faults, resets + tuple((now_s, name) for name in cleared)
-    if len(memory.faults) < len(before):  # in whatever state: the way on is a start, also while the stop is verified
-        memory.hold = RESET
+    memory.hold = RESET  # in whatever state: the way on is a start, also while the stop is verified
     return None
 
 

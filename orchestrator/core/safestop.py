@@ -53,6 +53,16 @@ def proved_to_last(f: Facts) -> bool:
     return f.stopped and f.charger.online and f.now_s - proof[0] >= LASTS_S
 
 
+def verified(f: Facts) -> bool:
+    """The stop that is being tried is done."""
+    return proved_to_last(f) if f.memory.state is State.UNCONTROLLABLE else f.stopped
+
+
+def stands_by(f: Facts) -> bool:
+    """By what is known now, in whatever state: the charger does not run, and nothing is left to be verified."""
+    return verified(f) if f.memory.state in UNVERIFIED else not must_stop(f, f.memory.state)
+
+
 def _runs_again(f: Facts) -> bool:
     """It was stopped before, in vain. One reply alone may be a stray measurement: a second one, or a second return, is
     none."""

@@ -13,7 +13,7 @@ from orchestrator.core.machine import fire
 from orchestrator.core.memory import Memory
 from orchestrator.core.operator import hear
 from orchestrator.core.rules import Rules
-from orchestrator.core.safestop import follow_stop, must_stop
+from orchestrator.core.safestop import follow_stop, must_stop, stands_by
 from orchestrator.core.sequence import next_order
 from orchestrator.core.track import follow, follow_state
 from orchestrator.model import (
@@ -58,9 +58,9 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
         memory.since_s = now_s
     f = Facts(now_s, snapshot, memory, rules)
     follow(f, last_s)
-    answer = hear(memory, snapshot.request, now_s) if snapshot.request is not None else None
+    answer = hear(memory, snapshot.request, now_s, snapshot.unkept) if snapshot.request is not None else None
     memory.faults = latches.update(f)
-    faults = latches.shown(memory.faults)
+    faults = latches.shown(memory.faults, now_s, at_rest=stands_by(f))
     ended = _move(f, faults)
     setpoint, chosen = _setpoint(f, faults)
     memory.closed = closes(memory.state, closed=memory.closed, standby=f.standby)

@@ -23,6 +23,8 @@ from orchestrator.model import ENERGISED, Action, Cause, ChargeMode, ChargerRead
 WARMTH_EVERY_S = 10.0
 #: A battery that leaves in mid-charge and is back within this was not taken away: its plug is loose.
 LOOSE_PLUG_S = 60.0
+#: … unless its volts are so much other ones: several times what a pack loses when its charge is cut off.
+OTHER_V_SHARE = 0.05
 
 Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
 
@@ -109,10 +111,21 @@ def _follow_departure(f: Facts) -> None:
     memory.returned_s = None
     if f.departed:
         if memory.session is not None and memory.left_s is None:
+            volts = f.snapshot.battery.voltage_v
             memory.left_s = f.now_s
-    elif memory.left_s is not None and f.battery.online and not f.silent:
-        memory.returned_s = f.now_s if f.now_s - memory.left_s < LOOSE_PLUG_S else None
+            memory.left_as = (memory.session.soc_pct, volts.value if volts is not None else None)
+    elif memory.left_s is not None and f.battery.online and f.soc is not None and f.pack_v is not None:
+        gap_s = f.now_s - memory.left_s
+        memory.returned_s = f.now_s if gap_s < LOOSE_PLUG_S and not _is_another(f) else None
         memory.left_s = None
+
+
+def _is_another(f: Facts) -> bool:
+    """What has come is not the battery that left, by its SOC or its volts; those of a loose plug go on."""
+    left_pct, left_v = f.memory.left_as
+    by_soc = left_pct is not None and f.soc is not None and abs(f.soc - left_pct) > SOC_OTHER_PCT
+    by_volts = left_v is not None and f.pack_v is not None and abs(f.pack_v - left_v) > OTHER_V_SHARE * left_v
+    return by_soc or by_volts
 
 
 def _follow_charge(f: Facts) -> None:

@@ -8,22 +8,23 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
-from orchestrator.lastresort.lastline import HELD
+from orchestrator.lastresort.bareport import HELD
+from orchestrator.lastresort.descriptors import Turns, room
 from orchestrator.lastresort.laststop import LOOK_S, LastStop
 
 USAGE = """\
 usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held]
 
-Stop the charger on every port of the station file, or on the given ports, and verify it. Without arguments the file is
+Stop the charger on every port of the station file, and on the given ports, and verify it. Without arguments the file is
 station.yaml in this folder, else that of the installed service, else that of a service that runs. Ports whose chargers
 may be running by what the service has written down are stopped, too, whether the file still names them or not.
 Needs no running service. Each one that holds one of these ports is told to hold its bays until an operator starts them.
 Then the station file's contactors are opened. Those that a service holds are left to it: it opens them by itself
 where a charger does not obey.
 
-  --port PATH ...  these ports, without a station file
+  --port PATH ...  these ports: without a station file, or besides those of the one that is named
   --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or what the station file says)
   --leave-held     leave ports alone that a running service holds, and tell it nothing
 
@@ -36,6 +37,7 @@ OPENING, OPEN_S = "its driver hangs", 0.5
 #: still holds the ports is its controller, frozen as well, and is killed only afterwards.
 FROZEN = "watchdog"
 UNTOLD = "a service that holds a port could not be told: it may start its chargers again"
+HURRIED = "interrupted: every charger was sent its stop, but not each was given the time to prove it: run this again"
 LOST = "every charger that was found is told of here, but it may have named more, and those may run"
 #: How long the proof of standby is waited for, and a service's answer.
 VERIFY_S = 3.0
@@ -72,14 +74,14 @@ class Options:
                 self.stations.append(word)
         if os.environ.get("SERVICE_RESULT") == FROZEN:
             self.leave_held = False
-        if len(self.stations) + bool(self.ports) > 1:
-            self.wrong = "name one station file, or ports"
+        if len(self.stations) > 1:
+            self.wrong = "name one station file"
         elif taking == "--socket" or (taking == "--port" and not self.ports):
             self.wrong = f"{taking} needs a path"
 
 
-def main(words: list[str]) -> int:
-    """Stop, verify, tell; the exit status."""
+def main(words: list[str], catch: Callable[[Callable[[], None]], None] = lambda _: None) -> int:
+    """Stop, verify, tell; the exit status. `catch` is given what whoever wants this to end is to call."""
     if "-h" in words or "--help" in words:
         _say(1, USAGE.rstrip())
         return 0
@@ -88,9 +90,9 @@ def main(words: list[str]) -> int:
         _say(2, f"orchestrator estop: {options.wrong}\n{USAGE.rstrip()}")
         return 2
     stop = EmergencyStop(options)
-    if options.ports:
-        stop.stop(dict.fromkeys(options.ports, ""))
-    else:
+    catch(stop.hurry)
+    stop.stop(dict.fromkeys(options.ports, ""))
+    if options.stations or not options.ports:
         stop.by_station()
     return stop.finish()
 
@@ -101,9 +103,9 @@ class EmergencyStop:
     def __init__(self, options: Options) -> None:
         self._options, self._socket = options, options.socket
         self._began_s = time.monotonic()
-        self._stopping = LastStop(leave_held=options.leave_held, watch_s=WATCH_S)
+        self._stopping = LastStop(leave_held=options.leave_held, watch_s=WATCH_S, turns=Turns(room()))
         self._bays: dict[str, str] = {}  # of each port's bay the name, where it has one
-        self._real: set[str] = set()
+        self._real: dict[str, str] = {}  # a port's real name → the one that it is called by
         self._contactors: tuple[Contactor, ...] = ()
         self._opening: set[Contactor] = set()
         self._cut: dict[Contactor, str] = {}  # what became of them
@@ -116,10 +118,16 @@ class EmergencyStop:
         for port, bay in bays.items():
             real = os.path.realpath(port)
             if real not in self._real:
-                self._real.add(real)
+                self._real[real] = port
                 new[port] = bay
+            elif bay and not self._bays.get(self._real[real], bay):
+                self._bays[self._real[real]] = bay
         self._bays.update(new)
         self._stopping.stop(dict.fromkeys(new))
+
+    def hurry(self) -> None:
+        """Somebody wants this to end: it does once every charger has had its stop, and it tells what it knows."""
+        self._stopping.hurried = True
 
     def by_station(self) -> None:
         """Stop what a station file names, and what is in hand besides."""
@@ -157,7 +165,8 @@ class EmergencyStop:
         try:
             found = wiring(Path(station))
         except OSError as error:
-            self._notes.append(f"{station}: {error.strerror}")
+            notes = self._doubts if self._options.ports else self._notes
+            notes.append(f"{station}: {error.strerror}")
             return ""
         self.stop(found.ports)
         if found.damaged:
@@ -172,9 +181,6 @@ class EmergencyStop:
 
     def finish(self) -> int:
         """Verify all of them, with whatever help there is, and tell what became of each; the exit status."""
-        import signal  # noqa: PLC0415 - the first stops are out now
-
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
         if not self._bays:
             return self._without_ports()
         if self._options.leave_held:
@@ -184,6 +190,8 @@ class EmergencyStop:
         end_s = time.monotonic() + OPEN_S
         while OPENING in self._cut.values() and time.monotonic() < end_s:
             time.sleep(LOOK_S)
+        if self._stopping.hurried:
+            self._doubts.append(HURRIED)
         return self._tell(whys)
 
     def _without_ports(self) -> int:
@@ -197,9 +205,13 @@ class EmergencyStop:
 
     def _with_services(self) -> dict[str, str]:
         """Tell the services, and verify with what they see."""
-        from orchestrator.lastresort.running_service import Services  # noqa: PLC0415 - the first stops are out now
-
-        services = Services(self._bays, self._socket, every_bay=not self._options.ports)
+        try:
+            from orchestrator.lastresort.running_service import Services  # noqa: PLC0415 - the first stops are out now
+        except OSError as error:
+            self._doubts.append(f"{UNTOLD} ({error.strerror})")
+            return self._stopping.finish(VERIFY_S, on_round=self._isolate)
+        every_bay = bool(self._options.stations) or not self._options.ports
+        services = Services(self._bays, self._socket, every_bay=every_bay)
         self._stopping.witness = services.sees
         services.start()
         whys = self._stopping.finish(VERIFY_S, on_round=self._isolate) if self._bays else {}

@@ -24,7 +24,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from types import FrameType
 
-from orchestrator.lastresort.lastline import HELD, drop_port
+from orchestrator.lastresort.bareport import HELD, drop_port
 from orchestrator.lastresort.lastopen import open_contactor
 from orchestrator.lastresort.laststop import LOOK_S, stop_all
 from orchestrator.lastresort.notify import Systemd, say

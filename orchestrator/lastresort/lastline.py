@@ -11,7 +11,6 @@ Standard library only, few imports.
 """
 
 import errno
-import fcntl
 import os
 import select
 import termios
@@ -21,6 +20,8 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from orchestrator.lastresort import line_settings
+from orchestrator.lastresort.bareport import HELD, drop_port, flush, open_port, takes
+from orchestrator.lastresort.descriptors import Turns
 from orchestrator.lastresort.port_owner import holder
 from orchestrator.protocol.standby import ANSWER_BYTES, OPERATION_STOP_FRAME, QUESTION, STOP_FRAME, stands_by
 
@@ -37,6 +38,8 @@ PROOFS = 2
 #: From an answer's first byte to its last, with an adapter's latency: who reads earlier gets pieces, or leaves some to
 #: another process that reads this port.
 GATHER_S = 0.01 + ANSWER_BYTES * 10 / 19200
+#: Where ports take turns, one that has had its own waits for this long before it asks for another.
+LET_IN_S = 0.02
 #: Of what came in, kept up to this; far more than one answer.
 KEEP = 256
 
@@ -50,17 +53,18 @@ RUNS = "NOT stopped: the charger says that it goes on"
 STALLED = "the line takes nothing"
 GONE = "the line is gone"
 HANGS = "the port's driver hangs"
-HELD = "left alone: a service holds this port"
 
 
 class LastLine:
     """One charger's line and what has become of it; `why` is "" once standby is verified."""
 
-    def __init__(self, name: str, fd: int | None, witness: Witness, *, leave_held: bool) -> None:
+    def __init__(
+        self, name: str, fd: int | None, witness: Witness, *, leave_held: bool, turns: Turns | None = None
+    ) -> None:
         self.name, self.why = name, SILENT
         self.tried = threading.Event()  #: the first stop is out, or could not be written
         self.shown_s: float | None = None  #: since when every answer has shown standby
-        self._fd, self._witness, self._leave_held = fd, witness, leave_held
+        self._fd, self._witness, self._leave_held, self._turns = fd, witness, leave_held, turns
         self._stopped_s = 0.0  # when the first stop had been written
         self._begun = False  # the thread has had its first round
         self._proofs, self._sample = 0, 0.0
@@ -97,7 +101,52 @@ class LastLine:
                 self.why = HANGS
 
     def _run(self) -> None:
-        while not self._over.is_set() and self.why != HELD:
+        turns = self._turns
+        if turns is None:
+            self._watch()
+            self._close()
+            return
+        while not self._finished:
+            turns.take()
+            try:
+                self._take_turn() if self._crowded else self._watch()
+            finally:
+                self._close()
+                turns.give()
+            self._over.wait(LET_IN_S)
+
+    @property
+    def _crowded(self) -> bool:
+        return self._turns is not None and self._turns.crowded
+
+    @property
+    def _finished(self) -> bool:
+        """Where ports take turns, one whose charger stands by leaves its place to others."""
+        return self._over.is_set() or self.why == HELD or (self._crowded and not self.why)
+
+    def _take_turn(self) -> None:
+        """With the port open for as short as can be: in the first turn only to stop, so that all are stopped soon."""
+        try:
+            first = not self.tried.is_set()
+            self._stop()
+            for at_s, frame in STOPS[1:] if first else ():
+                self._pause_until(self._stopped_s + at_s)
+                self.write(frame)
+            if first:
+                self._pause_until(self._stopped_s + STOPS[-1][0] + GATHER_S)  # what is not sent yet goes with the port
+                return
+            self._pause_until(time.monotonic() + GATHER_S)
+            while not self._finished:
+                self._look()
+                if not self._proofs:
+                    return
+                self._pause_until(time.monotonic() + (AGAIN_S if self.why else 0.0))
+        except Exception as error:  # noqa: BLE001 - as in `_watch`
+            self._fail(f"internal: {error!r}")
+
+    def _watch(self) -> None:
+        """Stop it, ask it, and stop it again if it runs again, until that is over, or others need its place."""
+        while not self._finished and not self._crowded:
             began_s, stood_by = time.monotonic(), bool(self._proofs)
             try:
                 self._round(began_s)
@@ -105,7 +154,6 @@ class LastLine:
                 self._fail(f"internal: {error!r}")
             if self._proofs or not stood_by:  # one that runs again is stopped at once
                 self._pause_until(began_s + (AGAIN_S if self._proofs else ROUND_S))
-        self._close()
 
     def _round(self, began_s: float) -> None:
         if not self._proofs:
@@ -157,9 +205,9 @@ class LastLine:
             if self._fd is None:
                 self._fd = open_port(self.name, leave_held=self._leave_held)
                 self.why = SILENT
-            if not _takes(self._fd, frame):
-                _flush(self._fd, termios.TCOFLUSH)
-                if not _takes(self._fd, frame):
+            if not takes(self._fd, frame):
+                flush(self._fd, termios.TCOFLUSH)
+                if not takes(self._fd, frame):
                     self._fail(STALLED)
         except OSError as error:
             self._failed(error)
@@ -174,7 +222,7 @@ class LastLine:
         """What the charger says to a question: "" for standby. What came in before it proves nothing."""
         heard, end_s = b"", time.monotonic() + ANSWER_S
         if self._fd is not None:
-            _flush(self._fd, termios.TCIFLUSH)
+            flush(self._fd, termios.TCIFLUSH)
             self.write(QUESTION)
         while self._fd is not None and (left_s := end_s - time.monotonic()) > 0:
             listener = select.poll()
@@ -221,56 +269,3 @@ class LastLine:
                 return
             with suppress(OSError):  # it is closed, whatever its driver says to that
                 os.close(fd)
-
-
-def open_port(name: str, *, leave_held: bool) -> int:
-    """Open a charger's port for stopping: without waiting, and with its settings; the descriptor.
-
-    `leave_held`: only if no orchestrator holds it, by the lock that one puts on it; then it is held. Anybody else's
-    lock keeps no stop away. OSError says why not.
-    """
-    try:
-        fd = os.open(name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    except ValueError:  # a 0, or half a character: a dying controller may say anything
-        raise OSError("not the name of a port") from None
-    try:
-        line_settings.take_back(fd)  # with another line discipline a serial port may not look like one
-        if not os.isatty(fd):
-            raise OSError("not a serial port")
-        if leave_held:
-            _lock(fd, name)
-        line_settings.restore(fd)
-    except termios.error:
-        return fd  # its settings may be right all the same
-    except OSError:
-        os.close(fd)
-        raise
-    return fd
-
-
-def _lock(fd: int, name: str) -> None:
-    try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        if holder(name, (os.getpid(),)).ours:  # we have it open ourselves, and hold nothing
-            raise OSError(HELD) from None
-
-
-def drop_port(fd: int) -> None:
-    """Close a port that is given up. What it has not sent is dropped: close() would wait for a line that is stalled."""
-    _flush(fd, termios.TCOFLUSH)
-    with suppress(OSError):
-        os.close(fd)
-
-
-def _takes(fd: int, frame: bytes) -> bool:
-    """Whether a line has taken the whole frame."""
-    try:
-        return os.write(fd, frame) == len(frame)
-    except BlockingIOError:
-        return False
-
-
-def _flush(fd: int, queue: int) -> None:
-    with suppress(termios.error):  # gone; the next use of it will tell
-        termios.tcflush(fd, queue)

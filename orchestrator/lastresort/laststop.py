@@ -12,7 +12,9 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from orchestrator.lastresort.lastline import ANSWER_S, ASK_S, HELD, ROUND_S, STOPS, LastLine, Witness
+from orchestrator.lastresort.bareport import HELD
+from orchestrator.lastresort.descriptors import Turns
+from orchestrator.lastresort.lastline import ANSWER_S, ASK_S, ROUND_S, STOPS, LastLine, Witness
 
 #: The first stops are waited for no longer than this before anything else is done: what else there is would compete
 #: with them for the processor.
@@ -38,8 +40,10 @@ class LastStop:
     `witness` knows about is not asked here; it may be set later. Never raises for what a port does.
     """
 
-    def __init__(self, *, leave_held: bool = True, watch_s: float = 0.0) -> None:
+    def __init__(self, *, leave_held: bool = True, watch_s: float = 0.0, turns: Turns | None = None) -> None:
         self.witness: Witness = nobody
+        self.hurried = False  #: it is to end as soon as every charger has had its stop
+        self._turns = turns
         self._leave_held, self._watch_s = leave_held, watch_s
         self._lines: dict[str, LastLine] = {}
         self._waiting: list[LastLine] = []  # for a thread
@@ -51,7 +55,11 @@ class LastStop:
         `ports` maps names to open descriptors, which are taken over, or to None.
         """
         end_s = time.monotonic() + FIRST_S
-        lines = [LastLine(name, fd, self._seen, leave_held=self._leave_held) for name, fd in ports.items()]
+        if self._turns is not None:
+            self._turns.ports += len(ports)
+        lines = [
+            LastLine(name, fd, self._seen, leave_held=self._leave_held, turns=self._turns) for name, fd in ports.items()
+        ]
         self._lines = {**self._lines, **{line.name: line for line in lines}}
         _sweep(deque(line for line in lines if ports[line.name] is not None))
         self._waiting += lines
@@ -73,7 +81,7 @@ class LastStop:
         `on_stop` is called after each round's stops, `on_round` when its chargers have had time to obey and answer.
         Returns for each name "" where standby was verified, else why not.
         """
-        end_s, round_s = self._began_s + within_s, self._began_s
+        end_s, round_s = self._began_s + within_s * self._shifts, self._began_s
         while True:
             _pause_until(round_s + STOPS[-1][0])
             on_stop()
@@ -85,6 +93,11 @@ class LastStop:
             self._pause_until(min(round_s, end_s))
             if self._settled() or round_s >= end_s:
                 return self._end()
+
+    @property
+    def _shifts(self) -> int:
+        """How many times as long it takes where ports take turns."""
+        return 1 if self._turns is None else -(-self._turns.ports // self._turns.at_once)
 
     def _seen(self, name: str, since_s: float) -> tuple[float, str] | None:
         return self.witness(name, since_s)
@@ -98,6 +111,8 @@ class LastStop:
             time.sleep(LOOK_S)
 
     def _settled(self) -> bool:
+        if self.hurried and all(line.tried.is_set() for line in self._lines.values()):
+            return True
         since_s = time.monotonic() - self._watch_s
         return all(
             line.why == HELD or (not line.why and line.shown_s is not None and line.shown_s <= since_s)

@@ -13,6 +13,8 @@ from collections.abc import Iterable, Iterator
 LISTENS = "00010000"  #: __SO_ACCEPTCON among the flags in /proc/net/unix
 #: How the words of our own processes begin: the program itself, or a module of it.
 PROGRAM = "orchestrator"
+#: The one of them that orders chargers to run; the others that have ports open only stop them, or ask.
+CONTROLLER = "orchestrator.service.controller"
 
 
 class Holder:
@@ -39,9 +41,16 @@ def holder(port: str, but: Iterable[int] = ()) -> Holder:
 
 def control_sockets(ports: Iterable[str]) -> list[str]:
     """The control socket of every orchestrator that has one of these ports open, each once."""
+    return services(ports)[0]
+
+
+def services(ports: Iterable[str]) -> tuple[list[str], list[int]]:
+    """The same, and the processes of those controllers whose sockets are not to be seen: in another container, say."""
     devices = {os.path.realpath(port) for port in ports if _may_be_tty(port)}
-    found = [_listens_on(pid) for pid, _ in orchestrators() if not devices.isdisjoint(_files(pid))]
-    return [path for path in dict.fromkeys(found) if path]
+    found = {pid: words for pid, words in orchestrators() if not devices.isdisjoint(_files(pid))}
+    sockets = {pid: _listens_on(pid) for pid in found}
+    mute = [pid for pid, words in found.items() if CONTROLLER in words and not sockets[pid]]
+    return [path for path in dict.fromkeys(sockets.values()) if path], mute
 
 
 def _may_be_tty(port: str) -> bool:

@@ -8,13 +8,13 @@ BMU sees current runs. All of this is a thread of its own: no stop waits for a s
 import os
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
-from orchestrator.lastresort.port_owner import control_sockets
+from orchestrator.lastresort.port_owner import services
 
 #: A service that has not answered by then is asked again.
 ANSWER_S = 0.5
@@ -63,25 +63,32 @@ class Services:
     @property
     def untold(self) -> bool:
         """Whether one that holds a port may start its charger again: it has not taken the stop."""
-        return not self._looked.is_set() or any(one.holds and not one.told.is_set() for one in self._found)
+        return not self._looked.is_set() or any(one.holds and not one.took for one in self._found)
 
     def _look(self) -> None:
-        paths = control_sockets(self._names)
-        self._found = [
-            Service(self._names, path, every_bay=self._every_bay, holds=bool(paths)) for path in paths or [self._named]
-        ]
+        paths, mute = services(self._names)
+        found = [Service(self._names, path, every_bay=self._every_bay, holds=True) for path in paths]
+        if not paths or mute:  # the one that is named may be one of those that cannot be seen
+            found.append(Service(self._names, self._named, every_bay=self._every_bay, mute=mute))
+        self._found = found
         self._looked.set()
         for service in self._found:
             service.start()
 
 
 class Service:
-    """The service behind this socket, if there is one; `holds` if it has one of these ports open."""
+    """The service behind this socket, if there is one; `holds` if it has one of these ports open.
 
-    def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool, holds: bool = False) -> None:
+    `mute`: the processes that have one open, too, and may be behind this socket; nobody has seen which is theirs.
+    """
+
+    def __init__(
+        self, names: Iterable[str], socket: str, *, every_bay: bool, holds: bool = False, mute: Sequence[int] = ()
+    ) -> None:
         self.said = UNTOLD  #: what became of it, for people
         self.told = threading.Event()  #: that it has answered, or that there is none
-        self.path, self.holds = Path(socket), holds
+        self.took = False  #: it holds its bays, or there is nobody who could start them
+        self.path, self.holds, self._mute = Path(socket), holds or bool(mute), mute
         self._ports = {os.path.realpath(name) for name in names}
         self._named, self._every_bay = socket, every_bay
         self._seen: tuple[float, Mapping[str, Bay]] = (0.0, {})
@@ -116,7 +123,8 @@ class Service:
     def _hold(self) -> bool:
         """Tell it to hold its bays until an operator starts them. False where there is no service."""
         if not _listens(self._named):
-            self.said = NOBODY
+            self.said = self._unseen if self._mute else NOBODY
+            self.took = not self._mute
             self.told.set()  # one that starts now stops its chargers first, and asks nobody
             return False
         bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
@@ -128,8 +136,16 @@ class Service:
             f"the service holds {held} until an operator starts it" if held else "the service holds none of these ports"
         )
         self.said = "; ".join([holds, *refused])
+        self.took = not self._mute or any(port in self._ports for port, _ in self._bays())
+        if not self.took:
+            self.said = f"{self._unseen}; {self.path}: {self.said}"
         self.told.set()
         return True
+
+    @property
+    def _unseen(self) -> str:
+        pids = ", ".join(map(str, self._mute))
+        return f"a service that holds a port (pid {pids}) was not told: its control socket is not to be found"
 
     def _bays(self) -> list[tuple[str, Bay]]:
         """Each bay with its port's real name."""

@@ -1,5 +1,6 @@
 """A request of an operator on its way: decided by one step, answered when its effect is on the disk."""
 
+from collections.abc import Callable
 from threading import Event
 
 from orchestrator.model import Cause, Request
@@ -16,30 +17,38 @@ class Asked:
 
 
 class Answers:
-    """The requests of one bay that were done, and are not on the disk yet. Used by the control loop only."""
+    """The requests of one bay that were done, and are not on the disk yet. Used by the control loop only.
 
-    def __init__(self, store: Store) -> None:
-        self._store = store
-        self.waiting: list[tuple[Asked, int, float]] = []  #: with the revision that keeps it, and until when to wait
+    A start that no disk takes is withdrawn: `withdraw` holds the bay again. Nothing has begun: a charger is told
+    to run only once the disk has the beginning.
+    """
 
-    def give(self, asked: Asked, answer: Cause | None, revision: int, now_s: float) -> None:
+    def __init__(self, store: Store, withdraw: Callable[[], None]) -> None:
+        self._store, self._withdraw = store, withdraw
+        self.waiting: list[
+            tuple[Asked, int, float, bool]
+        ] = []  #: with the revision that keeps it, until when to wait, and whether it changed something
+
+    def give(self, asked: Asked, answer: Cause | None, revision: int, now_s: float, *, changed: bool = True) -> None:
         """Answer it: a refusal at once, what was done when the disk has it."""
         asked.answer = answer
         if answer is not None:
             asked.done.set()
         else:
-            self.waiting.append((asked, revision, now_s + KEPT_WITHIN_S))
+            self.waiting.append((asked, revision, now_s + KEPT_WITHIN_S, changed))
 
     def look(self, now_s: float) -> None:
         """Tell those whose time has come."""
         kept = self._store.kept_revision
         left = []
-        for asked, revision, until_s in self.waiting:
+        for asked, revision, until_s, changed in self.waiting:
             if revision > kept and now_s < until_s:
-                left.append((asked, revision, until_s))
+                left.append((asked, revision, until_s, changed))
                 continue
             if revision > kept:
-                problem = self._store.unkept(now_s)
-                asked.answer = Cause.of("not_kept", problem=problem) if problem else Cause("not_taken")
+                starts, problem = asked.request is Request.START, self._store.unkept(now_s)
+                asked.answer = Cause.of("not_done" if starts else "not_kept", problem=problem or Cause("not_taken"))
+                if starts and changed:
+                    self._withdraw()
             asked.done.set()
         self.waiting = left

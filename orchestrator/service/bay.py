@@ -86,7 +86,7 @@ class BayRunner:
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
         self._rules, self._language = Rules.of(bay), language
-        self._store, self._say, self._answers = store, say, Answers(store)
+        self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
         self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
         self._revision = 0  # the one that keeps this bay's memory
         self._ending = ""
@@ -97,8 +97,7 @@ class BayRunner:
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # nobody to wait for
         self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
-        self._snapshot = Snapshot()
-        self._recorder = SnapshotRecorder(bay) if snapshots else None
+        self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
         self._asked: list[Asked] = []
         self._asking = Lock()
         self._internal = ""
@@ -160,6 +159,10 @@ class BayRunner:
                 self._asked = [one for one in self._asked if one.request is Request.STOP]
             self._asked.append(asked)
 
+    def _withdraw(self) -> None:
+        """Hold, as after a stop: a start could not be kept."""
+        self.ask(Asked(Request.STOP))
+
     def _take_asked(self) -> list[Asked]:
         """The request whose turn it is, as often as it was made in a row: one step answers all of them."""
         with self._asking:
@@ -172,7 +175,7 @@ class BayRunner:
 
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
-        asked = self._take_asked()
+        asked, before = self._take_asked(), self._revision
         try:
             self._step(now_s, asleep_s, asked[0].request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
@@ -180,7 +183,8 @@ class BayRunner:
             self._failed(error, now_s, asked[0].request if asked else None)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         for one in asked:
-            self._answers.give(one, self.decision.answer if self.decision else None, self._revision, now_s)
+            answer, changed = self.decision.answer if self.decision else None, self._revision != before
+            self._answers.give(one, answer, self._revision, now_s, changed=changed)
         self._answers.look(now_s)
 
     def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:
@@ -215,8 +219,8 @@ class BayRunner:
         for line in lines:
             self._journal.put(self.name, line)
         if before is None or before.state is not decision.state:
-            came_from = f"{before.state} → " if before else ""
-            self._say(f"{self.name}: {came_from}{decision.state}: {say(decision.cause, self._language)}")
+            states = f"{before.state} → {decision.state}" if before else decision.state
+            self._say(f"{self.name}: {states}: {say(decision.cause, self._language)}")
         self._keep(self._memory, now_s)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
@@ -275,9 +279,7 @@ class BayRunner:
 
     def status(self) -> dict[str, object]:
         """The bay's part of the status document."""
-        decision = self.decision
-        if decision is None:
-            decision = Decision(State.STARTING, Memory().cause)
+        decision = self.decision or Decision(State.STARTING, Memory().cause)
         status = bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language)
         bay, offered, contactor = self._rules.bay, self._offered, self._contactor
         return {

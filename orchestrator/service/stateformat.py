@@ -18,6 +18,7 @@ SENTENCES = 2
 NEVER_SET_S = 1_704_067_200.0
 #: What stands beside a bay's persisted state.
 PLACE = ("bay", "port", "can", "node_id", "control", "rs485", "run")
+TOO_DEEP = "it is nested deeper than anything that this service writes"
 #: No entry is without these; what later versions have added has its defaults.
 NEEDED = frozenset({"running", "hold", "paused", "faults"})
 
@@ -70,7 +71,9 @@ def decode(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
         stamp = Stamp(figures["written"], figures["clock_s"], structure(document.get("boot"), str))
         run, age_s = structure(document.get("run"), int), stamp.age_s(now)
         entries = list(_entries(document.get("entries"), age_s, sentences=document["format"] == SENTENCES))
-    except (ArithmeticError, LookupError, RecursionError) as error:
+    except RecursionError:
+        raise ValueError(TOO_DEEP) from None
+    except (ArithmeticError, LookupError) as error:
         raise ValueError(repr(error)) from None
     if len({entry.place for entry in entries}) < len(entries):
         raise ValueError("one place is in it twice")
@@ -109,8 +112,8 @@ def decode_first(data: bytes, run: int) -> list[Entry]:
     """The entries of the first format, which knew bays by their names only; ValueError for what is none of ours."""
     try:
         document = json.loads(data)
-    except RecursionError as error:
-        raise ValueError(repr(error)) from None
+    except RecursionError:
+        raise ValueError(TOO_DEEP) from None
     if not isinstance(document, dict):
         raise ValueError("it is no object")
     return [Entry(Place(structure(name, str)), _first(value), run) for name, value in document.items()]

@@ -141,6 +141,11 @@ class Store:
             return f"a restart would forget what changes: {self.path} is not written within {KEPT_WITHIN_S:g} s"
         return ""
 
+    def refuse_unkept(self, now_s: float) -> None:
+        """ServiceError where what is to be changed now would be forgotten."""
+        if why := self.unkept(now_s):
+            raise ServiceError(f"not done: {why}")
+
     def stalled(self, _now_s: float) -> bool:
         """True when the writer has died. That it waits for its disk is no hang: it is what `unkept` is for."""
         return not self._thread.is_alive()

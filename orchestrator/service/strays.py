@@ -8,8 +8,11 @@ written down, and holds it if it ever comes back.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from math import inf
+from os.path import abspath
+from threading import Thread
 
 from orchestrator.devices.charger import ChargerPort
+from orchestrator.errors import ServiceError
 from orchestrator.model import STOP, Cause, ChargerReading, Operation
 from orchestrator.service.closing import close_all
 from orchestrator.service.past import START, Place, shown
@@ -84,10 +87,28 @@ class Strays:
             self._remember(stray, running=True)
         stray.ran_s, stray.stop_s, stray.seen_s, stray.verified_s = reading.t_s, None, None, None
 
-    def _remember(self, stray: _Stray, *, running: bool) -> None:
+    def _remember(self, stray: _Stray, *, running: bool) -> int:
         persisted = self._store.past(stray.place)
         why = Cause.of("stray_ran", advice=START, port=shown(stray.place.port))
-        self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
+        return self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
+
+    def drop(self, port: str) -> tuple[str, int]:
+        """A person says that a charger is gone for good: forget it. What was forgotten, and the revision that keeps it.
+
+        Nothing else is lost: its bay stays held if it ever comes back. ServiceError where it is not gone.
+        """
+        wanted = Place("", abspath(port))  # noqa: PTH100 - not resolved
+        stray = next((one for one in self._strays if one.verified_s is None and one.place.is_port_of(wanted)), None)
+        if stray is None:
+            there = ", ".join(one.place.port for one in self._strays if one.verified_s is None) or "none"
+            raise ServiceError(f"{port}: no charger without a bay is waited for there (waited for: {there})")
+        if stray.port.view[1].online:
+            raise ServiceError(f"{stray.place}: its charger answers, so it is not gone: it is being stopped")
+        self._strays = [one for one in self._strays if one is not stray]
+        revision = self._remember(stray, running=False)
+        self._say(f"{stray.place}: dropped by the operator: its charger is gone for good")
+        Thread(target=stray.port.close, name="drop", daemon=True).start()  # its driver may take its time
+        return str(stray.place), revision
 
     @property
     def unverified(self) -> list[str]:

@@ -34,7 +34,7 @@ from orchestrator.service.reception import Answer, Later
 from orchestrator.service.reload import Reload
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import station_status
-from orchestrator.service.store import Store
+from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.service.strays import Strays
 from orchestrator.service.wiring import charger_port, open_contactor, stray_port
 from orchestrator.text.catalogue import say
@@ -239,10 +239,26 @@ class Supervisor:
                 self._station, shown, self._journal.problem(now_s), self._store.unkept(now_s), self._strays.status()
             )
         if isinstance(verb, str) and verb in set(Request):
-            names = request.get("bays")
+            names, port = request.get("bays"), request.get("port")
+            if verb == Request.RESET and isinstance(port, str):
+                return self._drop(port)
             bays = self._bays if names is None else [self._named(name) for name in _names(names)]
             return self._ask(list(dict.fromkeys(bays)), Request(verb))
         raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
+
+    def _drop(self, port: str) -> Later:
+        """Forget a charger that no bay has any more; told when the disk has it."""
+        self._store.refuse_unkept(monotonic())
+        what, revision = self._strays.drop(port)
+        end_s = monotonic() + KEPT_WITHIN_S
+
+        def results() -> Answer | None:
+            if self._store.kept_revision >= revision:
+                return {"results": {what: ""}}
+            why = self._store.unkept(monotonic()) or "the disk has not taken it"
+            return {"results": {what: f"dropped, but not kept: {why}"}} if monotonic() >= end_s else None
+
+        return results
 
     def _named(self, name: object) -> BayRunner:
         for bay in self._bays:

@@ -1,9 +1,9 @@
 """`say()`: the sentence for a cause, in English or Korean.
 
 Theory of operation. A template stands under the id of its cause and names its parameters, with the rounding of the
-figures. What an advice adds stands in a frame. Beside the formats of numbers there are four of our own: `word` (a word
-of a fixed list, translated), `and` and `then` (how the parts of a list are joined), `after` (a cause, if there is one,
-after what stands before it).
+figures. What an advice adds stands in a frame. Beside the formats of numbers there are five of our own: `word` (a word
+of a fixed list, translated), `nth` (the first time …), `and` and `then` (how the parts of a list are joined), `after`
+(a cause, if there is one, after what stands before it).
 
 `say` never raises, whatever it is given: what it is asked for is often the reason of a stop. A cause that is not known,
 of an older or newer version say, or lacks something, is shown as its data.
@@ -72,14 +72,16 @@ def advise(id_: str, language: str = "en") -> str:
 
 def _sentence(cause: Cause, texts: Language) -> str:
     params = _Params(cause, texts)
-    what = texts.texts[cause.id].format_map(params)
-    if not cause.advice:
-        return what
-    do, frames = texts.advice[cause.advice].format_map(params), texts.frames
-    if "strikes" in params:
-        do = frames["strikes"].format(do=do, strikes=params["strikes"])
+    what, frames = texts.texts[cause.id].format_map(params), texts.frames
     tripped = params.get("effect") == _Value(TRIP, texts)
-    return frames["trip" if tripped else "advice"].format(do=do, what=what)
+    if "ago_min" in params and not tripped:
+        what = frames["ago" if cause.param("ago_min") else "just_now"].format(what=what, ago_min=params["ago_min"])
+    if cause.advice:
+        do = texts.advice[cause.advice].format_map(params)
+        if "strikes" in params:
+            do = frames["strikes"].format(do=do, strikes=params["strikes"])
+        what = frames["trip" if tripped else "advice"].format(do=do, what=what)
+    return f"{what}{params['then']:after}" if "then" in params else what
 
 
 def _data(cause: Cause, texts: Language) -> str:
@@ -123,6 +125,8 @@ class _Value:
         if isinstance(value, tuple):
             joint = "then" if any(isinstance(one, Cause) for one in value) else JOINS[form]
             return texts.frames[joint].join(_words(value, texts))
+        if form == "nth":
+            return texts.words[f"nth_{value}"]
         if form in JOINS:
             return texts.words.get(value, value) if form and isinstance(value, str) else str(value)
         return format(value, form)

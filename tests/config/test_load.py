@@ -1,13 +1,22 @@
 """How files are found, named in messages, read once and told apart."""
 
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from orchestrator.config import shipped
-from orchestrator.config.load import check, load_map, load_policy, load_station
+from orchestrator.config.load import check, load_map, load_policy, load_scenario, load_station
 from orchestrator.config.policy import Thresholds
+from orchestrator.config.ports import wiring
 from orchestrator.config.station import Rs485
+from orchestrator.config.yaml.tree import MAX_BYTES
 from orchestrator.errors import ConfigError
 from orchestrator.keys import Range
 from orchestrator.model import ControlMode
@@ -130,11 +139,66 @@ def test_a_name_that_no_file_system_takes_is_a_finding() -> None:
         load_policy("x" * 5000 + ".yaml")
 
 
-def test_a_file_that_cannot_be_read_is_a_finding() -> None:
-    Path("folder.yaml").mkdir()
-    assert [str(finding) for finding in check(["folder.yaml"])] == [
-        "folder.yaml:1:1: error: cannot be read: Is a directory"
-    ]
+def _socket(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(path))
+
+
+#: What may stand where a file is expected; each of them is there for real.
+NO_FILES: dict[str, Callable[[Path], object]] = {
+    "a directory": Path.mkdir,
+    "a pipe (FIFO)": os.mkfifo,
+    "a socket": _socket,
+    "a device": lambda path: path.symlink_to("/dev/zero"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_FILES)
+def test_what_is_no_file_is_told_for_what_it_is_and_never_waited_for(kind: str) -> None:
+    name = "depot.yaml"
+    NO_FILES[kind](Path(name))
+    said = f"{name}:1:1: error: cannot be read: this is {kind}; expected is a YAML file: a station, a policy, "
+    assert [str(finding)[: len(said)] for finding in check([name])] == [said]
+    for load in (load_station, load_policy, load_map, load_scenario):
+        with pytest.raises(ConfigError) as error:
+            load(name)
+        assert _findings(error)[0].startswith(said)
+    with pytest.raises(OSError, match=f"this is {re.escape(kind)}; expected is a station file"):
+        wiring(Path(name))
+
+
+def test_what_is_no_file_is_told_where_a_station_names_it() -> None:
+    os.mkfifo("pipe.yaml")
+    _write("depot.yaml", STATION.replace("policy: li-ion-48v", "policy: pipe.yaml"))
+    assert any(
+        "pipe.yaml:1:1: error: cannot be read: this is a pipe (FIFO)" in str(one) for one in check(["depot.yaml"])
+    )
+
+
+def test_a_file_that_this_user_may_not_read_is_told_with_the_user() -> None:
+    """Root may read everything: so somebody else is asked, where everybody may come to the file."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder).chmod(0o755)
+        Path(folder, "secret.yaml").touch(0o000)
+        assert _said_of_a_secret(folder) == "; expected is a policy that this user may read\n"
+
+
+def _said_of_a_secret(folder: str) -> str:
+    code = "import os, sys; from pathlib import Path; from orchestrator.config.plainfile import read_plain\n"
+    code += "os.setuid(int(sys.argv[1]))\n" if os.getuid() == 0 else ""
+    code += "try: read_plain(Path('secret.yaml'), 9, 'a policy')\nexcept OSError as error: print(error.strerror)"
+    user = "65534" if os.getuid() == 0 else str(os.getuid())
+    argv = [sys.executable, "-c", code, user]
+    said = subprocess.run(argv, cwd=folder, capture_output=True, text=True, check=True).stdout
+    return said.removeprefix(f"permission denied for user {user}")
+
+
+def test_a_huge_file_is_not_read_to_its_end() -> None:
+    with Path("huge.yaml").open("wb") as file:
+        file.truncate(1 << 40)  # it takes no room: there is nothing in it
+    said = f"huge.yaml:1:1: error: the file has more than {MAX_BYTES} bytes: this is not one of our files"
+    assert [str(finding) for finding in check(["huge.yaml"])] == [said]
+    assert wiring(Path("huge.yaml")).damaged
 
 
 def test_a_file_of_another_kind_is_not_read_as_this_one() -> None:

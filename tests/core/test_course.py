@@ -206,7 +206,7 @@ def test_full_too_early_is_no_full() -> None:
     """Else a battery of 30 % would be called full, and never be charged again before it has lost some more."""
     world = charging()
     world.values["soc_pct"] = 79.9
-    world.run(2)
+    tapers_off(world)
     charger_says_full(world)
     world.run(2)
     assert world.is_in(S.IDLE)
@@ -214,11 +214,21 @@ def test_full_too_early_is_no_full() -> None:
     assert world.memory.full_pct is None
 
 
+def test_a_standby_that_somebody_orders_is_not_named_full() -> None:
+    """Its mode 5 is standby: nothing has tapered off, so nobody has to look at the BMU's SOC."""
+    world = charging()
+    charger_says_full(world)
+    world.run(2)
+    assert set(world.raised) == {"stopped_by_itself"}
+    assert "not taken for full" in reason_of(world.decision)
+    assert world.is_in(S.IDLE)
+
+
 def test_early_depends_on_where_the_policy_ends() -> None:
     policy = replace(POLICY, finish=replace(POLICY.finish, soc_pct=60), start=replace(POLICY.start, soc_below_pct=55))
     world = World(bay(policy)).charging()
     world.values["soc_pct"] = 59.9
-    world.run(1)
+    tapers_off(world)
     charger_says_full(world)
     world.run(2)
     assert "early_full" in world.raised
@@ -398,36 +408,36 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.FULL: ("", S.SUSPENDED),
         S.SUSPENDED: ("", S.SUSPENDED),
         S.STOPPING: ("", S.UNCONTROLLABLE),
-        S.TRIPPED: ("", S.TRIPPED),
-        S.UNCONTROLLABLE: ("", S.UNCONTROLLABLE),
+        S.TRIPPED: ("not running: internal must be reset first", S.TRIPPED),
+        S.UNCONTROLLABLE: ("not running: will_not_stop must be reset first", S.UNCONTROLLABLE),
     },
     Request.START: {
-        S.STARTING: ("", S.CHARGING),
-        S.OFFLINE: ("", S.OFFLINE),
-        S.IDLE: ("", S.IDLE),  # 99 %: nothing to do
+        S.STARTING: ("nothing to start: STARTING: ", S.CHARGING),
+        S.OFFLINE: ("nothing to start: OFFLINE: ", S.OFFLINE),
+        S.IDLE: ("nothing to start: IDLE: ", S.IDLE),  # 99 %: nothing to do
         S.QUALIFYING: ("", S.CHARGING),
         S.PRECHARGE_PULSE: ("", S.PRECHARGE_PULSE),
         S.PRECHARGE_CONTINUOUS: ("", S.PRECHARGE_CONTINUOUS),
         S.CHARGING: ("", S.CHARGING),
-        S.FULL: ("", S.FULL),
+        S.FULL: ("nothing to start: FULL: ", S.FULL),
         S.SUSPENDED: ("", S.CHARGING),
         S.STOPPING: ("", S.UNCONTROLLABLE),
         S.TRIPPED: ("internal is latched and needs a reset: ZeroDivisionError", S.TRIPPED),
-        S.UNCONTROLLABLE: ("the charger does not obey", S.UNCONTROLLABLE),
+        S.UNCONTROLLABLE: ("the charger was not seen to stop: cut its mains", S.UNCONTROLLABLE),
     },
     Request.RESET: {
-        S.STARTING: ("", S.CHARGING),
-        S.OFFLINE: ("", S.OFFLINE),
-        S.IDLE: ("", S.IDLE),
-        S.QUALIFYING: ("", S.CHARGING),
-        S.PRECHARGE_PULSE: ("", S.PRECHARGE_PULSE),
-        S.PRECHARGE_CONTINUOUS: ("", S.PRECHARGE_CONTINUOUS),
-        S.CHARGING: ("", S.CHARGING),
-        S.FULL: ("", S.FULL),
-        S.SUSPENDED: ("", S.SUSPENDED),
-        S.STOPPING: ("", S.UNCONTROLLABLE),
+        S.STARTING: ("nothing to reset: STARTING: ", S.CHARGING),
+        S.OFFLINE: ("nothing to reset: OFFLINE: ", S.OFFLINE),
+        S.IDLE: ("nothing to reset: IDLE: ", S.IDLE),
+        S.QUALIFYING: ("nothing to reset: QUALIFYING: ", S.CHARGING),
+        S.PRECHARGE_PULSE: ("nothing to reset: PRECHARGE_PULSE: ", S.PRECHARGE_PULSE),
+        S.PRECHARGE_CONTINUOUS: ("nothing to reset: PRECHARGE_CONTINUOUS: ", S.PRECHARGE_CONTINUOUS),
+        S.CHARGING: ("nothing to reset: CHARGING: ", S.CHARGING),
+        S.FULL: ("nothing to reset: FULL: ", S.FULL),
+        S.SUSPENDED: ("nothing to reset: SUSPENDED: ", S.SUSPENDED),
+        S.STOPPING: ("nothing to reset: STOPPING: ", S.UNCONTROLLABLE),
         S.TRIPPED: ("", S.IDLE),
-        S.UNCONTROLLABLE: ("will_not_stop is still there", S.UNCONTROLLABLE),
+        S.UNCONTROLLABLE: ("the charger was not seen to stop: cut its mains", S.UNCONTROLLABLE),
     },
 }
 
@@ -507,7 +517,7 @@ def test_a_charger_that_comes_back_running_is_stopped_and_waits_for_a_person() -
 
 def test_offline_and_back() -> None:
     world = offline()
-    assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 16) does not answer"
+    assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 0x10) does not answer"
     world.battery_link = replace(world.battery_link, problem="BMU 0x10 on can0 does not answer: no frame of it came")
     assert reason_of(world.tick()) == "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came"
     world.battery_answers = True
@@ -661,7 +671,7 @@ ENDS: tuple[tuple[Callable[[World], object], State, str], ...] = (
     (lambda world: world.ask(Request.STOP), S.IDLE, say(STOPPED)),
     (lambda world: world.values.update(soc_pct=100.0), S.FULL, "full: SOC 100 %"),
     (lambda world: setattr(world, "internal", "KeyError()"), S.TRIPPED, "this is a defect of the software"),
-    (lambda world: world.leave(), S.IDLE, "the BMU (node 16) has stopped answering"),
+    (lambda world: world.leave(), S.IDLE, "the BMU (node 0x10) has stopped answering"),
 )
 
 

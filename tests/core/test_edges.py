@@ -226,7 +226,9 @@ OBEDIENCE = (
     Edge(obedience.stopped_by_itself, NOT_FULL, TAPERED, bmu={"soc_pct": 85.0},
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL},
          policy=replace(POLICY, finish=replace(POLICY.finish, charger_full=False))),
-    Edge(obedience.stopped_by_itself, None, bmu={"soc_pct": 79.0},  # that is early_full
+    Edge(obedience.stopped_by_itself, NOT_FULL, bmu={"soc_pct": 79.0},
+         charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
+    Edge(obedience.stopped_by_itself, None, TAPERED, bmu={"soc_pct": 79.0},  # that is early_full
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
     Edge(obedience.found_running, "the charger was found running though it was not commanded to"),
     Edge(obedience.found_running, None, charger={"operation": Operation.STOPPED, "current_a": 0.5}),
@@ -238,8 +240,9 @@ OBEDIENCE = (
          charger={"current_a": 12.5, "current_limit": 3}),
     Edge(obedience.over_current, "16.81 A, more than 16.80 A for a limit of 15 A",
          charger={"current_a": 16.81, "current_limit": None}),
-    Edge(obedience.early_full, None, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
-    Edge(obedience.early_full, "the charger reports full (mode 5), the BMU only 79 %", bmu={"soc_pct": 79.0},
+    Edge(obedience.early_full, None, TAPERED, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
+    Edge(obedience.early_full, None, bmu={"soc_pct": 79.0}, charger={"charge_mode": ChargeMode.FULL}),
+    Edge(obedience.early_full, "the charger reports full (mode 5), the BMU only 79 %", TAPERED, bmu={"soc_pct": 79.0},
          charger={"charge_mode": ChargeMode.FULL}),
     Edge(obedience.open_circuit, None),
     Edge(obedience.open_circuit, None, {"idle_s": 10.0}),

@@ -152,9 +152,70 @@ def test_a_start_does_not_skip_a_backoff() -> None:
     world = charging()
     gone_s = strike(world)
     world.run(5)
-    assert world.ask(Request.START) == ""
+    refused = world.ask(Request.START)
+    assert refused.startswith("nothing to start: SUSPENDED: SOC 140 %")
+    assert refused.endswith("; its cause is gone, goes on by itself in 15 s (1st of 3 within an hour)")
     world.until(State.CHARGING)
     assert world.now_s - gone_s == 20 + TICK_S + 2
+
+
+def test_a_backoff_says_when_it_goes_on_and_a_latch_what_to_type() -> None:
+    world = charging()
+    for which, wait_s in (("1st", 20), ("2nd", 70), ("3rd", 310)):
+        implausible(world)
+        world.run(2)
+        told = f"goes on by itself {wait_s} s after its cause is gone ({which} of 3 within an hour)"
+        assert reason_of(world.decision).endswith(f"; {told}")
+        implausible(world, seen=False)
+        world.run(TICK_S + 6)
+        left = f"its cause is gone, goes on by itself in {wait_s - 6} s ({which} of 3 within an hour)"
+        assert reason_of(world.decision).endswith(f"; {left}")
+        assert all(told not in say(fault.cause) and left not in say(fault.cause) for fault in world.decision.faults)
+        world.until(State.CHARGING, 400)
+        world.charging()
+    strike(world)
+    world.run(1)
+    assert reason_of(world.decision).endswith(
+        "; its cause is gone: orchestrator reset bay-1, then orchestrator start bay-1"
+    )
+
+
+def test_a_trip_whose_charger_stands_by_asks_nobody_to_cut_its_mains() -> None:
+    world = charging()
+    world.deaf.add(Action.STOP)
+    world.ask(Request.STOP)
+    world.run(8)
+    assert world.is_in(State.UNCONTROLLABLE)
+    assert world.raised["will_not_stop"].startswith("cut the charger's mains now")
+    for request in (Request.START, Request.RESET):
+        assert world.ask(request).startswith("the charger was not seen to stop: cut its mains")
+    world.deaf.clear()
+    said = "the charger stands by now: have the cause repaired, then reset – before, it did not obey the stop for 8 s"
+    world.until(State.TRIPPED, 15)
+    assert reason_of(world.decision) == said
+    world.run(600, dt_s=1.0)
+    assert reason_of(world.decision) == said
+
+
+def test_a_jump_of_the_soc_is_told_with_how_long_ago() -> None:
+    world = charging()
+    world.values["soc_pct"] = 56.0
+    world.tick()
+    assert world.raised["soc_jump"].startswith("the SOC went from 50 to 56 % in 0 s, just now; ")
+    world.run(180, dt_s=1.0)
+    assert world.raised["soc_jump"].startswith("the SOC went from 50 to 56 % in 0 s, 3 min ago; ")
+
+
+@pytest.mark.parametrize(
+    ("comes", "loose"), [({}, True), ({"soc_pct": 80.0}, False), ({"voltage_v": 52.0, "soc_pct": 52.0}, False)]
+)
+def test_another_battery_within_a_minute_is_no_loose_plug(comes: dict[str, float], *, loose: bool) -> None:
+    world = charging()
+    world.leave()
+    world.run(5)
+    world.arrive(**comes)
+    world.run(3)
+    assert ("loose_plug" in world.raised) is loose
 
 
 # --- a battery that leaves --------------------------------------------------------------------------------------------
@@ -304,7 +365,7 @@ def test_a_reset_while_the_stop_is_being_verified_is_no_start() -> None:
 
 def test_a_reset_of_nothing_changes_nothing() -> None:
     world = charging()
-    assert world.ask(Request.RESET) == ""
+    assert world.ask(Request.RESET).startswith("nothing to reset: CHARGING: step 4")
     world.run(5)
     assert world.is_in(State.CHARGING)
 
@@ -422,4 +483,4 @@ def test_resets_are_counted_for_each_fault() -> None:
 def test_a_reset_of_nothing_counts_for_nothing() -> None:
     world = idle()
     for _ in range(9):
-        assert world.ask(Request.RESET) == ""
+        assert world.ask(Request.RESET).startswith("nothing to reset: IDLE: ")

@@ -39,7 +39,7 @@ from tests.core.world import bay
 
 
 def goes(f: Facts) -> Course:
-    return course(f, latches.shown(f.memory.faults))
+    return course(f, latches.shown(f.memory.faults, f.now_s))
 
 
 def holding(**changes: Any) -> dict[str, Any]:
@@ -119,9 +119,9 @@ GOES = (
     Edge(goes, (None, "held"), {"hold": cause("held")}, IDLE, **AT_REST),
     Edge(goes, (Trigger.SUSPEND, "paused by the operator; start to go on"), {"paused": True}, IDLE, **AT_REST),
     Edge(goes, (Trigger.RESET, "reset by the operator"), {}, TRIPPED, **AT_REST),
-    Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 16) does not answer"), {}, IDLE,
+    Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer"), {}, IDLE,
          **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0}, charger_link=STOP_SENT, snapshot={"connected": False}),
-    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 16) has just booted"), {}, IDLE, **AT_REST,
+    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted"), {}, IDLE, **AT_REST,
          bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "boot_t_s": ago(1)}),
     Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but unplugged"), {}, IDLE, **AT_REST, bmu=SILENT_BMU["bmu"],
          bmu_link={"online": False, "problem": "unplugged"}),
@@ -252,7 +252,7 @@ def test_a_value_counts_while_it_is_fresh_and_not_from_the_future(t_s: float, va
 
 
 def test_a_fault_of_the_first_moment_is_shown_from_then_on() -> None:
-    (fault,) = latches.shown({"soh_low": FaultMemory(raised_s=0.0)})
+    (fault,) = latches.shown({"soh_low": FaultMemory(raised_s=0.0)}, 9.0)
     assert fault.since_s == 0.0
 
 

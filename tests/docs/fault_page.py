@@ -68,7 +68,7 @@ def _table() -> Iterator[str]:
     yield "| fault | effect | what to do | how it ends |"
     yield "| --- | --- | --- | --- |"
     for row in sorted(FAULTS, key=lambda row: (-row.effect, row.id)):
-        yield f"| `{row.id}` | {Effect(row.effect).name} | {row.advice} | {_end(row)} |"
+        yield f"| `{row.id}` | {Effect(row.effect).name} | {_advice(row)} | {_end(row)} |"
 
 
 def _numbers() -> Iterator[str]:
@@ -82,6 +82,10 @@ def _numbers() -> Iterator[str]:
 def rows_of(number: str) -> list[Row]:
     """The rows that name this number of the catalogue."""
     return [row for row in FAULTS if number in row.source.split(", ")]
+
+
+def _advice(row: Row) -> str:
+    return f"{row.advice}; once it has stopped: {row.at_rest}" if row.at_rest else row.advice
 
 
 def _end(row: Row) -> str:

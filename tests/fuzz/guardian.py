@@ -8,7 +8,7 @@ from unittest.mock import patch
 
 import pytest
 
-from orchestrator.lastresort import guardian, lastline
+from orchestrator.lastresort import bareport, guardian
 from orchestrator.lastresort.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records, scratch
 
@@ -39,7 +39,7 @@ def one(data: bytes) -> None:
                 os.close(fd)
             else:
                 with pytest.raises(OSError, match=r"\w"):
-                    lastline.open_port(name, leave_held=True)
+                    bareport.open_port(name, leave_held=True)
         os.close(watched._child)
     assert _descriptors() <= before, "a descriptor is left open"
 
@@ -68,7 +68,7 @@ TARGET = Target(
         record(RAW_FD), record(RAW_FD, b"B"), record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"),
         record(NAME, b"x" * 31),
     ],
-    ["orchestrator/lastresort/guardian.py", "orchestrator/lastresort/lastline.py"],
+    ["orchestrator/lastresort/guardian.py", "orchestrator/lastresort/bareport.py"],
     max_bytes=128,
     limit_s=1.0,
 )  # fmt: skip

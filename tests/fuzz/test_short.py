@@ -20,7 +20,7 @@ from orchestrator.config.yaml import tree
 from orchestrator.core import persisted
 from orchestrator.devices import battery, dialogue
 from orchestrator.devices.sdo_client import SdoClient
-from orchestrator.lastresort import lastline
+from orchestrator.lastresort import bareport
 from orchestrator.lastresort.guardian import Guardian
 from orchestrator.model import Measurement
 from orchestrator.protocol import frame, standby, words
@@ -189,7 +189,7 @@ def keeps_old_ports(patch: Patch) -> None:
 
 
 def any_name(patch: Patch) -> None:
-    patch.setattr(lastline, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
+    patch.setattr(bareport, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
 
 
 #: Target → what somebody might get wrong there.

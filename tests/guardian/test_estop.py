@@ -1,20 +1,24 @@
 """`orchestrator estop` with no service, a dead one, one that hangs and one that runs."""
 
 import os
+import resource
 import signal
 import subprocess
+import sys
+import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from orchestrator.lastresort.estop import LOST, UNTOLD
+from orchestrator.lastresort.estop import HURRIED, LOST, UNTOLD
 from orchestrator.lastresort.port_owner import control_sockets
 from orchestrator.protocol.standby import STOP_FRAME
 from orchestrator.sim.client import PlantProcess
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
-from tests.whole.station import Service, orchestrator, whole_station
+from tests.whole.station import Service, die_with_parent, orchestrator, whole_station
 
 Station = tuple[PlantProcess, Service]
 NOBODY = "no service is running\n"
@@ -86,6 +90,52 @@ def test_a_station_file_without_ports_or_none_at_all(tmp_path: Path) -> None:
         assert done.stderr.endswith("no port to stop: name a station file or --port PATH\n")
 
 
+def test_ports_besides_those_of_a_station_file(tmp_path: Path) -> None:
+    with running_chargers(tmp_path, 3) as (left, right, other):
+        done = estop(str(station_file(tmp_path, BAYS)), "--port", other.name, left.name)
+        assert (done.returncode, done.stderr) == (0, NOBODY)
+        assert sorted(done.stdout.splitlines()) == sorted([
+            f"{other.name}: standby verified",
+            f"left ({left.name}): standby verified",
+            f"right ({right.name}): standby verified",
+            DONE.strip(),
+        ])  # fmt: skip
+        missing = estop(str(tmp_path / "none.yaml"), "--port", left.name)
+        assert missing.returncode == 1, "nobody knows what that file names"
+        assert f"{tmp_path}/none.yaml: No such file or directory" in missing.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_who_interrupts_it_is_told_what_was_stopped(tmp_path: Path, number: signal.Signals) -> None:
+    """As soon as the first stop has come: it would have waited three seconds for the charger that is deaf."""
+    with running_chargers(tmp_path, 2) as (good, deaf):
+        deaf.charger.ignores_stop = True
+        argv = [sys.executable, "-m", "orchestrator", "estop", "--port", deaf.name, good.name]
+        with subprocess.Popen(argv, stdout=subprocess.PIPE, text=True, preexec_fn=die_with_parent) as process:
+            wait_until(lambda: deaf.stops, what="the first stop")
+            process.send_signal(number)
+            began_s = time.monotonic()
+            said, _ = process.communicate(timeout=20)
+        assert process.returncode == 1
+        assert time.monotonic() - began_s < 3.5
+        assert said.startswith("CUT THE MAINS of ") and deaf.name in said.splitlines()[0]
+        assert f"{good.name}: " in said and said.splitlines()[-1] == HURRIED
+        assert not good.runs
+
+
+@pytest.mark.parametrize("files", [12, 9])
+def test_where_few_files_may_be_open_ports_take_turns(tmp_path: Path, files: int) -> None:
+    with running_chargers(tmp_path, 5) as benches:
+        names = [bench.name for bench in benches]
+        limit = partial(resource.setrlimit, resource.RLIMIT_NOFILE, (files, files))
+        argv = [sys.executable, "-m", "orchestrator", "estop", "--port", *names]
+        done = subprocess.run(argv, preexec_fn=limit, capture_output=True, text=True, timeout=30, check=False)
+        assert "Traceback" not in done.stderr
+        assert not any(bench.runs for bench in benches)
+        assert done.stdout == "".join(f"{name}: standby verified\n" for name in names) + DONE
+        assert (done.returncode, done.stderr) == (0, NOBODY)
+
+
 def test_contactors_of_a_station_file_come_after_the_stops(tmp_path: Path) -> None:
     """What is not a chip is told, and changes nothing for the chargers."""
     bays = BAYS.replace("{name: right,", "{name: right, contactor: {chip: ./gpiochip0, line: 17},")
@@ -107,8 +157,8 @@ def test_contactors_of_a_station_file_come_after_the_stops(tmp_path: Path) -> No
     ("args", "said"),
     [
         (("--prot", "/dev/x"), "unknown option --prot"),
-        (("one.yaml", "two.yaml"), "name one station file, or ports"),
-        (("one.yaml", "--port", "/dev/x"), "name one station file, or ports"),
+        (("one.yaml", "two.yaml"), "name one station file"),
+        (("one.yaml", "two.yaml", "--port", "/dev/x"), "name one station file"),
         (("--port",), "--port needs a path"),
         (("--port", "/dev/x", "--socket"), "--socket needs a path"),
     ],

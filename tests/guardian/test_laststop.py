@@ -16,20 +16,18 @@ import pytest
 
 from orchestrator.errors import LinkError
 from orchestrator.lastresort import laststop
+from orchestrator.lastresort.bareport import HELD, drop_port, open_port
 from orchestrator.lastresort.guardian import VERIFY_S
 from orchestrator.lastresort.lastline import (
     ASK_S,
     GONE,
     HANGS,
-    HELD,
     ONCE,
     ROUND_S,
     RUNS,
     SILENT,
     STALLED,
     STOPS,
-    drop_port,
-    open_port,
 )
 from orchestrator.lastresort.laststop import LastStop, stop_all
 from orchestrator.link.serial import SerialLine

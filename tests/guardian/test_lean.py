@@ -12,24 +12,15 @@ from tests.guardian.chargers import running_chargers
 from tests.test_imports import PACKAGE, ROOT, Module, product
 
 ROOM = {"", "lastresort"}
-LINE = (
-    ROOM
-    | {"protocol", "protocol.standby"}
-    | {f"lastresort.{name}" for name in ("port_owner", "line_settings", "lastline")}
-)
+PORT = ROOM | {f"lastresort.{name}" for name in ("port_owner", "line_settings", "bareport")}
+LINE = PORT | {"protocol", "protocol.standby", "lastresort.descriptors", "lastresort.lastline"}
 STOP = LINE | {"lastresort.laststop"}
+ALONE = ("port_owner", "line_settings", "notify", "lastopen", "descriptors")
 #: Module → all of the product that is imported with it.
 LEAN: dict[str, set[str]] = {
     "protocol.standby": {"", "protocol", "protocol.standby"},
-    **{
-        f"lastresort.{name}": ROOM | {f"lastresort.{name}"}
-        for name in (
-            "port_owner",
-            "line_settings",
-            "notify",
-            "lastopen",
-        )
-    },
+    **{f"lastresort.{name}": ROOM | {f"lastresort.{name}"} for name in ALONE},
+    "lastresort.bareport": PORT,
     "lastresort.lastline": LINE,
     "lastresort.laststop": STOP,
     "lastresort.estop": STOP | {"lastresort.estop"},

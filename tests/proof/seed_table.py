@@ -97,7 +97,7 @@ LINES: tuple[Seed, ...] = (
         "line",
         "estop --leave-held leaves alone what a stranger has locked",
         ("tests/guardian/test_laststop.py::test_a_strangers_lock_keeps_no_stop_away",),
-        (f"{LASTRESORT}lastline.py", "        if holder(name, (os.getpid(),)).ours:", "        if True:"),
+        (f"{LASTRESORT}bareport.py", "        if holder(name, (os.getpid(),)).ours:", "        if True:"),
     ),
 )
 
@@ -351,7 +351,11 @@ WITNESSES: tuple[Seed, ...] = (
         "witness",
         "UNCONTROLLABLE ends with the first standby, not with a lasting one",
         ("tests/core/test_witnesses.py",),
-        (f"{CORE}course.py", "proved_to_last(f) if state is State.UNCONTROLLABLE else f.stopped", "f.stopped"),
+        (
+            f"{CORE}safestop.py",
+            "proved_to_last(f) if f.memory.state is State.UNCONTROLLABLE else f.stopped",
+            "f.stopped",
+        ),
     ),
     scene(
         "returns are not counted",
@@ -531,7 +535,7 @@ CONDITIONS: tuple[Seed, ...] = (
         "comes and goes",
         "a battery that leaves and comes back is charged again each time",
         ("loose plug",),
-        (f"{CORE}track.py", "f.now_s if f.now_s - memory.left_s < LOOSE_PLUG_S else None", "None"),
+        (f"{CORE}track.py", "f.now_s if gap_s < LOOSE_PLUG_S and not _is_another(f) else None", "None"),
     ),
     scene(
         "another kind of pack is charged",

@@ -93,6 +93,10 @@ def _volts_disagree(bay: Bay) -> bool:
     return differ_v > max(1.0, 0.02 * bay.told.voltage_v) + ROUND_V
 
 
+def _pulses(bay: Bay) -> bool:
+    return bay.rig.bay.charger.mode in (ChargeMode.PRECHARGE, ChargeMode.BATTERY_RECOVERY)
+
+
 def _amps_disagree(bay: Bay) -> bool:
     charger_a = _shown(bay, Kind.CURRENT, bay.rig.bay.charger.current_a)
     return abs(charger_a - bay.told.current_a) > max(1.0, 0.1 * charger_a) + ROUND_A
@@ -121,7 +125,9 @@ CONDITIONS: tuple[Condition, ...] = (
     Condition("over-current", SILENT_S, _over_current),
     Condition("implausible SOC", SILENT_S + 1.0, _implausible),
     Condition("status word", SILENT_S, lambda b: bool(int(b.told.status) & TRIP_BITS)),
-    Condition("volts disagree", SILENT_S + 3.0, _volts_disagree),
+    Condition("volts disagree", SILENT_S + 3.0, lambda b: not _pulses(b) and _volts_disagree(b)),
+    # Pulses move both values faster than the BMU is read: what is compared there is the mean of the last 10 s.
+    Condition("volts disagree in pulses", SILENT_S + 3.0 + 10.0, lambda b: _pulses(b) and _volts_disagree(b)),
     Condition("amps disagree", SILENT_S + 5.0, _amps_disagree),
     Condition("no battery", SILENT_S, lambda b: not b.rig.bay.connected),
     Condition("undocumented mode", SILENT_S, lambda b: not 1 <= b.rig.wire.lies.get(Kind.CHARGE_MODE, 1) <= 8),

@@ -34,7 +34,7 @@ from tests.proof.virtual_process import Processes
 from tests.proof.virtual_threads import Condition, Event, Lock, SimpleQueue, Thread
 
 #: The parts of the package that run in the service.
-PARTS = ("orchestrator.service", "orchestrator.link", "orchestrator.devices")
+PARTS = ("orchestrator.service", "orchestrator.lastresort", "orchestrator.link", "orchestrator.devices")
 #: What the wall clock shows when the world begins (1000 s).
 WALL_S = 1_700_000_000.0
 

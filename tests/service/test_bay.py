@@ -159,6 +159,26 @@ def test_a_request_that_no_disk_takes_is_answered_with_that(bench: Bench) -> Non
     assert bench.charger.reading.current_a == 0
 
 
+def test_a_start_that_no_disk_takes_is_answered_no_and_starts_nothing_later(bench: Bench) -> None:
+    bench.until(State.CHARGING)
+    bench.ask(Request.STOP)
+    bench.disk = False
+    start = Asked(Request.START)
+    bench.bay.ask(start)
+    bench.step(12)
+    assert start.done.is_set()
+    assert say(start.answer).startswith("not done: a restart would forget what changes: ")
+    again = Asked(Request.START)
+    bench.bay.ask(again)
+    bench.step()
+    assert say(again.answer).startswith("not done: a restart would forget what changes: ")
+    bench.disk = True
+    assert bench.step(100) is State.IDLE, "the disk is well again, and nobody has started it since"
+    assert kept(bench)[1] == HELD
+    assert bench.ask(Request.START) == ""
+    bench.until(State.CHARGING)
+
+
 def test_a_refusal_waits_for_no_disk(bench: Bench) -> None:
     bench.ask(Request.STOP)
     bench.disk = False

@@ -51,15 +51,15 @@ MOVED = {
     "another name": (replace(A, bay="bay-9"), f"/dev/a was bay-1's {LAST} is bay-9's now"),
     "another bus": (
         replace(A, can="can1"),
-        "bay-1 had the BMU on can0, node 16, when this service last ran, and has can1, node 16, now",
+        "bay-1 had the BMU on can0, node 0x10, when this service last ran, and has can1, node 0x10, now",
     ),
     "another BMU": (
         replace(A, node_id=20),
-        "bay-1 had the BMU on can0, node 16, when this service last ran, and has can0, node 20, now",
+        "bay-1 had the BMU on can0, node 0x10, when this service last ran, and has can0, node 0x14, now",
     ),
     "only its BMU": (
         Place("bay-9", "/dev/c", "can0", 16),
-        f"the BMU on can0, node 16, was bay-1's {LAST} is bay-9's now",
+        f"the BMU on can0, node 0x10, was bay-1's {LAST} is bay-9's now",
     ),
 }
 

@@ -34,7 +34,8 @@ from orchestrator.model import (
     Step,
 )
 from orchestrator.service.records import QUIET, WHOLE_EVERY, SnapshotRecorder, decision_lines
-from tests.core.said import cause
+from tests.core.bays import charging
+from tests.core.said import cause, reason_of
 from tests.service.bench import Bench, the_bay
 
 BAY = the_bay()
@@ -218,3 +219,20 @@ def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
     path = [fields["to"] for kind, fields in lines if kind == "transition"]
     assert path == ["STARTING", "IDLE", "QUALIFYING", "CHARGING", "STOPPING", "FULL"]
     assert [fields["event"] for kind, fields in lines if kind == "session"] == ["begin", "end"]
+
+
+def test_a_countdown_is_no_news() -> None:
+    """The reason of a backoff says when it goes on: new words each second, and not one line of the journal."""
+    world = charging()
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.tick()
+    world.battery_link = replace(world.battery_link, implausible={})
+    world.run(5)
+    assert world.state is State.SUSPENDED
+    reasons = set()
+    for _ in range(8):
+        before = world.decision
+        reasons.add(reason_of(world.run(1)))
+        assert list(decision_lines(before, world.decision)) == []
+    assert len(reasons) == 8
+    assert all("goes on by itself in" in reason for reason in reasons)

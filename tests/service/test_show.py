@@ -113,6 +113,17 @@ def test_what_needs_a_person_comes_first() -> None:
     assert [line.split()[0] for line in lines[2:]] == ["BAY", "bay-9", "bay-5", "bay-1"]
 
 
+def test_what_needs_a_person_is_said_once() -> None:
+    faults = [
+        {**fault("will_not_stop", "cut the charger's mains now – it still delivers 14.00 A"), "effect": "TRIP"},
+        fault("noisy_line", "a noisy line"),
+    ]
+    text = table([bay(state="UNCONTROLLABLE", reason="CUT THE MAINS of this charger (/dev/x): it runs", faults=faults)])
+    assert text.lower().count("mains") == 1
+    assert text.splitlines()[2].endswith("  see ALARM")
+    assert text.splitlines()[3:] == ["  WARN: a noisy line"]
+
+
 STOPPED = bay(
     state="IDLE",
     reason="stopped by the operator",

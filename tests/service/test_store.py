@@ -371,6 +371,15 @@ def test_one_value_that_is_none_of_ours_spoils_the_file(tmp_path: Path, name: st
         assert " cannot be read (" in say(store.past(A).hold)
 
 
+def test_one_that_is_nested_beyond_all_bounds_is_told_in_words(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_text("[" * 100_000)
+    with running(tmp_path, A) as store:
+        said = f"{tmp_path / FILE} cannot be read (it is nested deeper than anything that this service writes): "
+        assert say(store.past(A).hold).startswith(said)
+        kept(store, 1)
+    assert (tmp_path / f"{FILE}.unread-1").exists()
+
+
 def test_one_place_twice_is_no_file_of_ours(tmp_path: Path) -> None:
     left(tmp_path, bay_1=HELD)
     document = json.loads((tmp_path / FILE).read_text())

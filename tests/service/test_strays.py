@@ -10,6 +10,7 @@ import pytest
 
 from orchestrator.core.persisted import Persisted
 from orchestrator.devices.charger import ChargerPort
+from orchestrator.errors import ServiceError
 from orchestrator.model import STOP, ChargerLink, ChargerReading, Command, ControlMode, Operation
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.store import Store
@@ -130,6 +131,21 @@ def test_one_that_runs_again_was_not_stopped(case: Case) -> None:
     assert case.said[-1] == "bay-1 on /dev/lost: its charger runs again: stopping it"
     assert not case.sees(stopped_s=101.0), "that stop was before"
     assert not case.sees(stopped_s=101.0)
+
+
+def test_one_that_is_gone_for_good_is_dropped_when_a_person_says_so(case: Case) -> None:
+    with pytest.raises(ServiceError, match=r"no charger without a bay is waited for there \(waited for: /dev/lost\)"):
+        case.strays.drop("/dev/2")
+    case.sees(stopped_s=case.now_s)
+    with pytest.raises(ServiceError, match="its charger answers, so it is not gone"):
+        case.strays.drop("/dev/lost")
+    case.sees(online=False)
+    what, revision = case.strays.drop("/dev/lost")
+    assert what == "bay-1 on /dev/lost"
+    assert (case.strays.unverified, case.strays.status(), case.running) == ([], [], False)
+    assert say(case.store.past(LOST).hold).startswith("the station file had no bay on /dev/lost")
+    assert revision == case.store._revision
+    wait_until(lambda: case.port.closed, what="the port")
 
 
 def test_its_port_is_given_back_after_a_while(case: Case) -> None:

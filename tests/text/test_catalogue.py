@@ -21,7 +21,7 @@ def params(template: str) -> Iterator[tuple[str, str]]:
     """The parameters that a template names, and their formats; of a word or a list only that it is one."""
     for _, name, form, _ in Formatter().parse(template):
         if name is not None:
-            yield name, "" if form in ("word", "and", "then") else form or ""
+            yield name, "" if form in ("word", "and", "then", "nth") else form or ""
 
 
 @pytest.mark.parametrize("part", ["texts", "advice", "words", "frames"])

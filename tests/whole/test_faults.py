@@ -53,7 +53,7 @@ CASES = (
     Case("amps_disagree", "UNCONTROLLABLE", "amps_disagree", 5 + AT_ONCE_S),
     Case("says_standby", "IDLE", "stopped_by_itself"),
     Case("says_standby_now_and_then", "IDLE", "stopped_by_itself", SILENCE_S),
-    Case("stopped_elsewhere", "IDLE", "early_full", instead="stopped_by_itself"),  # its mode 5 says so, whoever did it
+    Case("stopped_elsewhere", "IDLE", "stopped_by_itself"),  # its mode 5 is no full: nothing had tapered off
     Case("pack_collapsed", "TRIPPED", "pack_collapsed"),
     Case("another_pack", "TRIPPED", "pack_collapsed", instead="volts_disagree"),  # in mid-charge its volts fall first
     Case("status_bits", "TRIPPED", "status_trip"),

@@ -1,7 +1,10 @@
 """What an operator does with the real command line, and with the plugs."""
 
 import json
+import resource
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from orchestrator.lastresort.asking import ask
 from orchestrator.sim.client import PlantProcess
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until
-from tests.whole.station import Document, Service, orchestrator, whole_station
+from tests.whole.station import Document, Service, die_with_parent, orchestrator, whole_station
 
 Station = tuple[PlantProcess, Service]
 
@@ -246,6 +249,59 @@ def test_a_battery_that_leaves_and_another_that_comes(station: Station) -> None:
     wait_until(lambda: "SOC 99 % is not below 98 %" in service.bay()["reason"], 10, "the fuller battery is left alone")
     plant.set(soc_pct=40)
     service.wait("CHARGING", timeout_s=40)  # after the backoff of a battery that left in mid-charge
+
+
+def test_who_watches_goes_on_when_the_service_is_started_anew(tmp_path: Path) -> None:
+    with whole_station(tmp_path) as (_, service):
+        service.start()
+        argv = [sys.executable, "-m", "orchestrator", "status", "--watch", "--json", "--socket", str(service.socket)]
+        said = (tmp_path / "watch.txt").open("w+")
+        with said, subprocess.Popen(argv, stdout=said, stderr=subprocess.STDOUT, preexec_fn=die_with_parent) as watch:
+            file = tmp_path / "watch.txt"
+            wait_until(lambda: '"station"' in file.read_text(), 10, "the first status")
+            service.signal(signal.SIGTERM)
+            service.ended()
+            wait_until(lambda: "still watching: no service answers" in file.read_text(), 10, "the loss")
+            service.start()
+            wait_until(lambda: "the service answers again\n" in file.read_text(), 10, "the return")
+            watch.send_signal(signal.SIGINT)
+            assert watch.wait(10) == 130
+
+
+def test_a_charger_that_is_gone_for_good_is_dropped(tmp_path: Path) -> None:
+    def elsewhere(document: Document) -> None:
+        document["bays"][0]["charger"]["port"] += "-gone"
+
+    with whole_station(tmp_path) as (plant, service):
+        service.start().wait("CHARGING")
+        service.kill_all()
+        port = plant.bays[0]["port"]
+        plant.inject("port_gone")
+        service.edit(elsewhere)
+        service.start()
+        wait_until(service.strays, 10, "the charger in hand")
+        refused = service.cli("reset", "--port", "/dev/other")
+        assert refused.returncode == 1 and f"(waited for: {port})" in refused.stderr
+        done = service.cli("reset", "--port", port)
+        assert (done.returncode, done.stdout) == (0, f"bay-1 on {port}: reset accepted\n")
+        assert service.strays() == []
+        service.kill_all()
+        service.start()
+        assert service.strays() == [], "it was on the disk before that was said"
+        assert service.cli("reset", "bay-1", "--port", port).returncode == 2
+
+
+def test_a_service_that_may_open_too_few_files_says_so(tmp_path: Path) -> None:
+    with whole_station(tmp_path) as (_, service):
+        done = subprocess.run(
+            [sys.executable, "-m", "orchestrator", "run", str(service.file)],
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (12, 12)),
+            capture_output=True, text=True, timeout=30, check=False,
+        )  # fmt: skip
+        assert done.returncode == 1
+        assert "Traceback" not in done.stderr
+        assert done.stderr.startswith("orchestrator: at most 12 files may be open at once, and this station needs ")
+        assert len(done.stderr.splitlines()) == 1
 
 
 def test_the_end_names_the_charger_that_nobody_could_verify(station: Station) -> None:

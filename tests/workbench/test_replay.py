@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -284,3 +285,8 @@ def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: py
     assert "nothing is recorded of bay-9 (recorded: bay-1)" in capsys.readouterr().err
     assert main(["replay", str(tmp_path / "nowhere.jsonl")]) == 1
     assert "nowhere.jsonl:1:1: error: cannot be read: No such file or directory" in capsys.readouterr().err
+    os.mkfifo(tmp_path / "pipe.jsonl")
+    assert main(["replay", str(tmp_path / "pipe.jsonl")]) == 1
+    assert (
+        "pipe.jsonl:1:1: error: cannot be read: this is a pipe (FIFO); expected is a journal" in capsys.readouterr().err
+    )

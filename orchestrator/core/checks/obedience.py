@@ -22,6 +22,8 @@ IDLE_MAX_S = 10.0
 NEARLY_FULL_PCT = 95.0
 #: So many settings that go back within this time are no accident.
 MAX_REVERTS, REVERTS_S = 3, 60.0
+#: How a stop that was verified in the end is told afterwards: by one that both deny, and by one that only the BMU does.
+PAST = {"will_not_stop": "did_not_stop", "stop_contradicted": "stop_was_contradicted"}
 #: What somebody else did to the line is news for this long.
 NEWS_S = 5.0
 
@@ -60,6 +62,11 @@ def will_not_stop(f: Facts) -> Cause | None:
     if not sees_current(f):
         return None
     return Cause.of("stop_contradicted", pack_a=f.pack_a, charger_a=f.reading.current_a)
+
+
+def did_not_stop(cause: Cause, lasted_s: float) -> Cause:
+    """What is said of `will_not_stop` once its charger stands by; `cause` is what was said before, this or that."""
+    return Cause.of(PAST[cause.id], lasted_s=lasted_s) if cause.id in PAST else cause
 
 
 def will_not_start(f: Facts) -> Cause | None:
@@ -165,8 +172,8 @@ def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
 
 def early_full(f: Facts) -> Cause | None:
     """FAULTS C18."""
-    if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f):
-        return None
+    if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f) or not ends_full(f):
+        return None  # what did not end like a full charge was stopped by somebody: `stopped_by_itself`
     return Cause.of("early_full", soc_pct=f.soc)
 
 

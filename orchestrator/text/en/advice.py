@@ -19,8 +19,8 @@ ADVICE: Mapping[str, str] = {
     "charger_silent": "check the charger's power and its cable",
     "found_running": "it was stopped; find out why it ran, then start",
     "rogue_run": "somebody else commands this charger, or it is defective: find out, then reset",
-    "current_without_order": "cut the charger's mains if the current goes on; check the bay's serial "
-    "cable and what else charges this pack, then reset",
+    "current_without_order": "cut the charger's mains if the current goes on; if the BMU shows it with the mains off "
+    "too, restart the BMU, else check the bay's serial cable and what else charges this pack, then reset",
     "will_not_stop": "cut the charger's mains now; reset after it was repaired",
     "contactor_lost": "check the GPIO chip and the line that the station file names (gpioinfo shows who uses it)",
     "will_not_start": "check the charger's rotary switch and its mains",
@@ -82,6 +82,8 @@ ADVICE: Mapping[str, str] = {
     "suspended": "a gateway must not be suspended: switch that off in its operating system",
     "unkept": "make space, or mend the disk of the journal's directory",
     "internal": "this is a defect of the software: report it with the journal, then reset",
+    # once the charger stands by
+    "stands_by_now": "the charger stands by now: have the cause repaired, then reset",
     # what a person does next
     "start": "start to go on",
 }

@@ -10,7 +10,8 @@ TEXTS: Mapping[str, str] = {
     "service_ends": "the service ends: {why}",
     "no_answer": "the control loop has not answered: look at the service's log",
     "not_kept": "done, but not kept: {problem}",
-    "not_taken": "done, but not kept: the disk has not taken it",
+    "not_done": "not done: {problem}",
+    "not_taken": "the disk has not taken it",
     "overtaken": "a stop came meanwhile: ask again if it is still wanted",
     # while current flows
     "charging": "step {step} ({step_a:.1f} A): {rule}{limited:after}{rises:after}",
@@ -28,12 +29,22 @@ TEXTS: Mapping[str, str] = {
     "operator_pause": "paused by the operator",
     "operator_reset": "reset by the operator",
     "not_running": "not running: {what}",
-    "out_of_control": "the charger does not obey: cut its mains; nothing can start here",
+    "out_of_control": "the charger was not seen to stop: cut its mains; nothing can be started or reset here before it "
+    "has stood by for {lasts_s:g} s",
+    "reset_first": "not running: {faults} must be reset first",
+    "nothing_to_start": "nothing to start: {state}: {what}",
+    "nothing_to_reset": "nothing to reset: {state}: {what}",
     "needs_reset": "{fault} is latched and needs a reset: {what}",
     "still_there": "{fault} is still there: {what}",
     "gone_first": "{fault} must be gone for {clean_s:g} s first",
     "reset_too_often": "{fault} was reset {times} times within an hour and came again each time: remove its cause; it "
     "can be reset again in {wait_min:.0f} min",
+    # how a fault goes on
+    "goes_on_by_reset": "its cause is gone: orchestrator reset {bay}, then orchestrator start {bay}",
+    "goes_on_after": "goes on by itself {wait_s:g} s after its cause is gone ({strike:nth} of {of} within an hour)",
+    "goes_on_in": "its cause is gone, goes on by itself in {left_s} s ({strike:nth} of {of} within an hour)",
+    "goes_on_in_at_the_earliest": "its cause is gone, goes on by itself in {left_s} s at the earliest ({strike:nth} of "
+    "{of} within an hour)",
     # a defect of our own
     "failed": "internal: {error}",
     "failed_stopping": "stopping: internal: {error}",
@@ -48,12 +59,12 @@ TEXTS: Mapping[str, str] = {
     "past_unknown": "{bay} on {port} is not in {file}: nobody knows its past",
     "older_version_ran": "an older version of this service has run {bay} in the meantime: see what is wired where",
     "port_was_of": "{port} was {old_bay}'s when this service last ran, and is {bay}'s now: see what is wired where",
-    "bmu_was_of": "the BMU on {can}, node {node_id}, was {old_bay}'s when this service last ran, and is {bay}'s now: "
+    "bmu_was_of": "the BMU on {can}, node 0x{node_id:02X}, was {old_bay}'s when this service last ran, and is {bay}'s now: "
     "see what is wired where",
     "bay_moved_port": "{bay} was on {old_port} when this service last ran, and is on {port} now: see what is wired "
     "where",
-    "bay_moved_bmu": "{bay} had the BMU on {old_can}, node {old_node_id}, when this service last ran, and has {can}, "
-    "node {node_id}, now: see what is wired where",
+    "bay_moved_bmu": "{bay} had the BMU on {old_can}, node 0x{old_node_id:02X}, when this service last ran, and has {can}, "
+    "node 0x{node_id:02X}, now: see what is wired where",
     "state_unreadable": "{file} cannot be read ({error}): nobody knows which faults were latched",
     "state_lost": "{file} is lost, though this service has run here before: nobody knows which faults were latched",
     "state_disk_silent": "the disk of {directory} does not answer: nobody knows which faults were latched",

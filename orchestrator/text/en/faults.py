@@ -26,11 +26,14 @@ TEXTS: Mapping[str, str] = {
     "current_unheard": "the BMU sees {pack_a:.2f} A flow into the pack, nothing was commanded, and the charger is not "
     "heard",
     "current_without_order": "the BMU sees {pack_a:.2f} A flow into the pack while the charger says {charger_a:.2f} A "
-    "and nothing was commanded: believe the BMU. Either the charger's word is wrong, its cable belongs to another bay, "
-    "or something else charges this pack",
+    "and nothing was commanded. Either the charger's word is wrong, its cable belongs to another bay, something else "
+    "charges this pack, or the BMU's current is wrong",
     "will_not_stop": "the charger does not obey the stop, which is repeated: it still delivers {charger_a:.2f} A",
-    "stop_contradicted": "the stop, which is repeated, is not obeyed: the BMU still sees {pack_a:.2f} A, the charger "
-    "says {charger_a:.2f} A",
+    "stop_contradicted": "the stop, which is repeated, is not seen by both: the BMU still sees {pack_a:.2f} A, the "
+    "charger says {charger_a:.2f} A; one of them is wrong",
+    "did_not_stop": "before, it did not obey the stop for {lasted_s:.0f} s",
+    "stop_was_contradicted": "before, the BMU saw current for {lasted_s:.0f} s while the charger said none: one of them "
+    "was wrong",
     "contactor_lost": "{problem}",
     "will_not_start": "the charger was told '{order:word}' for {waited_s:.1f} s and its status does not show it{held:after}",
     "stopped_by_itself": "the charger stopped though it was told to run",
@@ -60,7 +63,7 @@ TEXTS: Mapping[str, str] = {
     "by_step": "the step that was set ({step_a:g} A)",
     "moves_other": "the charger of {bay} moves the BMU of {other}: it has begun with {charger_a:.2f} A, and the BMU of "
     "{bay} sees {seen_a:.2f} A of it. Their cables or node ids are swapped",
-    "pairing_not_proved": "the charger of {bay} has begun with {charger_a:.2f} A, and its BMU (node {node_id}) sees "
+    "pairing_not_proved": "the charger of {bay} has begun with {charger_a:.2f} A, and its BMU (node 0x{node_id:02X}) sees "
     "{seen_a:.2f} A of it: they are not on one battery",
     "charger_frozen": "the charger has said {charger_v:.2f} V and {charger_a:.2f} A for {lasted_s:.0f} s, while the "
     "BMU's values moved by {moved_v:.2f} V and {moved_a:.2f} A: its measurement is frozen",
@@ -75,7 +78,7 @@ TEXTS: Mapping[str, str] = {
     "back_feed": "the BMU reports a discharge of {discharge_a:.2f} A while the charger runs",
     # the battery
     "bmu_problem": "{problem}",
-    "bmu_silent": "the BMU (node {node_id}) has stopped answering",
+    "bmu_silent": "the BMU (node 0x{node_id:02X}) has stopped answering",
     "heartbeat_lost": "no heartbeat of the BMU for {age_s:.1f} s",
     "stale_reading": "no fresh {missing:word} from the BMU",
     "sdo_refused": "{problem}",

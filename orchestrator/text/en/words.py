@@ -22,6 +22,10 @@ WORDS: Mapping[str, str] = {
     "temperature": "temperature",
     "soc": "SOC",
     "soh": "SOH",
+    # times within an hour
+    "nth_1": "1st",
+    "nth_2": "2nd",
+    "nth_3": "3rd",
     # the charger's modes, orders and complaints
     "manual": "manual",
     "automatic": "automatic",
@@ -44,4 +48,6 @@ FRAMES: Mapping[str, str] = {
     "list": ", ",
     "and": " and ",
     "then": "; ",
+    "ago": "{what}, {ago_min} min ago",
+    "just_now": "{what}, just now",
 }

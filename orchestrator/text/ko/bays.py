@@ -10,7 +10,8 @@ TEXTS: Mapping[str, str] = {
     "service_ends": "서비스가 종료됩니다: {why}",
     "no_answer": "제어 루프가 응답하지 않았습니다: 서비스의 로그를 확인하십시오",
     "not_kept": "수행했으나 저장되지 않았습니다: {problem}",
-    "not_taken": "수행했으나 저장되지 않았습니다: 디스크가 아직 받아들이지 않았습니다",
+    "not_done": "수행하지 않았습니다: {problem}",
+    "not_taken": "디스크가 아직 받아들이지 않았습니다",
     "overtaken": "그 사이에 정지 요청이 있었습니다: 여전히 필요하면 다시 요청하십시오",
     # while current flows
     "charging": "단계 {step}({step_a:.1f} A): {rule}{limited:after}{rises:after}",
@@ -28,12 +29,22 @@ TEXTS: Mapping[str, str] = {
     "operator_pause": "작업자가 일시 정지했습니다",
     "operator_reset": "작업자가 리셋했습니다",
     "not_running": "동작 중이 아닙니다: {what}",
-    "out_of_control": "충전기가 명령에 따르지 않습니다: 주전원을 차단하십시오. 여기서는 아무것도 시작할 수 없습니다",
+    "out_of_control": "충전기의 정지가 확인되지 않았습니다: 주전원을 차단하십시오. {lasts_s:g} s 동안 대기 상태가 유지되기 "
+    "전에는 시작도 리셋도 할 수 없습니다",
+    "reset_first": "동작 중이 아닙니다: 먼저 {faults}을(를) 리셋해야 합니다",
+    "nothing_to_start": "시작할 것이 없습니다: {state}: {what}",
+    "nothing_to_reset": "리셋할 것이 없습니다: {state}: {what}",
     "needs_reset": "{fault} 장애가 래치되어 리셋이 필요합니다: {what}",
     "still_there": "{fault} 장애가 아직 남아 있습니다: {what}",
     "gone_first": "먼저 {fault} 장애가 {clean_s:g} s 동안 없어야 합니다",
     "reset_too_often": "{fault} 장애를 1시간 안에 {times}회 리셋했으나 매번 다시 발생했습니다: 원인을 제거하십시오. "
     "{wait_min:.0f}분 후에 다시 리셋할 수 있습니다",
+    # how a fault goes on
+    "goes_on_by_reset": "원인이 사라졌습니다: orchestrator reset {bay}, 이어서 orchestrator start {bay}",
+    "goes_on_after": "원인이 사라지고 {wait_s:g} s 후에 스스로 계속합니다(1시간 내 {of}회 중 {strike:nth}회째)",
+    "goes_on_in": "원인이 사라졌고 {left_s} s 후에 스스로 계속합니다(1시간 내 {of}회 중 {strike:nth}회째)",
+    "goes_on_in_at_the_earliest": "원인이 사라졌고 빨라도 {left_s} s 후에 스스로 계속합니다(1시간 내 {of}회 중 "
+    "{strike:nth}회째)",
     # a defect of our own
     "failed": "내부 에러: {error}",
     "failed_stopping": "정지하고 있습니다: 내부 에러: {error}",
@@ -48,10 +59,10 @@ TEXTS: Mapping[str, str] = {
     "past_unknown": "{port}의 {bay}이(가) {file}에 없습니다: 이전 상태를 알 수 없습니다",
     "older_version_ran": "그 사이에 이 서비스의 이전 버전이 {bay}을(를) 운전했습니다: 배선을 확인하십시오",
     "port_was_of": "{port}은(는) 지난 실행 때 {old_bay}의 것이었고 지금은 {bay}의 것입니다: 배선을 확인하십시오",
-    "bmu_was_of": "{can}의 BMU(노드 {node_id})는 지난 실행 때 {old_bay}의 것이었고 지금은 {bay}의 것입니다: 배선을 "
+    "bmu_was_of": "{can}의 BMU(노드 0x{node_id:02X})는 지난 실행 때 {old_bay}의 것이었고 지금은 {bay}의 것입니다: 배선을 "
     "확인하십시오",
     "bay_moved_port": "{bay}은(는) 지난 실행 때 {old_port}에 있었고 지금은 {port}에 있습니다: 배선을 확인하십시오",
-    "bay_moved_bmu": "{bay}의 BMU는 지난 실행 때 {old_can}의 노드 {old_node_id}였고 지금은 {can}의 노드 {node_id}입니다: "
+    "bay_moved_bmu": "{bay}의 BMU는 지난 실행 때 {old_can}의 노드 0x{old_node_id:02X}였고 지금은 {can}의 노드 0x{node_id:02X}입니다: "
     "배선을 확인하십시오",
     "state_unreadable": "{file}을(를) 읽을 수 없습니다({error}): 어떤 장애가 래치되어 있었는지 알 수 없습니다",
     "state_lost": "이 서비스가 여기서 실행된 적이 있는데 {file}이(가) 없습니다: 어떤 장애가 래치되어 있었는지 알 수 없습니다",

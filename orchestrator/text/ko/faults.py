@@ -24,11 +24,14 @@ TEXTS: Mapping[str, str] = {
     "rogue_run": "기동 명령이 없었는데 충전기가 동작합니다: {charger_a:.2f} A",
     "current_unheard": "명령이 없었는데 BMU에 {pack_a:.2f} A의 충전 전류가 보이며, 충전기는 응답하지 않습니다",
     "current_without_order": "명령이 없었는데 BMU에는 {pack_a:.2f} A의 충전 전류가 보이고 충전기는 {charger_a:.2f} A라고 "
-    "보고합니다. BMU를 믿으십시오. 충전기의 보고가 틀렸거나, 통신 케이블이 다른 베이의 것이거나, 다른 장치가 이 팩을 "
-    "충전하고 있습니다",
+    "보고합니다. 충전기의 보고가 틀렸거나, 통신 케이블이 다른 베이의 것이거나, 다른 장치가 이 팩을 충전하고 있거나, "
+    "BMU의 전류가 틀렸습니다",
     "will_not_stop": "충전기가 반복되는 정지 명령에 따르지 않습니다: 아직 {charger_a:.2f} A를 출력합니다",
-    "stop_contradicted": "반복되는 정지 명령이 이행되지 않습니다: BMU에는 아직 {pack_a:.2f} A가 보이고 충전기는 "
-    "{charger_a:.2f} A라고 보고합니다",
+    "stop_contradicted": "반복되는 정지가 한쪽에서만 확인됩니다: BMU에는 아직 {pack_a:.2f} A가 보이고 충전기는 "
+    "{charger_a:.2f} A라고 보고합니다. 둘 중 하나가 틀렸습니다",
+    "did_not_stop": "앞서 {lasted_s:.0f} s 동안 정지 명령에 따르지 않았습니다",
+    "stop_was_contradicted": "앞서 {lasted_s:.0f} s 동안 BMU에는 전류가 보이고 충전기는 전류가 없다고 했습니다: 둘 중 하나가 "
+    "틀렸습니다",
     "contactor_lost": "{problem}",
     "will_not_start": "충전기에 '{order:word}' 명령을 {waited_s:.1f} s 동안 보냈으나 상태에 나타나지 않습니다{held:after}",
     "stopped_by_itself": "기동을 명령했는데 충전기가 정지했습니다",
@@ -57,7 +60,7 @@ TEXTS: Mapping[str, str] = {
     "by_step": "설정된 단계({step_a:g} A)",
     "moves_other": "{bay}의 충전기가 {other}의 BMU를 움직입니다: {charger_a:.2f} A로 시작했으나 {bay}의 BMU에는 "
     "{seen_a:.2f} A만 보입니다. 두 베이의 케이블 또는 노드 ID가 서로 바뀌었습니다",
-    "pairing_not_proved": "{bay}의 충전기가 {charger_a:.2f} A로 시작했으나 그 BMU(노드 {node_id})에는 {seen_a:.2f} A만 "
+    "pairing_not_proved": "{bay}의 충전기가 {charger_a:.2f} A로 시작했으나 그 BMU(노드 0x{node_id:02X})에는 {seen_a:.2f} A만 "
     "보입니다: 같은 배터리에 연결되어 있지 않습니다",
     "charger_frozen": "BMU의 값이 {moved_v:.2f} V, {moved_a:.2f} A 변하는 동안 충전기는 {lasted_s:.0f} s째 "
     "{charger_v:.2f} V, {charger_a:.2f} A라고만 합니다: 충전기의 측정값이 멈추었습니다",
@@ -72,7 +75,7 @@ TEXTS: Mapping[str, str] = {
     "back_feed": "충전기가 동작하는 동안 BMU가 {discharge_a:.2f} A의 방전을 보고합니다",
     # the battery
     "bmu_problem": "{problem}",
-    "bmu_silent": "BMU(노드 {node_id})가 더 이상 응답하지 않습니다",
+    "bmu_silent": "BMU(노드 0x{node_id:02X})가 더 이상 응답하지 않습니다",
     "heartbeat_lost": "BMU의 heartbeat가 {age_s:.1f} s 동안 없습니다",
     "stale_reading": "BMU의 최신 값이 없습니다: {missing:word}",
     "sdo_refused": "{problem}",

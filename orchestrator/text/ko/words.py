@@ -22,6 +22,10 @@ WORDS: Mapping[str, str] = {
     "temperature": "온도",
     "soc": "SOC",
     "soh": "SOH",
+    # times within an hour
+    "nth_1": "1",
+    "nth_2": "2",
+    "nth_3": "3",
     # the charger's modes, orders and complaints
     "manual": "수동",
     "automatic": "자동",
@@ -44,4 +48,6 @@ FRAMES: Mapping[str, str] = {
     "list": ", ",
     "and": ", ",
     "then": ". ",
+    "ago": "{what}({ago_min}분 전)",
+    "just_now": "{what}(방금)",
 }

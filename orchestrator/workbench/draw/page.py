@@ -16,7 +16,9 @@ MAX_MOMENTS = 1500
 
 def save_page(runs: Sequence[Run], path: Path) -> None:
     """Write the page."""
-    environment = Environment(loader=PackageLoader("orchestrator.workbench", "."), autoescape=True, trim_blocks=True)
+    environment = Environment(
+        loader=PackageLoader("orchestrator.workbench.draw", "."), autoescape=True, trim_blocks=True
+    )
     drawing = svg(runs)
     path.write_text(
         environment.get_template("page.html").render(

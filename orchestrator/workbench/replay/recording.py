@@ -18,6 +18,7 @@ from typing import Any
 from cattrs import Converter
 from cattrs.errors import BaseValidationError
 
+from orchestrator.config.plainfile import check_plain
 from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
@@ -186,6 +187,7 @@ def _age(path: Path) -> int:
 def _lines(path: Path, reader: _Reader) -> Iterator[tuple[int, bytes]]:
     number = 0
     try:
+        check_plain(path, "a journal: JSON Lines, or a directory of them")
         with (gzip.open if path.suffix == ".gz" else open)(path, "rb") as file:
             for number, text in enumerate(file, 1):
                 if text.strip():

@@ -21,8 +21,8 @@ Outline = tuple[object, ...]
 EVENTFUL = (
     "since_s", "resets", "hold", "paused", "stop_cause", "full_pct", "boots", "resumed", "ran", "shown", "order",
     "limit", "limit_before", "closed", "charge_step", "exchange", "reached_s", "raise_s", "taper_s", "qualified_s",
-    "runs_s", "stopping_s", "verified_s", "returns", "unverified", "left_s", "returned_s", "reverts", "confirmed",
-    "ready", "intends",
+    "runs_s", "stopping_s", "verified_s", "returns", "unverified", "left_s", "left_as", "returned_s", "reverts",
+    "confirmed", "ready", "intends",
 )  # fmt: skip
 #: What it sums up, as long as there is anything to sum up.
 SUMS = ("idle_s", "search_s", "wake_s")
