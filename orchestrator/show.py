@@ -7,8 +7,15 @@ from typing import cast
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
 #: The battery's values in the table, with their names for people.
 BATTERY = {"soc_pct": "SOC", "voltage_v": "pack voltage", "temperature_c": "temperature"}
+#: The causes that begin with what to do about a charger that does not obey.
+CUT_THE_MAINS = frozenset({
+    "uncontrollable", "uncontrollable_unproved", "uncontrollable_contradicted", "uncontrollable_stands_by",
+    "failed_uncontrollable",
+})  # fmt: skip
 #: States in which a charger stands by, if it obeys.
-RESTING = frozenset({"IDLE", "FULL", "SUSPENDED", "TRIPPED"})
+RESTING = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"})
+#: The levels of `alarm`, worst first, as the table has its bays; all others come after them.
+LEVELS = ("danger", "attention")
 #: Standby may show so much at the charger, and so much at the BMU.
 STANDBY_A, BMU_A = 0.5, 1.0
 
@@ -38,7 +45,7 @@ def strays(document: Mapping[str, object]) -> list[str]:
 
 def table(bays: Sequence[Bay]) -> str:
     """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
-    bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", not bay.get("alarm")))
+    bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
     rows = [HEAD, *(_row(bay) for bay in bays)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
     lines = [f"ALARM: {what_to_do(bay)}" for bay in bays if is_alarming(bay)]
@@ -69,7 +76,13 @@ def _told(cause: object) -> Iterator[tuple[object, ...]]:
 
 def is_alarming(bay: Bay) -> bool:
     """Whether a charger may be running that nobody controls."""
-    return bool(bay.get("alarm")) or bay["state"] == "UNCONTROLLABLE"
+    return _level(bay) == 0 or bay["state"] == "UNCONTROLLABLE"
+
+
+def _level(bay: Bay) -> int:
+    """Its place in `LEVELS`. A service that has not been restarted since an update may still say true for danger."""
+    level = "danger" if bay.get("alarm") is True else bay.get("alarm")
+    return LEVELS.index(level) if level in LEVELS else len(LEVELS)
 
 
 def stands_by(bay: Bay) -> bool:
@@ -94,7 +107,7 @@ def stands_by(bay: Bay) -> bool:
 def what_to_do(bay: Bay) -> str:
     """About a charger that was not verified to stand by: first what to do, then why."""
     why = f"{bay['state']}: {bay['reason']}"
-    if str(bay["reason"]).startswith("CUT THE MAINS"):
+    if next(_told(bay.get("cause")), ("",))[0] in CUT_THE_MAINS:
         return f"{bay['name']}: {bay['reason']}"
     whose = f"{bay['name']}'s charger ({bay.get('port', 'its port is not known')})"
     if is_alarming(bay) or bay["state"] not in RESTING | {"OFFLINE"}:

@@ -14,7 +14,7 @@ stays isolated until a person has looked. The charger must keep its mains: one t
 from orchestrator.model import ENERGISED, State
 
 #: States in which the charger is known to do as it is told.
-OBEYS = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED}) | ENERGISED
+OBEYS = frozenset({State.IDLE, State.HELD, State.QUALIFYING, State.FULL, State.SUSPENDED}) | ENERGISED
 
 
 def closes(state: State, *, closed: bool, standby: bool) -> bool:

@@ -10,7 +10,7 @@ from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.safestop import OBEY_STOP_S
-from orchestrator.model import STOP, Cause, Decision, Request, Snapshot, State
+from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 
 FAULT = "internal"
 
@@ -39,8 +39,9 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
         memory.cause = Cause.of("failed_uncontrollable", tried_s=tried_s, error=error)
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
     answer = Cause.of("failed_request", error=error) if refused else None
+    level = Alarm.DANGER if out else Alarm.NONE
     decision = Decision(
-        memory.state, memory.cause, STOP, faults=shown(memory.faults, now_s), alarm=out, closed=memory.closed,
+        memory.state, memory.cause, STOP, faults=shown(memory.faults, now_s), alarm=level, closed=memory.closed,
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory

@@ -33,7 +33,7 @@ class Clear(Enum):
 
 ALWAYS = frozenset(State)
 #: The charger was verified to stand by and was not told to run.
-AT_REST = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
+AT_REST = frozenset({State.IDLE, State.HELD, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
 AT_WORK = ENERGISED | {State.QUALIFYING}
 #: The charger is heard for the first time, or again.
 UNSEEN = frozenset({State.STARTING, State.OFFLINE})

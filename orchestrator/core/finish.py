@@ -1,6 +1,7 @@
 """When a charge is over, by the policy. Time and Ah limits are faults and stand in the fault table."""
 
 from orchestrator.core.facts import Facts
+from orchestrator.model import Cause
 
 #: A charger that ends a charge below this state of charge is wrong, or the BMU is.
 EARLY_FULL_PCT = 80.0
@@ -12,16 +13,16 @@ TAPERED_SHARE = 0.5
 SEEN_TAPER_S = 5.0
 
 
-def finished(f: Facts) -> str | None:
+def finished(f: Facts) -> Cause | None:
     """Why the battery is full, with the policy's line; None while it is not."""
-    rule, source = f.rules.policy.finish, f.rules.policy.source
+    rule, by_policy = f.rules.policy.finish, f.rules.by_policy
     if f.soc is not None and f.soc >= rule.soc_pct:
-        return f"SOC {f.soc:.0f} % reached {rule.soc_pct:g} % ({source.at('finish.soc_pct')})"
+        return by_policy("full_soc", "finish.soc_pct", soc_pct=f.soc, limit_pct=rule.soc_pct)
     if rule.charger_full and f.full_mode and f.soc is not None and f.soc >= early_below_pct(f) and ends_full(f):
-        return f"the charger reports full (mode 5) ({source.at('finish.charger_full')})"
+        return by_policy("full_charger", "finish.charger_full")
     taper, since_s = rule.taper, f.memory.taper_s
     if taper is not None and since_s is not None and f.now_s - since_s >= taper.for_s:
-        return f"{f.amps:.2f} A, tapered below {taper.below_a:g} A for {taper.for_s:g} s ({source.at('finish.taper')})"
+        return by_policy("full_taper", "finish.taper", charger_a=f.amps, below_a=taper.below_a, for_s=taper.for_s)
     return None
 
 

@@ -5,7 +5,8 @@ that is not in the table is refused with `RefusedError` and the state stays as i
 
 - Current flows in three states only, and they are left only by `stop`, or one to the next.
 - What follows a stop is chosen after the stop was verified, so no fault names a state.
-- TRIPPED is left by a person's `reset`, or by `stop` if the charger runs again.
+- TRIPPED is left by a person's `reset`, or by `stop` if the charger runs again. A reset leads to HELD: it permits a
+  start, it does not make one.
 
 `transitions` is used as the engine, with a throw-away model for each call: the machine itself has no state.
 """
@@ -26,6 +27,7 @@ class Trigger(StrEnum):
     GIVE_UP = "give_up"  #: the charger did not obey a stop in time
     LOSE = "lose"  #: a device does not answer
     REST = "rest"  #: verified standby, nothing to do
+    HOLD = "hold"  #: verified standby, a person must start
     SUSPEND = "suspend"  #: verified standby, goes on by itself later
     FILL = "fill"  #: verified standby, the battery is full
     TRIP = "trip"  #: verified standby, a latched fault
@@ -41,7 +43,7 @@ S, T = State, Trigger
 #: Current flows; in the order in which a deeply discharged pack goes through them.
 ENERGISED_STAGES = (S.PRECHARGE_PULSE, S.PRECHARGE_CONTINUOUS, S.CHARGING)
 #: States in which the charger stands by, verified, and from which a bay goes where the facts lead.
-RESTING = (S.OFFLINE, S.IDLE, S.QUALIFYING, S.FULL, S.SUSPENDED)
+RESTING = (S.OFFLINE, S.IDLE, S.HELD, S.QUALIFYING, S.FULL, S.SUSPENDED)
 #: States that wait for a verified standby.
 UNVERIFIED = (S.STARTING, S.STOPPING, S.UNCONTROLLABLE)
 
@@ -52,11 +54,12 @@ TABLE: tuple[tuple[Trigger, tuple[State, ...], State | None], ...] = (
     (T.GIVE_UP, (S.STARTING, S.STOPPING), S.UNCONTROLLABLE),
     (T.LOSE, (*RESTING, *UNVERIFIED), S.OFFLINE),
     (T.REST, (*RESTING, *UNVERIFIED), S.IDLE),
+    (T.HOLD, (*RESTING, *UNVERIFIED), S.HELD),
     (T.SUSPEND, (*RESTING, *UNVERIFIED), S.SUSPENDED),
     (T.FILL, (*RESTING, *UNVERIFIED), S.FULL),
     (T.TRIP, (S.OFFLINE, *UNVERIFIED), S.TRIPPED),  # only after a stop that was verified just now
-    (T.RESET, (S.TRIPPED,), S.IDLE),
-    (T.QUALIFY, (S.IDLE, S.FULL, S.SUSPENDED), S.QUALIFYING),
+    (T.RESET, (S.TRIPPED,), S.HELD),
+    (T.QUALIFY, (S.IDLE, S.HELD, S.FULL, S.SUSPENDED), S.QUALIFYING),
     (T.PULSE, (S.QUALIFYING,), S.PRECHARGE_PULSE),
     (T.CONTINUE, (S.PRECHARGE_PULSE,), S.PRECHARGE_CONTINUOUS),
     (T.CHARGE, (S.QUALIFYING, S.PRECHARGE_CONTINUOUS), S.CHARGING),

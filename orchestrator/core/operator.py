@@ -14,10 +14,12 @@ from orchestrator.model.cause import together
 
 #: A charge has been started already.
 AT_WORK = ENERGISED | {State.QUALIFYING}
-STOPPED = Cause("operator_stop", advice="start")
+STOPPED = Cause("operator_stop")
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
-RESET = Cause("operator_reset", advice="start")
+RESET = Cause("operator_reset")
+#: The holds that are an operator's own doing.
+OWN = frozenset({STOPPED, RESET})
 OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 

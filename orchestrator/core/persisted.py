@@ -106,7 +106,7 @@ class Persisted:
         unknown = [one.cause or _unknown(name) for name, one in self.faults.items() if name not in ROW]
         session = self.session
         memory = Memory(
-            hold=self.hold or (together(unknown).with_("start") if unknown else None),
+            hold=self.hold or (together(unknown) if unknown else None),
             paused=self.paused,
             faults=faults,
             resets=tuple((now_s - age_s, name) for age_s, name in self.resets),

@@ -6,6 +6,7 @@ facts → what has lasted → the operator's request → faults → the trigger,
 from dataclasses import replace
 
 from orchestrator.core import latches, limits
+from orchestrator.core.alarm import alarm
 from orchestrator.core.contactor import closes
 from orchestrator.core.course import course
 from orchestrator.core.facts import Facts
@@ -43,7 +44,9 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
 PRECHARGE = Cause("precharge_step")
 #: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
 #: not end it: its limits would begin anew with each of them.
-SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.TRIPPED})
+SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})
+#: … but who waits for a person, or no longer does, has come no farther: what a restart has left open stays open.
+ALIKE = frozenset({State.IDLE, State.HELD})
 
 
 def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
@@ -72,7 +75,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
             setpoint=setpoint,
             step=chosen,
             faults=faults,
-            alarm=_alarm(memory),
+            alarm=alarm(memory, faults),
             closed=memory.closed,
             session=ended or memory.session,
             answer=answer,
@@ -81,18 +84,10 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     )
 
 
-def _alarm(memory: Memory) -> bool:
-    """People must know: a charger does not obey, or nobody knows whether the one that ran has stopped."""
-    unknown = memory.unverified and memory.state in (State.STARTING, State.OFFLINE)
-    locked = memory.faults.get("port_locked")
-    return memory.state is State.UNCONTROLLABLE or unknown or (locked is not None and locked.raised_s is not None)
-
-
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
     """Let the state follow the facts; the session that has ended by it, if any."""
     memory, before = f.memory, f.memory.state
-    trigger, why = course(f, faults)
-    memory.cause = why if isinstance(why, Cause) else Cause.of("said", text=why)
+    trigger, memory.cause = course(f, faults)
     memory.state = fire(before, trigger) if trigger is not None else before
     if memory.state is not before:
         follow_stop(f, before)
@@ -101,8 +96,9 @@ def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
             memory.stop_cause = memory.cause
     if memory.session is None or not _is_over(f, before):
         return None
-    stopped_by = memory.stop_cause if before is State.STOPPING else None
-    ended = replace(memory.session, result=stopped_by or memory.cause)
+    held = memory.hold if memory.state is State.HELD else None  # the rest of that cause is what to do next
+    result = (memory.stop_cause if before is State.STOPPING else held) or memory.cause
+    ended = replace(memory.session, result=result)
     memory.session = None
     return ended
 
@@ -111,8 +107,9 @@ def _is_over(f: Facts, before: State) -> bool:
     """Whether the open charge has ended. One that the last run of the service left open ends with its battery."""
     exchanged = f.memory.faults.get("battery_exchanged")
     another = f.departed or (exchanged is not None and exchanged.raised_s is not None)
-    goes_on = f.memory.state is before or before is State.STARTING
-    return f.memory.state in SESSION_ENDS and (another or not goes_on)
+    after = f.memory.state
+    goes_on = after is before or before is State.STARTING or {before, after} == ALIKE
+    return after in SESSION_ENDS and (another or not goes_on)
 
 
 def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step | None]:

@@ -12,6 +12,14 @@ if TYPE_CHECKING:
 
 #: The events that the picture has room for.
 ROOM = 12
+#: Events in other colours than most: a state that has ended a charge, or that wants a person.
+STYLES = {
+    "STOPPING": "yellow",
+    "HELD": "bold yellow",
+    "TRIPPED": "bold red",
+    "UNCONTROLLABLE": "bold red",
+    "FULL": "bold green",
+}
 #: Without a terminal, a line of figures this often.
 LINE_EVERY_S = 2.0
 
@@ -103,6 +111,4 @@ def picture(t_s: float, bay: Mapping[str, object], story: Story) -> "Panel":
 def _style(what: str) -> str:
     if what.startswith("inject"):
         return "bold magenta"
-    return {"STOPPING": "yellow", "TRIPPED": "bold red", "UNCONTROLLABLE": "bold red", "FULL": "bold green"}.get(
-        what, "cyan"
-    )
+    return STYLES.get(what, "cyan")

@@ -17,7 +17,7 @@ NOTHING_S = 40.0
 #: A demo that has not ended by then is stuck.
 LIMIT_S = 150.0
 #: No current flows and no stop is awaited.
-AT_REST = frozenset({"IDLE", "FULL", "SUSPENDED", "TRIPPED", "OFFLINE", "UNCONTROLLABLE"})
+AT_REST = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED", "OFFLINE", "UNCONTROLLABLE"})
 
 
 @dataclass(slots=True)

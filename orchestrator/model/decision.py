@@ -46,6 +46,7 @@ class State(StrEnum):
     STARTING = "STARTING"
     OFFLINE = "OFFLINE"
     IDLE = "IDLE"
+    HELD = "HELD"
     QUALIFYING = "QUALIFYING"
     PRECHARGE_PULSE = "PRECHARGE_PULSE"
     PRECHARGE_CONTINUOUS = "PRECHARGE_CONTINUOUS"
@@ -70,6 +71,14 @@ class Effect(IntEnum):
     PAUSE = 4  #: stop, go on by itself once clear
     STOP = 5  #: stop; may go on after a backoff or when an operator starts
     TRIP = 6  #: stop and latch until a person resets
+
+
+class Alarm(IntEnum):
+    """How urgently people must look at a bay; of many bays the highest counts."""
+
+    NONE = 0  #: nobody need look: it works, rests, or stands by because an operator wanted it so
+    ATTENTION = 1  #: its charger stands by, verified, and a fault waits for a person
+    DANGER = 2  #: its charger is, or may be, out of control
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +142,7 @@ class Decision:
     setpoint: Setpoint = STANDBY
     step: Step | None = None  #: while energised
     faults: tuple[ActiveFault, ...] = ()  #: worst first
-    alarm: bool = False  #: the charger is out of control, and people must know
+    alarm: Alarm = Alarm.NONE
     closed: bool = False  #: the contactor between charger and battery is to be closed
     session: Session | None = None  #: running, or just ended (`result` set, in this one decision)
     answer: Cause | None = None  #: why the operator's request was refused; None: it was not

@@ -7,7 +7,6 @@ from itertools import takewhile
 from math import inf
 from threading import Lock
 from time import monotonic, time
-from typing import Protocol
 
 from orchestrator.config.station import Bay
 from orchestrator.core.failed import carry_on
@@ -15,16 +14,12 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.interlock import Grant, grant
+from orchestrator.interlock import grant
 from orchestrator.model import (
     ENERGISED,
     STOP,
-    BatteryLink,
-    BatteryReading,
+    Alarm,
     Cause,
-    ChargerLink,
-    ChargerReading,
-    Command,
     Decision,
     Request,
     Snapshot,
@@ -32,6 +27,7 @@ from orchestrator.model import (
 )
 from orchestrator.service.asked import Answers, Asked
 from orchestrator.service.contactor import Contactor
+from orchestrator.service.devices import Battery, Charger
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.records import SnapshotRecorder, decision_lines
@@ -43,26 +39,9 @@ from orchestrator.text.catalogue import say
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
 #: The states that a charger was verified for: it stands by.
-VERIFIED = frozenset({State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE})
-
-
-class Charger(Protocol):
-    """What a bay needs of a charger's port (`devices.charger.ChargerPort`)."""
-
-    @property
-    def view(self) -> tuple[ChargerReading | None, ChargerLink]:
-        """The newest reading and how the line is doing."""
-
-    def order(self, command: Command | None, grant: Grant | None = None) -> None:
-        """Leave a standing order."""
-
-
-class Battery(Protocol):
-    """What a bay needs of a BMU (`devices.battery.BatteryNode`)."""
-
-    @property
-    def view(self) -> tuple[BatteryReading, BatteryLink]:
-        """The newest values and how the bus is doing."""
+VERIFIED = frozenset(
+    {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE}
+)
 
 
 class BayRunner:
@@ -109,6 +88,11 @@ class BayRunner:
         return decision is not None and decision.state in VERIFIED and decision.command is None
 
     @property
+    def alarm(self) -> Alarm:
+        """How urgently people must look at it."""
+        return self.decision.alarm if self.decision is not None else Alarm.NONE
+
+    @property
     def owes(self) -> bool:
         """Somebody waits for an answer."""
         return bool(self._asked or self._answers.waiting)
@@ -124,7 +108,7 @@ class BayRunner:
         """
         self._ending = why
         if not orderly and self.decision is not None and self.decision.state in ENERGISED:
-            self._waits = Cause.of("ended_in_charge", why=why).with_("start")
+            self._waits = Cause.of("ended_in_charge", why=why)
 
     def offer(self, bay: Bay | None) -> str:
         """Take another policy over at the next standby; what will come of it. From any thread.
@@ -200,7 +184,7 @@ class BayRunner:
             self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)
             self._keep(self._memory, now_s)
         except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
-            self.decision = Decision(State.STOPPING, Cause.of("failed", error=internal), STOP, alarm=True)
+            self.decision = Decision(State.STOPPING, Cause.of("failed", error=internal), STOP, alarm=Alarm.DANGER)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         self._take_over()

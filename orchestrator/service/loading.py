@@ -9,7 +9,7 @@ from pathlib import Path
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Cause
 from orchestrator.service.disk import read_file
-from orchestrator.service.past import START, Entry, Place, past_of, settled
+from orchestrator.service.past import Entry, Place, past_of, settled
 from orchestrator.service.stateformat import Stamp, decode, decode_first
 
 FILE, FIRST_FILE = "persisted.json", "kept.json"
@@ -47,7 +47,7 @@ def load(directory: Path, places: Sequence[Place], now: Stamp) -> Loaded:
 
 def held(places: Sequence[Place], why: Cause) -> tuple[Entry, ...]:
     """Every bay where nobody knows anything."""
-    return tuple(Entry(place, Persisted(hold=why.with_(START)), 1) for place in places)
+    return tuple(Entry(place, Persisted(hold=why), 1) for place in places)
 
 
 def _read(directory: Path, now: Stamp) -> tuple[int, list[Entry]] | None:

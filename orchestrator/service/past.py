@@ -14,8 +14,6 @@ from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.model import Cause, ControlMode
 from orchestrator.model.cause import SEVERAL, together
 
-START = "start"  #: the advice
-
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -71,7 +69,7 @@ def past_of(place: Place, entries: Sequence[Entry], file: str) -> Persisted:
     if own is None and [entry.place for entry in others] == [Place(place.bay)]:
         return others[0].persisted  # the first format knew names only
     if not others:
-        unknown = Cause.of("past_unknown", advice=START, bay=place.bay, port=shown(place.port), file=file)
+        unknown = Cause.of("past_unknown", bay=place.bay, port=shown(place.port), file=file)
         return own.persisted if own else Persisted(hold=unknown)
     moves = [_moved(entry.place, place) for entry in others]
     return merged([*([own.persisted] if own else []), *(entry.persisted for entry in others)], moves)
@@ -108,7 +106,7 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
     fulls = [part.full_pct for part in parts if part.full_pct is not None]
     return Persisted(
         running=any(part.running for part in parts),
-        hold=together(list(holds)).with_(START) if holds else None,
+        hold=together(list(holds)) if holds else None,
         paused=any(part.paused for part in parts),
         faults=faults,
         resets=tuple(sorted({reset for part in parts for reset in part.resets}, reverse=True)),
@@ -119,9 +117,9 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
 
 
 def _holds(hold: Cause) -> list[Cause]:
-    """What a bay was held for, each for itself and without the advice that they share."""
+    """What a bay was held for, each for itself."""
     whats = hold.param("whats") if hold.id == SEVERAL else None
-    return [replace(one, advice="") for one in (whats or (hold,)) if isinstance(one, Cause)]
+    return [one for one in (whats or (hold,)) if isinstance(one, Cause)]
 
 
 def _worse(one: PersistedFault, other: PersistedFault) -> PersistedFault:

@@ -26,7 +26,7 @@ from orchestrator.text.catalogue import say
 Line = tuple[str, dict[str, object]]  #: kind, fields
 
 #: States in which every step is the same until something happens.
-QUIET = frozenset({State.IDLE, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
+QUIET = frozenset({State.IDLE, State.HELD, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
 #: What of a record is said for people, beside its cause.
 TEXTS = frozenset({"reason", "text", "rule", "result"})
 #: What of a snapshot is about this service and its contactor.

@@ -5,8 +5,10 @@ What comes in is hostile still: what is not decoded here is, or is refused, with
 
 from collections.abc import Mapping
 
-#: How a sentence ended that held a bay; that is the advice now.
-START = "; start to go on"
+#: Until there was the state HELD, a hold ended with what to do about it; the bay itself says that now.
+OLD_END = "; start to go on"
+#: The sentences that anything depends on.
+KNOWN = {"stopped by the operator": "operator_stop", "reset by the operator": "operator_reset"}
 #: The cause of a sentence that nobody knows more of.
 SAID = "said"
 
@@ -36,5 +38,5 @@ def said(text: object) -> dict[str, object] | None:
         raise ValueError(f"{text!r:.80} is no sentence")
     if not text:
         return None
-    what = text.removesuffix(START)
-    return {"id": SAID, "params": {"text": what}, "advice": "start" if what != text else ""}
+    what = text.removesuffix(OLD_END)
+    return {"id": KNOWN[what]} if what in KNOWN else {"id": SAID, "params": {"text": what}}

@@ -8,7 +8,16 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.config.station import Station
 from orchestrator.core.facts import CHARGER_STALE_S, FAST_STALE_S, SLOW_STALE_S
-from orchestrator.model import ActiveFault, BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
+from orchestrator.model import (
+    ActiveFault,
+    Alarm,
+    BatteryReading,
+    ChargerReading,
+    Decision,
+    Measurement,
+    Setpoint,
+    Snapshot,
+)
 from orchestrator.service.records import command_fields, session_fields
 from orchestrator.text.catalogue import fields, say
 
@@ -47,7 +56,7 @@ def bay_status(
             **_battery(snapshot.battery, now_s),
         },
         "faults": [_fault(fault, wall_s - (now_s - fault.since_s), language) for fault in decision.faults],
-        "alarm": decision.alarm,
+        "alarm": _level(decision.alarm),
         "session": session_fields(session, language) if session else None,
     }
 
@@ -64,19 +73,28 @@ def _fault(fault: ActiveFault, since: float, language: str) -> dict[str, object]
 
 def station_status(
     station: Station,
+    alarm: Alarm,
     bays: list[dict[str, object]],
     journal_problem: str,
     unkept: str = "",
     strays: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, object]:
-    """The whole station. `strays` are chargers of bays that the station file has not any more."""
+    """The whole station. `alarm` is the worst of all its bays and strays, also where `bays` are only some of them.
+
+    `strays` are chargers of bays that the station file has not any more.
+    """
     return {
         "station": station.station,
+        "alarm": _level(alarm),
         "bays": bays,
         "strays": list(strays),
         "journal": {"problem": journal_problem},
         "persisted": {"problem": unkept},
     }
+
+
+def _level(alarm: Alarm) -> str:
+    return alarm.name.lower()
 
 
 def _setpoint(setpoint: Setpoint) -> dict[str, object]:

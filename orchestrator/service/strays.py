@@ -13,9 +13,9 @@ from threading import Thread
 
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
-from orchestrator.model import STOP, Cause, ChargerReading, Operation
+from orchestrator.model import STOP, Alarm, Cause, ChargerReading, Operation
 from orchestrator.service.closing import close_all
-from orchestrator.service.past import START, Place, shown
+from orchestrator.service.past import Place, shown
 from orchestrator.service.store import Store
 
 #: A charger that delivers no more than this delivers nothing: its measurement is no better.
@@ -89,7 +89,7 @@ class Strays:
 
     def _remember(self, stray: _Stray, *, running: bool) -> int:
         persisted = self._store.past(stray.place)
-        why = Cause.of("stray_ran", advice=START, port=shown(stray.place.port))
+        why = Cause.of("stray_ran", port=shown(stray.place.port))
         return self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
 
     def drop(self, port: str) -> tuple[str, int]:
@@ -116,6 +116,13 @@ class Strays:
         return [str(stray.place) for stray in self._strays if stray.verified_s is None]
 
     @property
+    def alarm(self) -> Alarm:
+        """Somebody must find out why such a charger is there, also when it stands by."""
+        if self.unverified:
+            return Alarm.DANGER
+        return Alarm.ATTENTION if self._strays else Alarm.NONE
+
+    @property
     def ports(self) -> Iterable[ChargerPort]:
         """To be closed at the end."""
         return [stray.port for stray in self._strays]
@@ -126,7 +133,7 @@ class Strays:
             {
                 "bay": stray.place.bay,
                 "port": stray.place.port,
-                "state": "STOPPING" if stray.verified_s is None else "IDLE",
+                "state": "STOPPING" if stray.verified_s is None else "HELD",
                 "verified": stray.verified_s is not None,
                 "problem": stray.port.view[1].problem,
             }

@@ -235,9 +235,9 @@ class Supervisor:
             name = request.get("bay")
             bays = self._bays if name is None else [self._named(name)]
             now_s, shown = monotonic(), [bay.status() for bay in bays]
-            return station_status(
-                self._station, shown, self._journal.problem(now_s), self._store.unkept(now_s), self._strays.status()
-            )
+            problem, unkept = self._journal.problem(now_s), self._store.unkept(now_s)
+            alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
+            return station_status(self._station, alarm, shown, problem, unkept, self._strays.status())
         if isinstance(verb, str) and verb in set(Request):
             names, port = request.get("bays"), request.get("port")
             if verb == Request.RESET and isinstance(port, str):

@@ -81,7 +81,8 @@ def _sentence(cause: Cause, texts: Language) -> str:
         if "strikes" in params:
             do = frames["strikes"].format(do=do, strikes=params["strikes"])
         what = frames["trip" if tripped else "advice"].format(do=do, what=what)
-    return f"{what}{params['then']:after}" if "then" in params else what
+    what = f"{what}{params['then']:after}" if "then" in params else what
+    return f"{what}: {params['how']}" if "how" in params else what
 
 
 def _data(cause: Cause, texts: Language) -> str:

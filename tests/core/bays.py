@@ -26,6 +26,14 @@ def idle() -> World:
     return world
 
 
+def held() -> World:
+    """An operator has stopped it in mid-charge."""
+    world = charging()
+    world.ask(Request.STOP)
+    world.until(S.HELD)
+    return world
+
+
 def qualifying() -> World:
     world = World()
     world.until(S.QUALIFYING)
@@ -94,6 +102,7 @@ IN: Mapping[State, Callable[[], World]] = {
     S.STARTING: starting,
     S.OFFLINE: offline,
     S.IDLE: idle,
+    S.HELD: held,
     S.QUALIFYING: qualifying,
     S.PRECHARGE_PULSE: pulse,
     S.PRECHARGE_CONTINUOUS: continuous,

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.core.contactor import closes
 from orchestrator.core.course import QUALIFY_S
-from orchestrator.model import ENERGISED, Action, Request, State
+from orchestrator.model import ENERGISED, Action, Alarm, Request, State
 from tests.core.bays import charging
 from tests.core.said import reason_of
 from tests.core.world import TICK_S, World
@@ -18,6 +18,7 @@ TABLE = """
 STARTING              .     .             .       .
 OFFLINE               .     x             .       x
 IDLE                  x     x             x       x
+HELD                  x     x             x       x
 QUALIFYING            x     x             x       x
 PRECHARGE_PULSE       x     x             x       x
 PRECHARGE_CONTINUOUS  x     x             x       x
@@ -126,7 +127,7 @@ def test_a_charger_that_does_not_stop_is_cut_off_after_its_time() -> None:
     while wired.world.decision.closed:
         wired.tick()
     assert (wired.world.state, wired.world.now_s - since_s) == (State.UNCONTROLLABLE, 3.0)
-    assert wired.world.decision.alarm
+    assert wired.world.decision.alarm is Alarm.DANGER
 
 
 def test_a_charger_that_falls_silent_in_a_charge_is_cut_off() -> None:

@@ -13,6 +13,7 @@ from orchestrator.model import (
     ENERGISED,
     STOP,
     Action,
+    Alarm,
     ChargeMode,
     ControlMode,
     Effect,
@@ -209,7 +210,7 @@ def test_full_too_early_is_no_full() -> None:
     tapers_off(world)
     charger_says_full(world)
     world.run(2)
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
     assert "early_full" in world.raised
     assert world.memory.full_pct is None
 
@@ -221,7 +222,7 @@ def test_a_standby_that_somebody_orders_is_not_named_full() -> None:
     world.run(2)
     assert set(world.raised) == {"stopped_by_itself"}
     assert "not taken for full" in reason_of(world.decision)
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
 
 
 def test_early_depends_on_where_the_policy_ends() -> None:
@@ -242,7 +243,7 @@ def test_a_charger_that_is_not_believed_stopped_by_itself() -> None:
     charger_says_full(world)
     world.run(2)
     assert set(world.raised) == {"stopped_by_itself"}
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
 
 
 def test_plain_standby_is_not_full() -> None:
@@ -384,15 +385,16 @@ def test_the_stricter_of_policy_and_station_counts() -> None:
 #: What becomes of each request in each state: the answer's beginning, and where the bay is ten seconds later.
 VERBS: dict[Request, dict[State, tuple[str, State]]] = {
     Request.STOP: {
-        S.STARTING: ("", S.IDLE),
-        S.OFFLINE: ("", S.IDLE),
-        S.IDLE: ("", S.IDLE),
-        S.QUALIFYING: ("", S.IDLE),
-        S.PRECHARGE_PULSE: ("", S.IDLE),
-        S.PRECHARGE_CONTINUOUS: ("", S.IDLE),
-        S.CHARGING: ("", S.IDLE),
-        S.FULL: ("", S.IDLE),
-        S.SUSPENDED: ("", S.IDLE),
+        S.STARTING: ("", S.HELD),
+        S.OFFLINE: ("", S.HELD),
+        S.IDLE: ("", S.HELD),
+        S.HELD: ("", S.HELD),
+        S.QUALIFYING: ("", S.HELD),
+        S.PRECHARGE_PULSE: ("", S.HELD),
+        S.PRECHARGE_CONTINUOUS: ("", S.HELD),
+        S.CHARGING: ("", S.HELD),
+        S.FULL: ("", S.HELD),
+        S.SUSPENDED: ("", S.HELD),
         S.STOPPING: ("", S.UNCONTROLLABLE),  # it is deaf in this world
         S.TRIPPED: ("", S.TRIPPED),
         S.UNCONTROLLABLE: ("", S.UNCONTROLLABLE),
@@ -401,6 +403,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.STARTING: ("", S.SUSPENDED),
         S.OFFLINE: ("", S.SUSPENDED),
         S.IDLE: ("", S.SUSPENDED),
+        S.HELD: ("not running: stopped by the operator", S.HELD),
         S.QUALIFYING: ("", S.SUSPENDED),
         S.PRECHARGE_PULSE: ("", S.SUSPENDED),
         S.PRECHARGE_CONTINUOUS: ("", S.SUSPENDED),
@@ -415,6 +418,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.STARTING: ("nothing to start: STARTING: ", S.CHARGING),
         S.OFFLINE: ("nothing to start: OFFLINE: ", S.OFFLINE),
         S.IDLE: ("nothing to start: IDLE: ", S.IDLE),  # 99 %: nothing to do
+        S.HELD: ("", S.CHARGING),
         S.QUALIFYING: ("", S.CHARGING),
         S.PRECHARGE_PULSE: ("", S.PRECHARGE_PULSE),
         S.PRECHARGE_CONTINUOUS: ("", S.PRECHARGE_CONTINUOUS),
@@ -429,6 +433,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.STARTING: ("nothing to reset: STARTING: ", S.CHARGING),
         S.OFFLINE: ("nothing to reset: OFFLINE: ", S.OFFLINE),
         S.IDLE: ("nothing to reset: IDLE: ", S.IDLE),
+        S.HELD: ("nothing to reset: HELD: ", S.HELD),
         S.QUALIFYING: ("nothing to reset: QUALIFYING: ", S.CHARGING),
         S.PRECHARGE_PULSE: ("nothing to reset: PRECHARGE_PULSE: ", S.PRECHARGE_PULSE),
         S.PRECHARGE_CONTINUOUS: ("nothing to reset: PRECHARGE_CONTINUOUS: ", S.PRECHARGE_CONTINUOUS),
@@ -436,7 +441,7 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
         S.FULL: ("nothing to reset: FULL: ", S.FULL),
         S.SUSPENDED: ("nothing to reset: SUSPENDED: ", S.SUSPENDED),
         S.STOPPING: ("nothing to reset: STOPPING: ", S.UNCONTROLLABLE),
-        S.TRIPPED: ("", S.IDLE),
+        S.TRIPPED: ("", S.HELD),
         S.UNCONTROLLABLE: ("the charger was not seen to stop: cut its mains", S.UNCONTROLLABLE),
     },
 }
@@ -463,14 +468,14 @@ def test_a_stop_holds_until_a_start() -> None:
         world.ask(Request.STOP)
         world.values["soc_pct"] = 40.0
         world.run(100)
-        assert world.is_in(S.IDLE)
-        assert world.decision.cause == STOPPED
+        assert world.is_in(S.HELD)
+        assert reason_of(world.decision) == f"{say(STOPPED)}; to go on: orchestrator start bay-1"
         assert world.ask(Request.PAUSE) == f"not running: {say(STOPPED)}"
         world.leave()
         world.run(5)
         world.arrive()
         world.run(20)
-        assert world.is_in(S.IDLE)  # also for another battery
+        assert world.is_in(S.HELD)  # also for another battery
         assert world.ask(Request.START) == ""
         world.until(S.CHARGING, 10)
 
@@ -491,7 +496,7 @@ def test_a_stop_while_tripped_is_remembered_over_the_reset() -> None:
     world.ask(Request.STOP)
     world.ask(Request.RESET)
     world.run(20)
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
 
@@ -509,7 +514,7 @@ def test_a_charger_that_comes_back_running_is_stopped_and_waits_for_a_person() -
     assert world.tick().state is S.STOPPING
     world.deaf.clear()
     world.run(20)
-    assert world.is_in(S.IDLE)
+    assert world.is_in(S.HELD)
     assert "found running" in reason_of(world.decision)
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
@@ -537,13 +542,13 @@ def test_a_line_that_dies_in_mid_charge_and_comes_back() -> None:
     assert reason_of(world.until(S.STOPPING, 2)).startswith("/dev/ttyX: no answer; check")
     world.until(S.UNCONTROLLABLE, 4)
     assert reason_of(world.decision) == (
-        "CUT THE MAINS of this charger (/dev/ttyX) now: it has not obeyed the stop for 3 s: /dev/ttyX: no answer; "
-        "14.00 A, last heard 4 s ago; the BMU sees 0.0 A"
+        "CUT THE MAINS of this charger (/dev/ttyX) now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: "
+        "no answer; 14.00 A, last heard 4 s ago; the BMU sees 0.0 A"
     )
     assert not sessions(world)  # its limits go on, too
     world.charger_answers = True
     world.until(S.SUSPENDED, 11)
-    assert not world.decision.alarm
+    assert world.decision.alarm is Alarm.NONE
     world.until(S.CHARGING, 30)
     assert world.decision.session is not None
     assert world.decision.session.charged_ah > 0  # that of before
@@ -553,7 +558,7 @@ def test_a_port_that_says_what_is_wrong_is_quoted() -> None:
     world = charging()
     world.charger_link = replace(world.charger_link, online=False, problem="/dev/ttyX: no such port")
     world.charger_answers = False
-    assert "now: it has not obeyed the stop for 3 s: /dev/ttyX: no such port; " in reason_of(
+    assert "now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: no such port; " in reason_of(
         world.until(S.UNCONTROLLABLE, 5)
     )
 
@@ -575,7 +580,7 @@ def test_a_new_fault_at_rest_has_the_charger_stopped_and_verified_again() -> Non
     assert world.tick().state is S.STOPPING
     assert world.decision.command == STOP
     assert world.tick().state is S.STOPPING  # one reply is not enough
-    assert world.tick().state is S.IDLE
+    assert world.tick().state is S.HELD
 
 
 def test_a_trip_is_verified_again_when_another_fault_comes() -> None:
@@ -668,7 +673,7 @@ def test_nothing_is_counted_in_standby() -> None:
 
 
 ENDS: tuple[tuple[Callable[[World], object], State, str], ...] = (
-    (lambda world: world.ask(Request.STOP), S.IDLE, say(STOPPED)),
+    (lambda world: world.ask(Request.STOP), S.HELD, say(STOPPED)),
     (lambda world: world.values.update(soc_pct=100.0), S.FULL, "full: SOC 100 %"),
     (lambda world: setattr(world, "internal", "KeyError()"), S.TRIPPED, "this is a defect of the software"),
     (lambda world: world.leave(), S.IDLE, "the BMU (node 0x10) has stopped answering"),

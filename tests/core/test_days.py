@@ -81,7 +81,7 @@ def is_paused(site: Site) -> None:
 
 def is_stopped(site: Site) -> None:
     site.run(30, Request.STOP)
-    assert site.decision.state is State.IDLE
+    assert site.decision.state is State.HELD
     site.run(1, Request.START)
 
 

@@ -20,6 +20,7 @@ from orchestrator.model import (
     ENERGISED,
     STOP,
     Action,
+    Alarm,
     BatteryReading,
     BatteryStatus,
     Cause,
@@ -69,7 +70,7 @@ def test_a_bay_that_cannot_be_judged_is_stopped_and_given_up_in_three_seconds(ra
     raises.on, before = True, len(world.decisions)
     world.run(3.5)
     assert world.is_in(State.UNCONTROLLABLE)
-    assert world.decision.alarm
+    assert world.decision.alarm is Alarm.DANGER
     assert reason_of(world.decision).startswith(
         "CUT THE MAINS of this charger: this software has failed to judge the bay"
     )
@@ -85,7 +86,7 @@ def test_a_bay_that_cannot_be_judged_is_stopped_and_given_up_in_three_seconds(ra
     world.run(9.5)
     assert world.is_in(State.UNCONTROLLABLE)
     world.until(State.TRIPPED, 2.0)
-    assert not world.decision.alarm
+    assert world.decision.alarm is not Alarm.DANGER
     assert world.ask(Request.START) != ""
     assert world.ask(Request.RESET) == ""
     world.run(30)
@@ -134,7 +135,7 @@ def test_a_stop_is_heard_meanwhile_and_nothing_else_is(raises: Switch, state: St
     world.run(15)
     assert world.ask(Request.RESET) == ""
     world.run(60)
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
     assert world.memory.hold
 
 

@@ -195,8 +195,8 @@ def test_it_clears_by_itself_and_not_before(scene: Scene) -> None:
 def test_it_waits_for_a_start(scene: Scene) -> None:
     world = healed(scene)
     world.run(30)
-    assert world.is_in(State.IDLE)
-    assert reason_of(world.decision) == world.raised[scene.fault]
+    assert world.is_in(State.HELD)
+    assert reason_of(world.decision) == f"{world.raised[scene.fault]}: orchestrator start bay-1"
     assert world.ask(Request.START) == ""
     assert not world.raised
     world.until(State.CHARGING)
@@ -216,8 +216,8 @@ def test_it_waits_for_a_reset_and_then_for_a_start(scene: Scene) -> None:
     assert world.ask(Request.RESET) == ""
     assert not world.raised
     world.run(30)
-    assert world.is_in(State.IDLE)
-    assert reason_of(world.decision) == "reset by the operator; start to go on"
+    assert world.is_in(State.HELD)
+    assert reason_of(world.decision) == "reset by the operator; to go on: orchestrator start bay-1"
     world.values["soc_pct"] = 50.0
     assert world.ask(Request.START) == ""
     while world.tick().state not in ENERGISED:

@@ -278,7 +278,7 @@ def test_a_latch_does_not_leave_with_the_battery() -> None:
     assert "bmu_silent" in world.raised
     assert world.ask(Request.RESET) == ""  # with no battery there, its cause is gone
     world.run(1)
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
 
 
 # --- what a person may clear ------------------------------------------------------------------------------------------
@@ -342,12 +342,12 @@ def test_a_start_clears_only_what_waits_for_one() -> None:
 def test_a_reset_clears_what_waits_for_a_start_too_but_starts_nothing() -> None:
     world = charging()
     world.charger.run = False
-    world.until(State.IDLE, 5)
+    world.until(State.HELD, 5)
     assert "stopped_by_itself" in world.raised
     assert world.ask(Request.RESET) == ""
     world.run(10)
-    assert reason_of(world.decision) == "reset by the operator; start to go on"
-    assert world.is_in(State.IDLE)
+    assert reason_of(world.decision) == "reset by the operator; to go on: orchestrator start bay-1"
+    assert world.is_in(State.HELD)
 
 
 def test_a_reset_while_the_stop_is_being_verified_is_no_start() -> None:
@@ -359,8 +359,8 @@ def test_a_reset_while_the_stop_is_being_verified_is_no_start() -> None:
     assert world.ask(Request.RESET) == ""
     world.deaf.clear()
     world.run(30)
-    assert world.is_in(State.IDLE)
-    assert reason_of(world.decision) == "reset by the operator; start to go on"
+    assert world.is_in(State.HELD)
+    assert reason_of(world.decision) == "reset by the operator; to go on: orchestrator start bay-1"
 
 
 def test_a_reset_of_nothing_changes_nothing() -> None:
@@ -467,7 +467,7 @@ def test_an_hour_after_the_first_of_three_there_may_be_a_fourth() -> None:
 def test_only_what_was_latched_counts_as_reset() -> None:
     world = charging()
     world.charger.run = False
-    world.until(State.IDLE, 5)
+    world.until(State.HELD, 5)
     assert world.ask(Request.RESET) == ""
     assert world.memory.resets == ()
 

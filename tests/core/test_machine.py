@@ -13,19 +13,20 @@ from orchestrator.model import ENERGISED, State
 
 #: What each trigger does in each state: where it leads, `=` it stays, `·` it is refused and the state is kept.
 MATRIX = """
-                      stop       give_up         lose     rest  suspend    fill  trip     reset  qualify     pulse            continue              charge
-STARTING              =          UNCONTROLLABLE  OFFLINE  IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
-OFFLINE               STOPPING   ·               =        IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
-IDLE                  STOPPING   ·               OFFLINE  =     SUSPENDED  FULL  ·        ·      QUALIFYING  ·                ·                     ·
-QUALIFYING            STOPPING   ·               OFFLINE  IDLE  SUSPENDED  FULL  ·        ·      ·           PRECHARGE_PULSE  ·                     CHARGING
-PRECHARGE_PULSE       STOPPING   ·               ·        ·     ·          ·     ·        ·      ·           ·                PRECHARGE_CONTINUOUS  ·
-PRECHARGE_CONTINUOUS  STOPPING   ·               ·        ·     ·          ·     ·        ·      ·           ·                ·                     CHARGING
-CHARGING              STOPPING   ·               ·        ·     ·          ·     ·        ·      ·           ·                ·                     ·
-FULL                  STOPPING   ·               OFFLINE  IDLE  SUSPENDED  =     ·        ·      QUALIFYING  ·                ·                     ·
-SUSPENDED             STOPPING   ·               OFFLINE  IDLE  =          FULL  ·        ·      QUALIFYING  ·                ·                     ·
-STOPPING              =          UNCONTROLLABLE  OFFLINE  IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
-TRIPPED               STOPPING   ·               ·        ·     ·          ·     ·        IDLE   ·           ·                ·                     ·
-UNCONTROLLABLE        =          ·               OFFLINE  IDLE  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
+                      stop      give_up         lose     rest  hold  suspend    fill  trip     reset  qualify     pulse            continue              charge
+STARTING              =         UNCONTROLLABLE  OFFLINE  IDLE  HELD  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
+OFFLINE               STOPPING  ·               =        IDLE  HELD  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
+IDLE                  STOPPING  ·               OFFLINE  =     HELD  SUSPENDED  FULL  ·        ·      QUALIFYING  ·                ·                     ·
+HELD                  STOPPING  ·               OFFLINE  IDLE  =     SUSPENDED  FULL  ·        ·      QUALIFYING  ·                ·                     ·
+QUALIFYING            STOPPING  ·               OFFLINE  IDLE  HELD  SUSPENDED  FULL  ·        ·      ·           PRECHARGE_PULSE  ·                     CHARGING
+PRECHARGE_PULSE       STOPPING  ·               ·        ·     ·     ·          ·     ·        ·      ·           ·                PRECHARGE_CONTINUOUS  ·
+PRECHARGE_CONTINUOUS  STOPPING  ·               ·        ·     ·     ·          ·     ·        ·      ·           ·                ·                     CHARGING
+CHARGING              STOPPING  ·               ·        ·     ·     ·          ·     ·        ·      ·           ·                ·                     ·
+FULL                  STOPPING  ·               OFFLINE  IDLE  HELD  SUSPENDED  =     ·        ·      QUALIFYING  ·                ·                     ·
+SUSPENDED             STOPPING  ·               OFFLINE  IDLE  HELD  =          FULL  ·        ·      QUALIFYING  ·                ·                     ·
+STOPPING              =         UNCONTROLLABLE  OFFLINE  IDLE  HELD  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
+TRIPPED               STOPPING  ·               ·        ·     ·     ·          ·     ·        HELD   ·           ·                ·                     ·
+UNCONTROLLABLE        =         ·               OFFLINE  IDLE  HELD  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
 """  # noqa: E501 - a matrix that is read as a whole
 
 
@@ -95,7 +96,7 @@ def test_a_trip_is_entered_only_from_where_a_stop_was_just_verified() -> None:
 
 
 def test_a_trip_is_left_only_by_a_reset_or_a_stop() -> None:
-    assert leads(State.TRIPPED) == {Trigger.RESET: State.IDLE, Trigger.STOP: State.STOPPING}
+    assert leads(State.TRIPPED) == {Trigger.RESET: State.HELD, Trigger.STOP: State.STOPPING}
 
 
 def test_a_stop_is_possible_everywhere_and_never_lets_current_flow() -> None:

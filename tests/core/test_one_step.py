@@ -61,11 +61,14 @@ SILENT_BMU: dict[str, Any] = {
     "bmu": dict.fromkeys(("voltage_v", "current_a", "status", "temperature_c", "soc_pct", "soh_pct")),
     "bmu_link": {"online": False},
 }
-FULL, SUSPENDED, OFFLINE, IDLE = State.FULL, State.SUSPENDED, State.OFFLINE, State.IDLE
+FULL, SUSPENDED, OFFLINE = State.FULL, State.SUSPENDED, State.OFFLINE
+IDLE, HELD = State.IDLE, State.HELD
 QUALIFYING, STOPPING, STARTING, TRIPPED = State.QUALIFYING, State.STOPPING, State.STARTING, State.TRIPPED
 NO_RULE = "precharge without a rule for it, or without the pack's voltage"
 CHECKING = "checking charger and battery before a charge"
-NEVER = "CUT THE MAINS of this charger (/dev/ttyX) now: it has not obeyed the stop for 3 s: {}; the BMU sees 0.0 A"
+CUT = "CUT THE MAINS of this charger (/dev/ttyX) now: {} {}; the BMU sees 0.0 A"
+RUNS_ON = CUT.format("it has not obeyed the stop for 3 s:", "{}")
+NEVER = CUT.format("nothing has proved for 3 s that it obeyed the stop:", "{}")
 
 GOES = (
     Edge(goes, (None, "step 2 (8.0 A): because"), holding()),
@@ -97,7 +100,7 @@ GOES = (
     *(Edge(goes, (Trigger.STOP, NO_RULE), precharged(0), PULSE, **how)
       for how in ({"policy": NO_PRECHARGE}, {"bmu": {"voltage_v": None}})),
     Edge(goes, (None, "stopped for it"), {"cause": cause("stopped for it")}, STOPPING, 2.9),
-    Edge(goes, (Trigger.GIVE_UP, NEVER.format("it delivers 10.00 A")), state=STOPPING, state_s=3),
+    Edge(goes, (Trigger.GIVE_UP, RUNS_ON.format("it delivers 10.00 A")), state=STOPPING, state_s=3),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 0 s ago")), state=STOPPING,
          state_s=3, charger_link={"online": False}),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 9 s ago")), state=STOPPING,
@@ -115,10 +118,10 @@ GOES = (
     *(Edge(goes, (None, "the charger on /dev/ttyX does not answer"), {}, OFFLINE, **how) for how in (
         {"charger": {**STANDS_BY, "t_s": ago(9)}}, {"charger": STANDS_BY, "charger_link": {"online": False}})),
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, IDLE, charger={"t_s": ago(9)}),
-    Edge(goes, (Trigger.REST, "held"), {"hold": cause("held")}, FULL, **AT_REST),
-    Edge(goes, (None, "held"), {"hold": cause("held")}, IDLE, **AT_REST),
+    Edge(goes, (Trigger.HOLD, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, FULL, **AT_REST),
+    Edge(goes, (None, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, HELD, **AT_REST),
     Edge(goes, (Trigger.SUSPEND, "paused by the operator; start to go on"), {"paused": True}, IDLE, **AT_REST),
-    Edge(goes, (Trigger.RESET, "reset by the operator"), {}, TRIPPED, **AT_REST),
+    Edge(goes, (Trigger.RESET, "reset by the operator; to go on: orchestrator start bay-1"), {}, TRIPPED, **AT_REST),
     Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer"), {}, IDLE,
          **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0}, charger_link=STOP_SENT, snapshot={"connected": False}),
     Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted"), {}, IDLE, **AT_REST,
@@ -397,7 +400,7 @@ def test_from_stage_to_stage_the_charge_goes_on() -> None:
 def test_a_charge_that_ends_at_rest_says_why_it_ends_there() -> None:
     memory = {"session": BEGUN, "hold": cause("held"), "stop_cause": cause("of before")}
     decision, after = whole(Edge(goes, None, memory, SUSPENDED, **AT_REST))
-    assert decision.state is IDLE
+    assert decision.state is HELD
     assert decision.session is not None
     assert decision.session.result == cause("held")
     assert after.session is None

@@ -14,7 +14,7 @@ from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import MAX_RESETS, STOPPED
 from orchestrator.core.persisted import RUNNING, UNFINISHED, Persisted, PersistedFault, from_first_format
-from orchestrator.model import ENERGISED, STOP, Action, ChargerLink, Request, Session, State
+from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle
 from tests.core.fault_scenes import SCENES
 from tests.core.said import cause, reason_of, say
@@ -58,9 +58,9 @@ def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None
     world.tick()
     assert world.decision.command == STOP
     assert world.is_in(State.STARTING)
-    assert world.decision.alarm is ran  # nobody knows yet
+    assert (world.decision.alarm is Alarm.DANGER) is ran  # nobody knows yet
     world.run(120)
-    assert not world.decision.alarm
+    assert world.decision.alarm is not Alarm.DANGER
     if ran:
         assert not any(decision.state in ENERGISED for decision in world.decisions)
         assert say(UNFINISHED) in world.raised["found_running"]
@@ -79,13 +79,13 @@ def test_a_charger_that_may_run_and_is_not_heard_is_an_alarm_over_any_number_of_
         world.charger_answers = False
         for _ in range(60):
             world.tick()
-            assert world.decision.alarm
+            assert world.decision.alarm is Alarm.DANGER
             assert world.decision.command == STOP
         assert world.is_in(State.UNCONTROLLABLE)
     world.charger_answers = True
     world.deaf.clear()
     world.run(12)
-    assert not world.decision.alarm
+    assert world.decision.alarm is not Alarm.DANGER
 
 
 @pytest.mark.parametrize("request_", [Request.STOP, Request.PAUSE])
@@ -124,7 +124,7 @@ def killed(world: World) -> None:
     stopped_meanwhile(world)
     restarted(world)
     world.run(3)
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
     assert world.ask(Request.START) == ""
 
 
@@ -248,6 +248,23 @@ def test_another_soc_after_the_restart_is_another_battery() -> None:
     assert "battery_exchanged" in world.raised
     assert world.memory.session is None
     assert not any(decision.state in ENERGISED for decision in world.decisions)
+
+
+def test_a_start_ends_no_charge_that_a_restart_has_left_open() -> None:
+    """HELD and IDLE are alike in that: its limits would begin anew with each start."""
+    world = charging()
+    world.run(60)
+    restarted(world)
+    world.until(State.HELD, 10)
+    world.frozen.add("soc_pct")
+    world.run(5)
+    assert world.ask(Request.START) == ""
+    assert (world.state, reason_of(world.decision)) == (State.IDLE, "a battery is there; its SOC is not known yet")
+    world.ask(Request.STOP)
+    assert world.is_in(State.HELD)
+    session = world.memory.session
+    assert session is not None
+    assert session.charged_ah > 0.2
 
 
 def test_strikes_count_on_over_restarts() -> None:
@@ -387,7 +404,7 @@ def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
     kept = Persisted(faults={"of_tomorrow": PersistedFault(cause("something"), latched=True, raised=1.0)})
     memory = kept.memory(100.0)
     assert memory.faults == {}
-    assert memory.hold == cause("something", advice="start")
+    assert memory.hold == cause("something")
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.model import ENERGISED, STOP, Action, Operation, Request, State
+from orchestrator.model import ENERGISED, STOP, Action, Alarm, Operation, Request, State
 from tests.core.bays import IN, charging, full, idle, qualifying, running_at_the_start, starting, stopping, suspended
 from tests.core.said import reason_of
 from tests.core.world import TICK_S, World
 
 #: Where a bay may rest with a charger that was verified.
-VERIFIED = {State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED, State.OFFLINE}
+VERIFIED = {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.OFFLINE}
 every_state = pytest.mark.parametrize("state", State)
 
 # --- every state, the worst that a charger can do ---------------------------------------------------------------------
@@ -25,7 +25,7 @@ def test_a_silent_charger_is_stopped_blindly_until_it_answers(state: State) -> N
     flowing = state in ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
     resting = State.TRIPPED if state is State.TRIPPED else State.OFFLINE
     assert world.is_in(State.UNCONTROLLABLE if flowing else resting)
-    assert world.decision.alarm is flowing
+    assert (world.decision.alarm is Alarm.DANGER) is flowing
     before = len(world.decisions)
     world.run(60)
     assert all(decision.command == STOP for decision in world.decisions[before:])
@@ -37,7 +37,7 @@ def test_a_silent_charger_is_stopped_blindly_until_it_answers(state: State) -> N
     world.run(1.25)
     assert world.is_in(*VERIFIED, State.QUALIFYING)
     assert not world.charger.running
-    assert not world.decision.alarm
+    assert world.decision.alarm is not Alarm.DANGER
 
 
 @every_state
@@ -52,23 +52,25 @@ def test_a_deaf_charger_that_runs_is_uncontrollable_until_it_stops(state: State)
     before = len(world.decisions)
     world.run(600, dt_s=0.5)
     assert all(decision.state is State.UNCONTROLLABLE for decision in world.decisions[before:])
-    assert all(decision.alarm and decision.command == STOP for decision in world.decisions[before:])
+    assert all(decision.alarm is Alarm.DANGER and decision.command == STOP for decision in world.decisions[before:])
     assert "will_not_stop" in world.raised
     assert "nothing can be started or reset here" in world.ask(Request.START)
     assert "nothing can be started or reset here" in world.ask(Request.RESET)
     world.deaf.clear()
     world.run(9.75)
     assert world.is_in(State.UNCONTROLLABLE)
-    assert world.decision.alarm
+    assert world.decision.alarm is Alarm.DANGER
     world.until(State.TRIPPED, 1.0)
-    assert not world.decision.alarm
+    assert world.decision.alarm is not Alarm.DANGER
 
 
 @every_state
 def test_no_alarm_but_in_uncontrollable(state: State) -> None:
     world = IN[state]()
     assert not world.decisions or world.is_in(state)
-    assert all(decision.alarm is (decision.state is State.UNCONTROLLABLE) for decision in world.decisions)
+    assert all(
+        (decision.alarm is Alarm.DANGER) is (decision.state is State.UNCONTROLLABLE) for decision in world.decisions
+    )
 
 
 # --- what proves a stop -----------------------------------------------------------------------------------------------
@@ -120,7 +122,7 @@ def test_half_an_ampere_is_standby() -> None:
     world.leak_a = 0.5
     world.ask(Request.STOP)
     assert world.tick().state is State.STOPPING  # one reply is not enough
-    assert world.tick().state is State.IDLE
+    assert world.tick().state is State.HELD
     assert world.decision.command is None
 
 
@@ -135,20 +137,23 @@ def test_a_stop_from_before_this_one_proves_nothing() -> None:
     assert world.is_in(State.STOPPING)
     world.writes = True
     assert world.tick().state is State.STOPPING
-    assert world.tick().state is State.IDLE
+    assert world.tick().state is State.HELD
+
+
+UNPROVED = "nothing has proved for 3 s that it obeyed the stop"
 
 
 def test_the_evidence_says_why_the_stop_is_not_confirmed() -> None:
     for spoil, words in (
-        (delivers, "it delivers 0.51 A; the BMU sees 0.5 A"),
-        (shows_nothing, "its status does not show a standby that lasts; the BMU sees 0.0 A"),
-        (answers_late, "no answer on /dev/ttyX; 0.00 A, last heard 3 s ago; the BMU sees 0.0 A"),
+        (delivers, "it has not obeyed the stop for 3 s: it delivers 0.51 A; the BMU sees 0.5 A"),
+        (shows_nothing, f"{UNPROVED}: its status does not show a standby that lasts; the BMU sees 0.0 A"),
+        (answers_late, f"{UNPROVED}: no answer on /dev/ttyX; 0.00 A, last heard 3 s ago; the BMU sees 0.0 A"),
     ):
         world = charging()
         spoil(world)
         world.ask(Request.STOP)
         reason = reason_of(world.until(State.UNCONTROLLABLE))
-        assert reason == (f"CUT THE MAINS of this charger (/dev/ttyX) now: it has not obeyed the stop for 3 s: {words}")
+        assert reason == (f"CUT THE MAINS of this charger (/dev/ttyX) now: {words}")
 
 
 # --- at rest ----------------------------------------------------------------------------------------------------------
@@ -250,7 +255,7 @@ def test_a_current_that_the_bmu_sees_at_the_start_is_given_three_seconds_whoever
         world.run(3.0)
         assert world.is_in(State.STARTING)
         assert world.tick().state is State.UNCONTROLLABLE
-        assert world.decision.alarm
+        assert world.decision.alarm is Alarm.DANGER
 
 
 def test_a_charger_whose_status_never_becomes_valid_is_given_up() -> None:

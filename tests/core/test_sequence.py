@@ -223,7 +223,7 @@ def test_a_charger_that_was_stopped_by_somebody_is_not_started_again() -> None:
     world.charger.run = False
     world.run(3)
     assert orders_since(world, first) == [None, STOP, None]
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
 
 
 def test_without_a_reading_the_order_stays() -> None:

@@ -11,14 +11,14 @@ from orchestrator.config.policy import Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.witnesses import pack as packs
-from orchestrator.model import ENERGISED, STOP, Action, ChargeMode, Measurement, Operation, Request, State
+from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargeMode, Measurement, Operation, Request, State
 from orchestrator.sim import chemistry
 from tests.core.bays import IN, POLICY, charging, idle, stopping
 from tests.core.edges import Edge
 from tests.core.said import reason_of, say
 from tests.core.world import TICK_S, World, bay, fitting_v
 
-AT_REST = {State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING}
+AT_REST = {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING}
 every_state = pytest.mark.parametrize("state", State)
 
 # --- a standby that does not last -------------------------------------------------------------------------------------
@@ -42,7 +42,7 @@ def test_a_charger_that_says_now_this_and_now_that_is_out_of_control(pattern: st
     stopped_s = world.now_s
     answers(world, pattern)
     assert world.is_in(State.UNCONTROLLABLE), world.decision
-    assert world.decision.alarm
+    assert world.decision.alarm is Alarm.DANGER
     assert world.decision.command == STOP
     # A single reply among others may be a stray measurement; the second of its kind is none.
     most_s = 4.0 if "11" in pattern + pattern[0] or len(pattern) < 3 else 4.0 + 2 * len(pattern) * TICK_S
@@ -52,7 +52,7 @@ def test_a_charger_that_says_now_this_and_now_that_is_out_of_control(pattern: st
         world.shows["operation"] = Operation(int(shown))
         world.tick()
         assert world.is_in(State.UNCONTROLLABLE)
-        assert world.decision.alarm
+        assert world.decision.alarm is Alarm.DANGER
         if world.now_s > stopped_s + 60:
             break
 
@@ -62,9 +62,9 @@ def test_one_that_runs_again_within_ten_seconds_was_never_verified(after_s: floa
     world = charging()
     world.ask(Request.STOP)
     stopped_s = world.now_s
-    world.until(State.IDLE, 1.0)
+    world.until(State.HELD, 1.0)
     world.run(after_s)
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
     world.shows = {"operation": Operation.RUNNING, "current_a": 14.0}
     world.pack_amps = 14.0
     world.tick()
@@ -77,7 +77,7 @@ def test_one_that_runs_again_within_ten_seconds_was_never_verified(after_s: floa
 def test_one_that_ran_again_after_a_minute_has_its_three_seconds() -> None:
     world = charging()
     world.ask(Request.STOP)
-    world.until(State.IDLE, 1.0)
+    world.until(State.HELD, 1.0)
     world.run(60)
     world.shows = {"operation": Operation.RUNNING, "current_a": 14.0}
     world.tick()
@@ -101,7 +101,7 @@ def test_out_of_control_is_left_only_by_a_standby_of_ten_seconds_without_a_break
     assert world.is_in(State.UNCONTROLLABLE)
     world.run(2 * TICK_S)
     assert world.is_in(State.TRIPPED)
-    assert not world.decision.alarm
+    assert world.decision.alarm is not Alarm.DANGER
 
 
 # --- the BMU's word ---------------------------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ def test_a_charger_that_denies_what_the_bmu_sees_is_out_of_control(state: State)
     while not world.is_in(State.UNCONTROLLABLE) if world.decisions else True:
         world.tick()
         assert world.now_s - seen_s <= 6.0, world.decision  # two to believe the BMU, three for the stop, and the ticks
-    assert world.decision.alarm
+    assert world.decision.alarm is Alarm.DANGER
     before = len(world.decisions)
     world.run(60)
     assert {decision.state for decision in world.decisions[before:]} == {State.UNCONTROLLABLE}
@@ -136,7 +136,7 @@ def test_a_charger_that_denies_what_the_bmu_sees_is_out_of_control(state: State)
     assert world.is_in(State.UNCONTROLLABLE)
     world.run(2)
     assert world.is_in(State.TRIPPED)
-    assert not world.decision.alarm
+    assert world.decision.alarm is not Alarm.DANGER
     world.run(30)
     assert world.ask(Request.RESET) == ""
 
@@ -173,7 +173,7 @@ def test_a_value_from_before_the_stop_proves_nothing() -> None:
     world.run(1.0)
     assert world.is_in(State.STOPPING)
     world.frozen.clear()
-    assert world.tick().state is State.IDLE
+    assert world.tick().state is State.HELD
 
 
 @pytest.mark.parametrize("late_s", [0.25, 0.5, 1.0, 1.5])
@@ -184,7 +184,7 @@ def test_a_bmu_that_averages_is_waited_for(late_s: float) -> None:
     world.ask(Request.STOP)
     world.run(late_s)
     world.pack_amps = 0.0
-    world.until(State.IDLE, 2.75 - late_s)
+    world.until(State.HELD, 2.75 - late_s)
     world.run(30)
     assert not world.raised
 
@@ -224,7 +224,7 @@ def test_a_current_that_has_ended_is_forgotten_within_half_a_minute(seconds: flo
     assert world.is_in(State.TRIPPED)
     assert world.ask(Request.RESET) == ""
     world.run(5)
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
 
 
 # --- whose battery it is ----------------------------------------------------------------------------------------------
@@ -241,9 +241,9 @@ def test_the_first_amperes_must_show_on_the_bays_own_bmu(moves: str) -> None:
     if moves:
         assert reason.startswith("the charger of bay-1 moves the BMU of bay-2: it has begun with 14.00 A")
     assert "sees 0.00 A of it" in reason
-    world.until(State.IDLE)
+    world.until(State.HELD)
     world.run(600, dt_s=1.0)
-    assert world.is_in(State.IDLE)  # it waits for a person
+    assert world.is_in(State.HELD)  # it waits for a person
     assert "pairing_not_proved" in world.raised
 
 
@@ -350,7 +350,7 @@ def test_a_pack_that_is_refused_is_charged_neither_before_nor_after_somebody_say
 def test_a_soc_that_is_corrected_in_mid_charge_ends_it_without_a_latch() -> None:
     world = charging()
     world.values |= {"soc_pct": 90.0, "voltage_v": 47.9}
-    world.until(State.IDLE, 8.0)
+    world.until(State.HELD, 8.0)
     assert set(world.raised) >= {"another_pack"}
     world.values |= {"soc_pct": 52.0, "voltage_v": 48.0}
     world.run(10)
@@ -449,12 +449,12 @@ def test_a_charger_that_somebody_stopped_is_not_full(soc_pct: float) -> None:
     world.values["soc_pct"] = soc_pct
     world.run(20)
     world.shows.update(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED, current_a=0.0)
-    world.until(State.IDLE, 3.0)
+    world.until(State.HELD, 3.0)
     assert set(world.raised) - {"soc_jump"} == {"stopped_by_itself"}
     assert world.memory.full_pct is None
     world.shows.clear()
     world.run(600, dt_s=1.0)
-    assert world.is_in(State.IDLE)  # it does not charge again by itself
+    assert world.is_in(State.HELD)  # it does not charge again by itself
 
 
 # --- what stands still ------------------------------------------------------------------------------------------------
@@ -545,7 +545,7 @@ def test_a_charger_that_is_in_standby_again_is_not_started_over_whoever_stopped_
     assert world.raised.keys() & {"stopped_by_itself", "early_full"}, "both wait for a person"
     world.deaf = set()
     world.run(60.0)
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
     assert not world.charger.running
 
 
@@ -556,6 +556,6 @@ def test_a_current_that_only_the_bmu_has_seen_was_a_charge() -> None:
     world.pack_amps = 0.0
     world.deaf = set()
     world.run(60.0)
-    assert world.is_in(State.IDLE)
+    assert world.is_in(State.HELD)
     assert not world.charger.running
     assert Action.RUN not in {order.action for order in world.orders[-1:] if order is not None}

@@ -192,7 +192,7 @@ def charging(station: Station, *bays: int) -> None:
     """Bring these bays to where the service knows that they charge; or all of them."""
     _, service = station
     names = [f"bay-{bay}" for bay in bays or (1, 2, 3, 4)]
-    service.wait({"IDLE", "CHARGING"}, names)
+    service.wait({"IDLE", "HELD", "CHARGING"}, names)
     service.ask("start", *names)
     service.wait("CHARGING", names)
     for name in names:
@@ -223,7 +223,7 @@ def test_a_service_that_nobody_told_leaves_a_stopped_charger_alone(station: Stat
     port = os.open(port_of(station, 2), os.O_RDWR | os.O_NOCTTY)
     os.write(port, STOP_FRAME)
     os.close(port)
-    (fault,) = service.wait("IDLE", ["bay-2"])["bay-2"]["faults"]
+    (fault,) = service.wait("HELD", ["bay-2"])["bay-2"]["faults"]
     assert fault["id"] in ("stopped_by_itself", "early_full")  # by what it shows in standby; both wait for an operator
 
 
@@ -231,7 +231,7 @@ def test_a_bay_in_the_first_moment_of_a_charge_is_held_as_well(station: Station)
     """Its charger has not run yet: to the service, a stop alone would look like a charger that does not start."""
     _, service = station
     service.ask("stop", "bay-3")
-    service.wait("IDLE", ["bay-3"])
+    service.wait("HELD", ["bay-3"])
     service.ask("start", "bay-3")
     service.wait("CHARGING", ["bay-3"])
     done = estop("--port", port_of(station, 3))
@@ -256,7 +256,7 @@ def test_what_was_stopped_stays_so_and_nobody_is_alarmed(station: Station) -> No
     wait_until(lambda: min(bay["charger"]["t_s"] for bay in service.status().values()) > since_s + 3, what="polls")
     for number, (name, bay) in enumerate(service.status().items(), start=1):
         assert plant.state(number)["operation"] == 0
-        assert (bay["state"], bay["alarm"], bay["charger"]["online"]) == ("IDLE", False, True), name
+        assert (bay["state"], bay["alarm"] != "danger", bay["charger"]["online"]) == ("HELD", True, True), name
         assert "UNCONTROLLABLE" not in service.path_of(name) or name == "bay-4"
 
 
@@ -268,9 +268,9 @@ def test_with_its_station_file_every_bay_is_held(station: Station) -> None:
     standby = [f"bay-{n} ({port_of(station, n)}): standby verified" for n in (1, 2, 3, 4)]
     assert done.stdout.splitlines() == [*standby, DONE.strip()]
     assert done.stderr == held("bay-1", "bay-2", "bay-3", "bay-4")
-    bays = service.wait("IDLE", ["bay-1", "bay-2", "bay-3", "bay-4"]).values()
+    bays = service.wait("HELD", ["bay-1", "bay-2", "bay-3", "bay-4"]).values()
     # On a busy machine it may have seen its charger stop before it was told why; a person starts it all the same.
-    assert all(bay["reason"].endswith(("start to go on", "then start")) for bay in bays)
+    assert all(bay["reason"].endswith(f": orchestrator start {bay['name']}") for bay in bays)
     assert not any(plant.state(bay)["operation"] for bay in (1, 2, 3, 4))
 
 

@@ -92,7 +92,7 @@ def charge(bay: Scene) -> None:
 
 def held(bay: Scene) -> None:
     """The service is there (again), has verified the charger's standby, and waits for its operator."""
-    comes_to(bay, r"^IDLE: .*start( to go on)?$")
+    comes_to(bay, r"^HELD: .*: orchestrator start bay-1$")
     assert bay.plant.state()["operation"] == 0
 
 

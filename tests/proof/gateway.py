@@ -14,6 +14,7 @@ from functools import cache, partial
 from math import inf
 from pathlib import Path
 from random import Random
+from types import SimpleNamespace
 from typing import Any
 
 from durand.scheduler import get_scheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
@@ -24,9 +25,11 @@ from orchestrator.config.station import Station
 from orchestrator.errors import ServiceError
 from orchestrator.lastresort import asking, estop, guardian, port_owner, running_service
 from orchestrator.link import can as can_module
+from orchestrator.link import gpio
 from orchestrator.service import boot, control, controller
 from tests.proof.virtual_can import BusWire, Driver
 from tests.proof.virtual_disk import Disk
+from tests.proof.virtual_gpio import Chip, Output, VirtualLine
 from tests.proof.virtual_kernel import ROOT, Kernel
 from tests.proof.virtual_modules import exchange, path_class, replacements
 from tests.proof.virtual_process import Process, Processes
@@ -37,7 +40,7 @@ SMALL_AH, SMALL_RISE_S = 0.15, 24.0
 PYTHON = ("/usr/bin/python3", "-P", "-m")
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10
-JOURNAL, SOCKET = f"{ROOT}journal", f"{ROOT}socket"
+JOURNAL, SOCKET, CHIP = f"{ROOT}journal", f"{ROOT}socket", f"{ROOT}gpiochip"
 #: What is changed in the shipped policy for a bay whose charges are to be seen to their end.
 SMALL = {"max_ah: 44 ": f"max_ah: {SMALL_AH} ", "within_min: 5 ": f"within_min: {SMALL_RISE_S / 60} "}
 #: What is asked of a control socket is answered within this, or not at all.
@@ -53,6 +56,8 @@ class Entry:
     node: int
     limit_a: float = 15.0
     policy: str = "li-ion-48v"
+    control: str = "manual"
+    contactor: bool = False
 
 
 def port_name(number: int) -> str:
@@ -64,10 +69,11 @@ def document(entries: Sequence[Entry], battery: dict[str, Any], *, snapshots: bo
     bays = [
         {
             "name": entry.name,
-            "charger": {"port": port_name(entry.port), "control": "manual", "steps_a": list(STEPS_A)},
+            "charger": {"port": port_name(entry.port), "control": entry.control, "steps_a": list(STEPS_A)},
             "battery": {"can": "can0", "node_id": FIRST_NODE + entry.node, "map": "tabos", **battery},
             "limits": {"voltage_v": 58.4, "current_a": entry.limit_a, "temperature_c": [0, 45]},
             "policy": entry.policy,
+            **({"contactor": {"chip": CHIP, "line": entry.port}} if entry.contactor else {}),
         }
         for entry in entries
     ]
@@ -174,6 +180,8 @@ class Gateway:
             VirtualRig(self.time, self.bus, self.kernel.add(port_name(number)), FIRST_NODE + number, nature)
             for number, nature in enumerate(natures)
         ]
+        lines = {number: Output(rig.breaker.drive) for number, rig in enumerate(self.rigs) if rig.breaker is not None}
+        self.kernel.chips[CHIP] = Chip(lines)
         self.kernel.on_said = self._on_said
         self.processes.on_spawn = self._controller
         self._disk_path = path_class(self.kernel)
@@ -190,6 +198,8 @@ class Gateway:
             running_service._listens: lambda _: self.door is not None,
             boot.boot_id: lambda: f"boot {self.boots}",
             can_module._open_bus: lambda _: Driver(self.bus, self.time),
+            gpio.OutputLine: SimpleNamespace(open=partial(VirtualLine.open, self.kernel)),
+            gpio.need_gpiod: lambda: None,
         }
         exchange(self._stack, replacements(self.kernel, self.processes), also)
 
@@ -266,6 +276,9 @@ class Gateway:
         self.kernel.calls.troubles.clear()
         for stream in self.kernel.output.values():
             stream.stopped = False
+        for rig in self.rigs:
+            if rig.breaker is not None:
+                rig.breaker.drive(False)
         self.bus.drivers.clear()
         self.boots += 1
         return self.disk.cut(self._dice, how)

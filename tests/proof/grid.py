@@ -16,7 +16,7 @@ from unittest.mock import patch
 from orchestrator.config.load import load_policy
 from orchestrator.core import latches, safestop
 from orchestrator.core.faults import FAULTS, Row
-from orchestrator.model import STOP, Action, Cause, ControlMode, Effect, Request, State
+from orchestrator.model import STOP, Action, Alarm, Cause, ControlMode, Effect, Request, State
 from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
 from orchestrator.service.bay import VERIFIED
 from orchestrator.sim.faults import FAULTS as INJECTIONS
@@ -79,6 +79,7 @@ SITUATIONS: dict[State, Situation] = {
     S.STARTING: Situation(),
     S.OFFLINE: Situation(acts=((S.STARTING, "bmu_silent"),)),
     S.IDLE: Situation(soc_pct=99.0),
+    S.HELD: Situation(acts=((S.QUALIFYING, "stop"),)),
     S.QUALIFYING: Situation(),
     S.PRECHARGE_PULSE: Situation(soc_pct=None),
     S.PRECHARGE_CONTINUOUS: Situation(soc_pct=None, acts=((S.PRECHARGE_PULSE, "fast forward"),)),
@@ -257,7 +258,9 @@ class Run:
         self.ended.word = "said, and went on" if raised else NOT_RAISED[cell.state in cell.row.where]
         if raised and cell.row.effect >= Effect.PAUSE:
             uncontrolled = (
-                decision.state is State.UNCONTROLLABLE and decision.alarm and self.rig.bay.charger.ignores_stop
+                decision.state is State.UNCONTROLLABLE
+                and decision.alarm is Alarm.DANGER
+                and self.rig.bay.charger.ignores_stop
             )
             self.ended.word = "out of control, and said so" if uncontrolled else "stopped, verified"
             if not (uncontrolled or (decision.state in VERIFIED and not self.rig.bay.charger.running)):

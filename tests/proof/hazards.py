@@ -40,6 +40,8 @@ class Bay:
     cells: int = 13
     small: bool = False  #: by a policy of which a charge ends after 0.15 Ah, a precharge without a rise after 24 s
     cross: int = -1  #: its serial cable goes to the charger of that bay, and the other way round
+    control: str = "manual"
+    contactor: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +199,38 @@ def _random(seed: int) -> Script:
         t_s += dice.choice((2.0, 6.0, BEGIN_S)) * dice.uniform(0.7, 1.0)
     hazards.sort(key=lambda one: one.t_s)
     end_s = max(t_s, hazards[-1].t_s) + 14.0
-    return Script(seed, bays, tuple(hazards), round(end_s, 3), dice.random() < 0.7, dice.random() < 0.2)
+    script = Script(seed, bays, tuple(hazards), round(end_s, 3), dice.random() < 0.7, dice.random() < 0.2)
+    return _with_more(script, Random(f"more of {seed}"))
+
+
+#: What a stranger's program sends, once or again and again, and what a chip of contactors may do.
+PROGRAM = ("run", "run", "operation", "resume", "stop", "rest", "limit 4", "limit 0", "charge", "precharge", "full")
+STRANGE = ("parenb", "cstopb", "crtscts", "min", "icanon", "ixon")
+CHIP = ("ioctl:chip:3:EIO", "ioctl:chip:30:EIO", "ioctl:chip:3:ENODEV")
+
+
+def _with_more(script: Script, dice: Random) -> Script:
+    """Bays of other kinds, and what these bring with them; by dice of their own, so that the rest stays as it was."""
+    bays = tuple(
+        replace(bay, control="automatic" if dice.random() < 0.15 else "manual", contactor=dice.random() < 0.15)
+        if bay.cross < 0
+        else bay
+        for bay in script.bays
+    )
+    last_s, more = script.hazards[-1].t_s + 8.0, []
+    if dice.random() < 0.3:
+        times = dice.choice((1, 1, 5, 50))
+        detail = f"{dice.choice(PROGRAM)}:{dice.choice((0.3, 1.0, 2.5))}:{times}"
+        more.append(Hazard(round(dice.uniform(2.0, last_s), 3), "program", dice.randrange(3), None, detail))
+    if dice.random() < 0.15:
+        late = Hazard(round(dice.uniform(2.0, last_s), 3), "late", dice.randrange(3), float(dice.choice((1, 3, 9))))
+        more.append(late)
+    if dice.random() < 0.1:
+        more.append(Hazard(round(dice.uniform(2.0, last_s), 3), "stty", dice.randrange(3), None, dice.choice(STRANGE)))
+    if any(bay.contactor for bay in bays) and dice.random() < 0.3:
+        more.append(Hazard(round(dice.uniform(2.0, last_s), 3), "slow", -1, 0.0, dice.choice(CHIP)))
+    hazards = sorted((*script.hazards, *more), key=lambda one: one.t_s)
+    return replace(script, bays=bays, hazards=tuple(hazards))
 
 
 # --- made smaller -----------------------------------------------------------------------------------------------------

@@ -13,19 +13,20 @@ import json
 import re
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from orchestrator.model import ENERGISED, ChargeMode
+from orchestrator.model import ENERGISED, ChargeMode, ControlMode, State
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.claims import Told, claims, record, starts
 from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name
 from tests.proof.hazards import BEGIN_S, Bay, Script
+from tests.proof.isolation import contactor_moves, isolates, left_on
 from tests.proof.virtual_rig import VirtualRig
 
 STOP, OPERATION_0 = bytes.fromhex("AFFA900410900034AFA0"), bytes.fromhex("AFFA90050290010028AFA0")
-OPERATION_1 = bytes.fromhex("AFFA90050290010129AFA0")
+OPERATION_1, RESUME = bytes.fromhex("AFFA90050290010129AFA0"), bytes.fromhex("AFFA90041090 0135AFA0")
 LIMIT = re.compile(re.escape(bytes.fromhex("AFFA9005029002")) + b"(.)", re.DOTALL)
 
 #: An output below this is none; what flows above it can be seen by everybody.
@@ -45,6 +46,8 @@ MEAN_S = 12.0
 RESTARTS, RESTARTS_S = 3, 25.0
 #: What latched this long ago is on the disk.
 KEPT_S = 2.6
+#: What another program does to a charger is seen with the next sample.
+GRACE_S = 0.6
 VERIFIED = re.compile(r"standby verified|stands? by, verified|verified (?:standby|to stand by)", re.IGNORECASE)
 DENIED = re.compile(r"NOT|not verified|no proof")
 
@@ -59,6 +62,7 @@ class Charger:
         ""  #: the newest that a process of ours has written to its port: "run", "stop"; "" nothing in this life
     )
     meant_s: float = 0.0
+    told_s: float = 0.0  #: when it was first told to stop, after it was told to run
     limit: int = 4  #: the newest current limit that was written
     deaf_s: float = 0.0  #: when it could last not hear, or not be reached
     since_s: dict[str, float] = field(default_factory=dict)  #: reason → since when it holds while current flows
@@ -73,6 +77,8 @@ class Charger:
     thawed: tuple[float, float] = (0.0, 0.0)  #: Ah and volts when its BMU was last seen to move
     precharged_s: float = 0.0
     told: Told = field(default_factory=Told)  #: what the status has said of it
+    strange_s: float = 0.0  #: when another program's frame has switched it on or off
+    stood_s: float = 0.0  #: since when its output is off
     onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
 
     @property
@@ -165,6 +171,13 @@ def _too_much(judge: "Judge", charger: Charger) -> bool:
     return charger.current_a > limit_a and charger.seen
 
 
+def _deep(_: "Judge", charger: Charger) -> bool:
+    """A pack at the bottom of its deep discharge gets a precharge at most; a charger on automatic sees to that."""
+    model = charger.rig.bay.charger
+    volts = model.voltage_v < 33.0 and charger.honest(Kind.VOLTAGE, "voltage_v")
+    return volts and charger.current_a > 1.5 * model.precharge_a
+
+
 REASONS: tuple[Reason, ...] = (
     Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run" and not judge.wants(c)),
     Reason("operator's stop", ASKED_S, lambda _, c: c.asked_stop),
@@ -178,12 +191,17 @@ REASONS: tuple[Reason, ...] = (
     Reason("crossed", 9.0, _crossed),
     Reason("BMU frozen", 62.0, _frozen),
     Reason("apart, most of the time", 20.0, lambda _, c: c.rig.apart_v > 1.2),
+    Reason("deep", LINE_S, _deep),
     Reason("status word", LINE_S, lambda _, c: "status" in c.rig.bay.falsify and _trips(c)),
 )
 
 
 #: Somebody reads or writes on bus and line as everybody may: no reason to stop.
-HARMLESS = ("boot", "tool", "term", "stderr")
+HARMLESS = ("boot", "tool", "term", "stderr", "late", "clock")
+#: Verified to stand by, and not told to run.
+AT_REST = {state.name for state in (State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED)}
+#: Whom another program has run at rest, or stopped in mid-charge, waits for a person after this.
+HELD_S, STATUS_S = 3.0, 0.25
 #: After the last start every bay charges within this.
 GOES_ON_S = 2 * BEGIN_S
 
@@ -219,6 +237,9 @@ class Judge:
         for charger in self.chargers:
             charger.rig.tty.on_written = partial(self._written, charger)
             charger.rig.wire.on_started = partial(self._started, charger)
+            charger.rig.wire.on_stranger = partial(self._stranger, charger)
+            if charger.rig.breaker is not None:
+                charger.rig.breaker.on_moved = partial(self._moved, charger)
 
     def entry(self, charger: Charger) -> Any:
         """The bay of the present life that this charger's port belongs to."""
@@ -244,8 +265,9 @@ class Judge:
 
     def _written(self, charger: Charger, data: bytes) -> None:
         if STOP in data or OPERATION_0 in data:
+            charger.told_s = charger.told_s if charger.meant == "stop" else self.time.now_s
             charger.meant, charger.meant_s = "stop", self.time.now_s
-        elif OPERATION_1 in data:
+        elif OPERATION_1 in data or (RESUME in data and charger.rig.as_built.control_mode is ControlMode.AUTOMATIC):
             charger.meant, charger.meant_s = "run", self.time.now_s
             charger.told.ran_s = self.time.now_s
         if limit := LIMIT.search(data):
@@ -260,6 +282,40 @@ class Judge:
         if self.booted_s is None or charger.meant_s < self.booted_s:
             self.find(charger.number, "by itself", "it was started by nobody")
 
+    def _stranger(self, charger: Charger, ran: bool) -> None:
+        """A frame of another program has switched an output on or off."""
+        charger.strange_s = self.time.now_s
+        state = self._shown(charger).get("state", "")
+        at_rest, fresh = state in AT_REST, self.time.now_s - self.status_s < 2 * STATUS_S
+        if ran and at_rest and fresh and charger.meant != "run":
+            self.time.call_later(HELD_S, self._latched, charger, self.time.now_s, self.booted_s)
+        elif not ran and state in ENERGISED and charger.meant == "run" and charger.current_a > FLOWS_A:
+            self.time.call_later(HELD_S, self._held, charger, self.time.now_s)
+
+    def _latched(self, charger: Charger, since_s: float, booted_s: float | None) -> None:
+        """FAULTS C5: one that was run by somebody else at rest waits for a person."""
+        shown = self._shown(charger)
+        undisturbed = charger.strange_s == since_s and charger.deaf_s < since_s and not charger.rig.wire.mute_tx
+        told = booted_s == self.booted_s and self.time.now_s - self.status_s < 1.0
+        held = "operator" in charger.waits or shown.get("state") in ("TRIPPED", "UNCONTROLLABLE", "STOPPING")
+        if undisturbed and told and charger.obeys and not held:
+            self.find(charger.number, "latched", f"another program has run it, {self._state(charger)}")
+
+    def _held(self, charger: Charger, since_s: float) -> None:
+        """FAULTS C4: one that somebody else has stopped in mid-charge waits for a person."""
+        if charger.strange_s == since_s and not charger.flows:
+            charger.waits["stranger"] = "another program has stopped it"
+
+    def _moved(self, charger: Charger, closed: bool) -> None:
+        charger.rig.catch_up(force=True)
+        for name, text in contactor_moves(self, charger, closed=closed):
+            self.find(charger.number, name, text)
+
+    def forgotten(self) -> None:
+        """The file of what survives is damaged: nobody knows what was latched."""
+        for charger in self.chargers:
+            charger.waits["past"] = "its past cannot be read"
+
     # --- what people are told, and ask --------------------------------------------------------------------------------
 
     def told(self, asked: Asked) -> None:
@@ -273,7 +329,7 @@ class Judge:
                 continue
             for name, text in claims(self, charger, bay):
                 self.find(charger.number, name, text)
-            if bay["alarm"]:
+            if bay["alarm"] == "danger":
                 charger.named_s = self.time.now_s
             if bay["state"] == "TRIPPED":
                 charger.tripped_s = self.time.now_s if charger.tripped_s is None else charger.tripped_s
@@ -388,7 +444,9 @@ class Judge:
 
     def ends(self) -> None:
         """The script is over: what was harmless has stopped nobody, and the record can be read."""
-        harmless = all(one.what in HARMLESS for one in self.script.hazards) and self.script.bays == (Bay(),) * 3
+        plain = [replace(bay, control="manual", contactor=False) for bay in self.script.bays]
+        harmless = all(one.what in HARMLESS for one in self.script.hazards) and plain == [Bay()] * 3
+        harmless = harmless and self.gateway.alive(self.gateway.controller)
         began_s = self.began_s if self.life_began_s is None else self.life_began_s
         if harmless and (self.time.now_s - began_s > GOES_ON_S or began_s == self.began_s):
             for charger in self.chargers:
@@ -428,6 +486,9 @@ class Judge:
                 )
             self._judge_named(charger, reason, since_s, now_s)
         self._judge_restless(charger, now_s)
+        charger.stood_s = 0.0 if charger.flows else charger.stood_s or now_s
+        for name, text in left_on(self, charger) if isolates(self, charger) else ():
+            self.find(charger.number, name, text)
 
     def _judge_restless(self, charger: Charger, now_s: float) -> None:
         """Who is stopped, and runs again and again, was never stopped."""
@@ -501,6 +562,8 @@ class Judge:
             if entry is not None and not any(port_name(one.number) in text for one in self.chargers):
                 named = re.search(rf"\b{entry.name}\b", text) is not None  # else it may have another bay's name by now
             if not (named or "every charger" in text) or charger.current_a < SEEN_A or entry is None:
+                continue
+            if self.time.now_s - charger.strange_s < GRACE_S:
                 continue
             alone = process == "guardian" or self.gateway.door is None  # who has the charger's word only
             lies = {*charger.rig.wire.lies, *charger.rig.wire.liars} & {Kind.OPERATION, Kind.CURRENT}

@@ -11,11 +11,14 @@ from typing import Any
 
 import can
 
+from orchestrator.model import ControlMode
 from orchestrator.sim.charger_frames import Kind, Lie
 from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.pack import Pack
 from orchestrator.sim.rig import cross_cables
-from tests.proof.gateway import FIRST_NODE, JOURNAL, Entry, Gateway, port_name
+from orchestrator.sim.second_master import SecondMaster
+from tests.proof import program
+from tests.proof.gateway import CHIP, FIRST_NODE, JOURNAL, Entry, Gateway, port_name
 from tests.proof.hazards import FOR_EVER, Hazard, Script
 from tests.proof.judge import ESTOP_S, FROZEN_S, KILLED_S, TERM_S, Judge
 from tests.proof.virtual_kernel import STDERR, Trouble
@@ -27,6 +30,8 @@ LOOK_S, STATUS_S = 0.05, 0.25
 RESTART_S = 2.0
 
 
+#: A charger that answers late, but within the deadline of 120 ms.
+LATE_S = (0.060, 0.119)
 #: After these the service may end.
 EXCUSES = ("term", "kill", "kill guardian", "kill both", "freeze", "power")
 
@@ -104,7 +109,7 @@ class Player:
 
     def _happen(self, hazard: Hazard) -> None:
         call, place = (*hazard.detail.split(":"), "")[:2]
-        hangs = hazard.what == "slow" and place == "port" and call not in ("open", "close")
+        hangs = hazard.what == "slow" and place in ("port", "chip") and call not in ("open", "close")
         self._excused = self._excused or hangs or hazard.what in EXCUSES
         getattr(self, f"_{hazard.what.replace(' ', '_')}")(hazard)
 
@@ -210,6 +215,12 @@ class Player:
         elif hazard.detail == "swap":
             other = {at: (at + 1) % 3, (at + 1) % 3: at}
             now = [replace(one, port=other.get(one.port, one.port)) for one in now]
+        elif hazard.detail == "nodes":
+            other = {at: (at + 1) % 3, (at + 1) % 3: at}
+            now = [replace(one, node=other.get(one.node, one.node)) for one in now]
+        elif hazard.detail == "inherit":  # it has a new name, and the next one its old one
+            names = {at: "bay-new", (at + 1) % 3: f"bay-{at + 1}"}
+            now = [replace(one, name=names.get(one.port, one.name)) for one in now]
         self.gateway.entries = now or usual
         self.gateway.write_station()
 
@@ -246,6 +257,7 @@ class Player:
         for rig in self._rigs(hazard):
             rig.inject(lambda rig: FAULTS["heal"].happen(rig, None))
             rig.bmu.port.faults.delay_s = ANSWER_S
+            rig.wire.late_s = None
             rig.frozen = False
 
     def _lie(self, hazard: Hazard) -> None:
@@ -267,14 +279,16 @@ class Player:
             rig.frozen = False  # not in all of its words
 
     def _slow(self, hazard: Hazard) -> None:
-        """detail: CALL:port|diskNAME:LASTS[:ERRNO]; value: seconds, FOR_EVER."""
+        """detail: CALL:port|diskNAME|directory|chip|stderr:LASTS[:ERRNO]; value: seconds, FOR_EVER."""
         call, place, lasts, *error = hazard.detail.split(":")
         delay_s = inf if hazard.value == FOR_EVER else hazard.value or 0.0
         on_disk = f"{JOURNAL}/{place[4:]}" if place[4:] else JOURNAL
-        where = port_name(hazard.bay) if place == "port" else on_disk
+        places = {"port": port_name(hazard.bay), "directory": JOURNAL, "chip": CHIP, "stderr": "stderr"}
+        where = places.get(place, on_disk)
         until_s = self.time.now_s + float(lasts)
         number = getattr(errno, error[0]) if error else 0
-        self.gateway.kernel.calls.troubles.append(Trouble(call, where, until_s, delay_s, number))
+        trouble = Trouble(call, where, until_s, delay_s, number, exact=place == "directory")
+        self.gateway.kernel.calls.troubles.append(trouble)
 
     def _stderr(self, hazard: Hazard) -> None:
         stream = self.gateway.kernel.output[STDERR]
@@ -310,6 +324,51 @@ class Player:
         for rig in self._rigs(hazard):
             rig.tty.listener(b"AT+GCAP\r")
 
+    def _stty(self, hazard: Hazard) -> None:
+        """detail: a word of `stty`, or "suspended": somebody has typed Ctrl-S there (TCOOFF)."""
+        for rig in self._rigs(hazard):
+            if hazard.detail == "suspended":
+                rig.tty.flow(goes=False)
+            else:
+                rig.tty.altered(hazard.detail)
+
+    def _program(self, hazard: Hazard) -> None:
+        """detail: FRAME+FRAME:EVERY_S:TIMES."""
+        names, every_s, times = hazard.detail.split(":")
+        data = program.frames(names)
+        for rig in self._rigs(hazard):
+            rig.catch_up(force=True)
+            self._repeat(int(times), float(every_s), partial(rig.wire.hears_stranger, data))
+
+    def _late(self, hazard: Hazard) -> None:
+        """Its answers come late, within the deadline, in so many pieces."""
+        for rig in self._rigs(hazard):
+            rig.wire.late_s, rig.wire.pieces = LATE_S, int(hazard.value or 1)
+
+    # --- contactors, disk, clock --------------------------------------------------------------------------------------
+
+    def _contactor(self, hazard: Hazard) -> None:
+        """detail: slow (by `value` s), stuck, well."""
+        for rig in self._rigs(hazard):
+            if rig.breaker is not None:
+                rig.breaker.slow_s = (hazard.value or 0.0) if hazard.detail == "slow" else 0.0
+                rig.breaker.stuck = hazard.detail == "stuck"
+
+    def _chip(self, hazard: Hazard) -> None:
+        """detail: gone, taken (by another program), back. Without the chip nothing drives the lines."""
+        chip = self.gateway.kernel.chips[CHIP]
+        chip.present = hazard.detail != "gone"
+        for output in chip.outputs.values() if hazard.detail == "gone" else ():
+            output.drive(False)
+
+    def _kept(self, hazard: Hazard) -> None:
+        """detail: what somebody has made of the file of what survives."""
+        self.gateway.disk.damage(f"{JOURNAL}/persisted.json", hazard.detail)
+        self.judge.forgotten()
+
+    def _clock(self, hazard: Hazard) -> None:
+        self.gateway.kernel.clock_off_s += hazard.value or 0.0
+
     # --- the bus ------------------------------------------------------------------------------------------------------
 
     def _tool(self, hazard: Hazard) -> None:
@@ -322,6 +381,14 @@ class Player:
             "fd": lambda: bus.subscribe(0x600 + node, self, self._answer_fd),
             "heartbeat": lambda: bus.send(0x600 + node, b"\x2b\x17\x10\x00\x88\x13\x00\x00"),
             "flood": lambda: self._repeat(400, 0.002, lambda: bus.send(0x123, bytes(8))),
+            "EMCY without error": lambda: bus.send(0x080 + node, bytes(8)),
+            "extended": lambda: self._repeat(99, 0.03, lambda: bus.raw(_extended(0x580 + node))),
+            "remote": lambda: self._repeat(99, 0.03, lambda: bus.send_remote(0x580 + node)),
+            "SYNC": lambda: self._repeat(400, 0.01, lambda: bus.send(0x080, b"")),
+            "LSS": lambda: self._repeat(40, 0.1, lambda: bus.send(0x7E5, b"\x4c" + bytes(7))),
+            "other nodes": lambda: self._repeat(80, 0.05, lambda: bus.send(0x700 + 0x44, b"\x05")),
+            "reads in segments": lambda: SecondMaster(self.time, bus, node).keep_reading(period_s=0.03),
+            "reads in blocks": lambda: SecondMaster(self.time, bus, node).keep_reading(period_s=0.03, blocks=True),
         }[hazard.detail]()
 
     def _bus(self, hazard: Hazard) -> None:
@@ -330,6 +397,11 @@ class Player:
         {
             "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
             "forged": lambda: bus.subscribe(0x600 + node, self, self._forge),
+            "odd answers": lambda: bus.subscribe(0x600 + node, self, self._answer_oddly),
+            "stopped": lambda: bus.send(0x000, bytes((2, node))),
+            "reset": lambda: bus.send(0x000, bytes((0x81, 0))),
+            "EMCY": lambda: bus.send(0x080 + node, b"\x00\x50\x01" + bytes(5)),
+            "short EMCY": lambda: bus.send(0x080 + node, b"\x00\x50"),
         }[hazard.detail]()
 
     def _answer_fd(self, cob_id: int, data: bytes) -> None:
@@ -342,6 +414,11 @@ class Player:
         if data[:3] == b"\x40\x04\x60":
             self.gateway.bus.send(cob_id - 0x80, b"\x43\x04\x60\x00\xc8\x00\x00\x00")
 
+    def _answer_oddly(self, cob_id: int, data: bytes) -> None:
+        """Another node answers as well, with the beginning of segments, a toggle bit where there is none."""
+        if data[:1] == b"\x40":
+            self.gateway.bus.send(cob_id - 0x80, b"\x51" + data[1:4] + b"\x04\x00\x00\x00")
+
     def _repeat(self, times: int, every_s: float, act: Callable[[], object]) -> None:
         act()
         if times > 1:
@@ -349,11 +426,18 @@ class Player:
 
 
 def _liar(lie: Lie, how: str, frozen: Any, value: float) -> Callable[[Any], Any]:
-    """What the BMU says of a value: another one, the one of now, or so much more; None is said as it is."""
+    """What the BMU says of a value: another one, the one of now, or so much more; None is said as it is.
+
+    Or the one before (`previous`), or this one and 100 less it in turns (`turns`).
+    """
+    said: list[Any] = [frozen]
 
     def told(true: Any) -> Any:
+        before, said[0] = said[0], true
         if not lie.is_told():
-            return true
+            return 100.0 - value if how == "turns" else true
+        if how == "previous":
+            return before
         if how == "more":
             return true if true is None else true + value
         return frozen if how == "frozen" else value
@@ -363,6 +447,12 @@ def _liar(lie: Lie, how: str, frozen: Any, value: float) -> Callable[[Any], Any]
 
 def _read(index: int) -> bytes:
     return b"\x40" + index.to_bytes(2, "little") + bytes(5)
+
+
+def _extended(cob_id: int) -> can.Message:
+    """A frame of 29 bits whose number ends like the BMU's: 60.0 °C."""
+    data = b"\x43\x04\x60\x00\x58\x02\x00\x00"
+    return can.Message(arbitration_id=cob_id, data=data, is_extended_id=True)
 
 
 def _fd(cob_id: int) -> can.Message:
@@ -377,14 +467,20 @@ REFUSED = b"\x2b\x00\x60\x00\x01\x00\x00\x00"
 def entries(script: Script) -> list[Entry]:
     """The station file as it is meant."""
     policies = ["small.yaml" if bay.small else "li-ion-48v" for bay in script.bays]
-    return [Entry(f"bay-{number + 1}", number, number, policy=policy) for number, policy in enumerate(policies)]
+    return [
+        Entry(f"bay-{number + 1}", number, number, policy=policy, control=bay.control, contactor=bay.contactor)
+        for number, (bay, policy) in enumerate(zip(script.bays, policies, strict=True))
+    ]
 
 
 def _nature(bay: Any, number: int) -> Nature:
     pack = Pack(cells=bay.cells)
     pack.set_soc(bay.soc_pct)
     pack.temperature_c = pack.ambient_c = bay.temperature_c
-    return Nature(pack, line=bay.line, seed=number + 1, running=bay.running)
+    control = ControlMode[bay.control.upper()]
+    return Nature(
+        pack, control, line=bay.line, seed=number + 1, running=bay.running, contactor=bay.contactor
+    )  # fmt: skip
 
 
 def live(script: Script) -> Lived:

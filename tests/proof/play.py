@@ -14,7 +14,7 @@ from functools import partial
 from orchestrator.config.load import load_policy
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.core.memory import Memory
-from orchestrator.model import ENERGISED, ChargeMode, ControlMode, Decision, Request, Snapshot, State
+from orchestrator.model import ENERGISED, Alarm, ChargeMode, ControlMode, Decision, Request, Snapshot, State
 from orchestrator.protocol.charger import STOP_FRAME
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import VERIFIED
@@ -229,7 +229,7 @@ class Player:
         for injected in watch.open:
             news = [fault.id for fault in decision.faults if fault.since_s >= injected.t_s]
             injected.fault = injected.fault or (news[0] if news else "")
-            injected.named = injected.named or decision.alarm
+            injected.named = injected.named or decision.alarm is Alarm.DANGER
             at_rest = decision.state in VERIFIED and snapshot.charger is not None
             injected.verified = injected.verified or (at_rest and injected.stop_s is not None)
 

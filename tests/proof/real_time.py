@@ -44,7 +44,7 @@ STANDS_A = 0.5
 #: What one step has to say is written down within this, its change of state first.
 STEP_S = 0.01
 #: A bay of a service that does not answer.
-NOBODY: dict[str, Any] = {"state": "", "reason": "", "alarm": False, "command": {"order": {"action": ""}}}
+NOBODY: dict[str, Any] = {"state": "", "reason": "", "alarm": "none", "command": {"order": {"action": ""}}}
 
 
 @dataclass(slots=True)
@@ -193,7 +193,7 @@ class Life:
     def _named(self) -> bool:
         bay = self._bay()
         cut_off = bay["state"] in ("OFFLINE", "TRIPPED") and bay["command"]["order"]["action"] == "stop"
-        return bool(bay["alarm"]) or cut_off
+        return bay["alarm"] == "danger" or cut_off
 
     def _bay(self) -> dict[str, Any]:
         if self._stage.service.poll() is not None:

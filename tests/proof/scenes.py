@@ -7,6 +7,7 @@ long enough to see what comes of it, over further lives where the past matters.
 import termios
 
 from tests.proof.hazards import BEGIN_S, FOR_EVER, TOOLS, Bay, Hazard, Script
+from tests.proof.variants import VARIANTS
 
 THREE = (Bay(), Bay(), Bay())
 #: In mid-charge.
@@ -200,4 +201,6 @@ SCENES: dict[str, Script] = {
     "a temperature that is forged": _scene(
         h(0, "bus", 1, None, "forged"), h(1, "fault", 1, 60.0, "over_temperature"), end_s=T + 16
     ),
+    # What somebody would try next.
+    **VARIANTS,
 }

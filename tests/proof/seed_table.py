@@ -90,7 +90,7 @@ LINES: tuple[Seed, ...] = (
         "line",
         "nobody is alarmed that another program has locked a port",
         ("locked by a stranger",),
-        (f"{CORE}step.py", "or unknown or (locked is not None and locked.raised_s is not None)", "or unknown"),
+        (f"{CORE}alarm.py", "or unknown or locked", "or unknown"),
     ),
     hostile(
         "a stranger's lock is respected at the end",
@@ -245,7 +245,7 @@ DISK: tuple[Seed, ...] = (
         (f"{SERVICE}past.py", "        if old in pasts or any(", "        if True or any("),
         (
             f"{SERVICE}past.py",
-            'Persisted(hold=f"{place} is not in {file}: nobody knows its past{START}")',
+            'Persisted(hold=f"{place} is not in {file}: nobody knows its past")',
             "Persisted()",
         ),
     ),
@@ -256,7 +256,7 @@ DISK: tuple[Seed, ...] = (
         ("tests/service/test_past.py", "tests/service/test_store.py"),
         (
             f"{SERVICE}past.py",
-            'Persisted(hold=f"{place} is not in {file}: nobody knows its past{START}")',
+            'Persisted(hold=f"{place} is not in {file}: nobody knows its past")',
             "Persisted()",
         ),
     ),
@@ -272,7 +272,7 @@ DISK: tuple[Seed, ...] = (
         ),
         (
             f"{SERVICE}past.py",
-            'Persisted(hold=f"{place} is not in {file}: nobody knows its past{START}")',
+            'Persisted(hold=f"{place} is not in {file}: nobody knows its past")',
             "Persisted()",
         ),
     ),
@@ -469,8 +469,8 @@ RESTARTS: tuple[Seed, ...] = (
         ("ampere-hours over silences",),
         (
             f"{CORE}step.py",
-            "frozenset({State.FULL, State.IDLE, State.TRIPPED})",
-            "frozenset({State.FULL, State.IDLE, State.TRIPPED, State.OFFLINE, State.SUSPENDED})",
+            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})",
+            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED, State.OFFLINE, State.SUSPENDED})",
         ),
     ),
     scene(
@@ -695,8 +695,8 @@ WORDS: tuple[Seed, ...] = (
         ("says standby", "cut off, then killed"),
         (
             f"{CORE}course.py",
-            '    return f"{do} now: it has not obeyed the stop for {f.now_s - since_s:.0f} s: {_why(f)}"',
-            "    return _why(f)",
+            '    id_ = "uncontrollable" if _heard(f) and f.runs else "uncontrollable_unproved"\n',
+            "    return _witnesses(f)\n",
         ),
     ),
     scene(
@@ -704,7 +704,7 @@ WORDS: tuple[Seed, ...] = (
         "words",
         "a charger that ran when the service died and is not heard is no alarm",
         ("cut off and not heard, then killed",),
-        (f"{CORE}step.py", "    unknown = memory.unverified and", "    unknown = False and"),
+        (f"{CORE}alarm.py", "    unknown = memory.unverified and", "    unknown = False and"),
         (f"{CORE}safestop.py", "        return memory.unverified and f.state_s >= LOST_S\n", "        return False\n"),
         (
             f"{CORE}course.py",

@@ -91,7 +91,7 @@ def test_a_charger_that_was_out_of_control_can_charge_again(control: ControlMode
         (S.STOPPING, True),
         (S.UNCONTROLLABLE, False),
         (S.TRIPPED, False),
-        (S.IDLE, True),
+        (S.HELD, True),
         (S.QUALIFYING, True),
         (S.CHARGING, True),
         (S.STOPPING, True),

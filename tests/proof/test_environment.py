@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core import persisted
+from orchestrator.core import course, faults, latches, persisted, step
+from orchestrator.core.facts import Facts
 from orchestrator.lastresort import lastline
+from orchestrator.model import Cause
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.environment import play, smallest
 from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
@@ -17,7 +19,8 @@ from tests.proof.scenes import SCENES
 SHORT: tuple[str | int, ...] = (
     "nothing happens", "another speed, then killed", "locked by a stranger", "charging, then the disk is torn",
     "crossed cables, hot", "says standby now and then", "half dead adapter, estop", "stopped while it ends",
-    "the lock cannot be closed", "a port whose closing fails", 0, 3, 58,
+    "the lock cannot be closed", "a port whose closing fails", "automatic, both killed", "contactor, does not obey",
+    "another program runs it at rest", "the BMU says 3 A more, stopped", 0, 3, 58,
 )  # fmt: skip
 Patch = pytest.MonkeyPatch
 
@@ -72,6 +75,37 @@ def test_a_bug_is_found_and_its_script_made_small(name: str, monkeypatch: Patch)
     bug(monkeypatch)
     assert name in live(script).kinds
     assert len(smallest(script).hazards) <= len(script.hazards)
+
+
+def never_opens(patch: Patch) -> None:
+    patch.setattr(step, "closes", lambda *_, **__: True)
+
+
+def lets_others_run(patch: Patch) -> None:
+    others = tuple(row for row in faults.FAULTS if row.id not in ("rogue_run", "current_without_order"))
+    patch.setattr(latches, "FAULTS", others)
+
+
+def blames(patch: Patch) -> None:
+    def disobeys(f: Facts) -> Cause:
+        return Cause.of("uncontrollable", port="", since_s=3.0, why=course._witnesses(f))
+
+    patch.setattr(course, "_out_of_control", disobeys)
+
+
+#: The invariant → a bug that breaks it, and a variant that shows it, in which nothing is found without.
+MORE_BUGS: dict[str, tuple[Callable[[Patch], None], str]] = {
+    "isolated": (never_opens, "contactor, does not obey"),
+    "latched": (lets_others_run, "another program runs it at rest"),
+    "false words": (blames, "the BMU says 3 A more, stopped"),
+}
+
+
+@pytest.mark.parametrize("name", MORE_BUGS)
+def test_a_bug_is_found_by_a_variant(name: str, monkeypatch: Patch) -> None:
+    bug, variant = MORE_BUGS[name]
+    bug(monkeypatch)
+    assert name in live(SCENES[variant]).kinds
 
 
 def test_who_says_standby_while_current_flows_is_believed_only_where_nobody_knows_better() -> None:

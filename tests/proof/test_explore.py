@@ -10,7 +10,8 @@ from orchestrator.model import ControlMode, State
 from orchestrator.workbench.processes import cores
 from orchestrator.workbench.prove.endings import reaches, settles
 from orchestrator.workbench.prove.exhaustive import here
-from orchestrator.workbench.prove.explore import Explorer, outline
+from orchestrator.workbench.prove.explore import Explorer
+from orchestrator.workbench.prove.gist import outline
 from tests.proof.exploring import NEVER, changes_of_table, rules, small, walk_on
 
 

@@ -101,7 +101,17 @@ def nothing_must_stop(patch: Patch) -> None:
 
 def silent_alarm(patch: Patch) -> None:
     decide = model.Decision
-    patch.setattr(step_module, "Decision", lambda **fields: decide(**fields | {"alarm": False}))
+    patch.setattr(step_module, "Decision", lambda **fields: decide(**fields | {"alarm": model.Alarm.NONE}))
+
+
+def a_hold_wears_off(patch: Patch) -> None:
+    place = course_module._resting_place
+
+    def forgets(f: Facts, faults: Any) -> Any:
+        held = f.memory.state is State.HELD and f.state_s > 60
+        return place(f, tuple(x for x in faults if x.effect is not Effect.STOP) if held else faults)
+
+    patch.setattr(course_module, "_resting_place", forgets)
 
 
 def never_gives_up(patch: Patch) -> None:
@@ -180,6 +190,7 @@ BUGS: dict[str, Callable[[Patch], None]] = {
     "no current": pause_goes_on,
     "operator": stop_is_not_heard,
     "hold": reset_starts,
+    "held": a_hold_wears_off,
     "tripped": trip_is_no_latch,
     "latched": latches_wear_off,
     "qualified": nobody_qualifies,

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from orchestrator.core.rules import Rules
-from orchestrator.model import ENERGISED, STOP, ChargeMode, Decision, State
+from orchestrator.model import ENERGISED, STOP, Alarm, ChargeMode, Decision, State
 from orchestrator.sim.charger_frames import Kind
 from orchestrator.sim.pack import Readout
 from tests.proof.virtual_rig import VirtualRig
@@ -145,5 +145,5 @@ def named(bay: Bay) -> bool:
     """
     decision = bay.decision
     if decision.state is State.UNCONTROLLABLE:
-        return decision.alarm
+        return decision.alarm is Alarm.DANGER
     return decision.state in (State.OFFLINE, State.TRIPPED) and decision.command == STOP

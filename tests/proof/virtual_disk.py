@@ -97,6 +97,12 @@ class Disk:
         self._pending = left
 
     def rename(self, old: str, new: str) -> None:
+        if old in self.directories:  # durable at once, as when it was made
+            self.directories.remove(old)
+            self.directories.add(new)
+            return
+        if new in self.directories:
+            raise fails(errno.EISDIR, new)
         inode = self.names.get(old)
         if inode is None:
             raise fails(errno.ENOENT, old)
@@ -140,6 +146,27 @@ class Disk:
         change = Change(names=names)
         _rename(self.names, change)
         self._pending.append(change)
+
+    # --- what others do to it ----------------------------------------------------------------------------------------
+
+    def damage(self, path: str, how: str) -> None:
+        """Somebody, or a bad card, has made this of a file; for good."""
+        inode = self.names.get(path)
+        if inode is None:
+            return
+        if how == "directory":
+            for names in (self.names, self._kept_names):
+                names.pop(path, None)
+            self.directories.add(path)
+            return
+        data = bytes(inode.data)
+        inode.data[:] = {
+            "empty": b"",
+            "truncated": data[: len(data) // 2],
+            "zeros": bytes(len(data)),
+            "another": b'{"format": 99}\n',
+        }[how]
+        self.sync(inode)
 
     # --- what a power cut does ----------------------------------------------------------------------------------------
 

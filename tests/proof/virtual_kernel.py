@@ -21,7 +21,9 @@ from math import inf
 from types import SimpleNamespace
 from typing import Any
 
+from orchestrator.lastresort.lastopen import GET_LINE, SET_VALUES
 from tests.proof.virtual_disk import Disk, Inode, fails
+from tests.proof.virtual_gpio import Chip, Output, request_line, set_values
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
 from tests.proof.virtual_tty import Tty
@@ -47,9 +49,11 @@ class Trouble:
     delay_s: float = 0.0
     error: int = 0
     times: float = inf
+    exact: bool = False  #: of this path alone, and not of what is below it
 
     def meets(self, call: str, place: str, now_s: float) -> bool:
-        return call == self.call and self.place in place and now_s < self.until_s and self.times > 0
+        there = self.place == place if self.exact else self.place in place
+        return call == self.call and there and now_s < self.until_s and self.times > 0
 
 
 def real(name: str) -> Callable[..., Any]:
@@ -130,7 +134,7 @@ class File:
     """An open file; several descriptors, of several processes, may stand for it."""
 
     path: str
-    what: Tty | Inode | Socket | Stream | Death | None
+    what: Tty | Inode | Socket | Stream | Death | Chip | Output | None
     flags: int = 0
     at: int = 0
     owners: int = 0
@@ -160,6 +164,8 @@ class Kernel:
         self.time = time
         self.calls = Calls(time)
         self.ttys: dict[str, Tty] = {}
+        self.chips: dict[str, Chip] = {}
+        self.clock_off_s = 0.0  #: somebody has set the wall clock
         self.disk = disk or Disk(ROOT.rstrip("/"))
         self.output = {STDOUT: Stream(time), STDERR: Stream(time)}
         self.on_said: Callable[[Any, str], None] = lambda _process, _text: None
@@ -227,6 +233,8 @@ class Kernel:
             what.opened -= 1
         if isinstance(what, Tty | Inode) and what.lock is file:
             what.lock = None
+        if isinstance(what, Output):
+            what.held = False
         if isinstance(what, Socket):
             what.closed = True
             if what.peer is not None:
@@ -249,6 +257,8 @@ class Kernel:
         if not self.is_ours(name):
             return os.open(path, flags, mode, dir_fd=dir_fd)
         self.calls("open", name)
+        if name in self.chips:
+            return self._open_chip(name)
         tty = self.ttys.get(name)
         if tty is None:
             if name.removeprefix(ROOT).isdigit():
@@ -260,6 +270,15 @@ class Kernel:
             raise fails(errno.EBUSY, name)
         tty.opened += 1
         return self._new(File(name, tty, flags))
+
+    def _open_chip(self, name: str) -> int:
+        if not self.chips[name].present:
+            raise fails(errno.ENOENT, name)
+        return self._new(File(name, self.chips[name]))
+
+    def new_line(self, name: str, output: Output) -> int:
+        """The descriptor of a line that was requested."""
+        return self._new(File(name, output))
 
     def is_ours(self, path: Any) -> bool:
         return isinstance(path, str) and path.startswith(ROOT)
@@ -277,6 +296,8 @@ class Kernel:
             return bytes(told)
         what = file.what
         if isinstance(what, Inode):
+            if file.path in self.disk.directories:
+                raise fails(errno.EISDIR, file.path)
             data = bytes(what.data[file.at : file.at + size])
             file.at += len(data)
             return data
@@ -470,7 +491,7 @@ class Kernel:
     def readable(self, fd: Any) -> bool:
         what = self._what(fd)
         if isinstance(what, Tty):
-            return bool(what.waiting_bytes) or not what.present
+            return what.readable or not what.present
         if isinstance(what, Socket):
             return bool(what.heard) or what.peer is None or what.peer.closed
         return isinstance(what, Death) and what.process.dead
@@ -490,13 +511,26 @@ class Kernel:
         return what
 
     def ioctl(self, fd: int, request: int = 0, argument: Any = 0, *_: object) -> int:
+        file = self.file(fd)
+        if isinstance(file.what, Chip | Output):
+            self.calls("ioctl", file.path)
+            return self._ioctl_line(file, request, argument)
         tty = self._tty(fd)
-        self.calls("ioctl", self.file(fd).path)
+        self.calls("ioctl", file.path)
         if request in (termios.TIOCEXCL, termios.TIOCNXCL):
             tty.exclusive = request == termios.TIOCEXCL
         elif request == TIOCGEXCL:
             argument[:4] = int(tty.exclusive).to_bytes(4, sys.byteorder)
         return 0
+
+    def _ioctl_line(self, file: File, request: int, argument: Any) -> int:
+        if not self.chips[file.path.split(":")[0]].present:
+            raise fails(errno.ENODEV, file.path)
+        if isinstance(file.what, Chip) and request == GET_LINE:
+            return request_line(self, file.what, file.path, argument)
+        if isinstance(file.what, Output) and request == SET_VALUES:
+            return set_values(file.what, argument)
+        raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY))
 
     def flock(self, fd: int, operation: int) -> None:
         file = self.file(fd)
@@ -533,6 +567,8 @@ class Kernel:
         tty = self._tty_call("tcflush", fd)
         if queue in (termios.TCIFLUSH, termios.TCIOFLUSH):
             tty.waiting_bytes = b""
+        if queue in (termios.TCOFLUSH, termios.TCIOFLUSH):
+            tty.held_back.clear()
 
     # --- what takes the modules' places -------------------------------------------------------------------------------
 
@@ -553,7 +589,7 @@ class Kernel:
         fake_os.path.getsize = lambda path: self.stat(path).st_size
         fake_termios = SimpleNamespace(**vars(termios))
         fake_termios.tcgetattr, fake_termios.tcsetattr = self.tcgetattr, self.tcsetattr
-        fake_termios.tcflow = lambda fd, _action: self._tty_call("tcflow", fd) and None
+        fake_termios.tcflow = lambda fd, action: self._tty_call("tcflow", fd).flow(goes=action == termios.TCOON)
         fake_termios.tcflush, fake_termios.tcdrain = self.tcflush, lambda fd: self._tty_call("tcdrain", fd) and None
         fake_select = SimpleNamespace(**vars(select))
         fake_select.select, fake_select.poll = self.select, lambda: Poll(self)

@@ -193,7 +193,7 @@ def replacements(kernel: Kernel, processes: Processes) -> dict[Any, Any]:
         time.wait(time.now_s + seconds)
 
     def wall() -> float:
-        return WALL_S + time.clock()
+        return WALL_S + kernel.clock_off_s + time.clock()
 
     fake_time = SimpleNamespace(**vars(real_time))
     fake_time.monotonic = fake_time.perf_counter = time.clock

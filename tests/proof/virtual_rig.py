@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from random import Random
 from typing import Any, cast
 
 from durand.scheduler import AsyncScheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
@@ -16,6 +17,7 @@ from orchestrator.sim.line import LINES
 from orchestrator.sim.pack import Pack, Readout
 from orchestrator.sim.rig import FRESH_S, AsBuilt, Rig
 from tests.proof.virtual_can import BusWire
+from tests.proof.virtual_gpio import Breaker
 from tests.proof.virtual_time import Time
 from tests.proof.virtual_tty import Tty
 
@@ -34,6 +36,19 @@ class Nature:
     speed: float = 1.0  #: model seconds in one second
     main_loop: bool = False  #: the BMU answers when its main loop comes round to it
     running: bool = False  #: as the last service left it
+    contactor: bool = False  #: between charger and battery
+
+
+class CutBay(Bay):
+    """A bay with a contactor in its cable, if it has one."""
+
+    breaker: Breaker | None = None
+
+    def advance(self, dt_s: float) -> None:
+        plugged = self.connected
+        self.connected = plugged and (self.breaker is None or self.breaker.closed)
+        super().advance(dt_s)
+        self.connected = plugged
 
 
 class MemoryWire(ChargerWire):
@@ -45,6 +60,12 @@ class MemoryWire(ChargerWire):
         self._plugged = False
         tty.listener = self._receive
         self.on_started: Callable[[float], None] = lambda _now_s: None  #: a frame has switched the output on
+        self.on_stranger: Callable[[bool], None] = lambda _ran: None  #: a stranger's has, or has switched it off
+        self.late_s: tuple[float, float] | None = None  #: an answer is whole so long after the question was written
+        self.pieces = 1  #: it comes in so many
+        self._came_s = 0.0
+        self._strange = False  #: what is heard now is another program's
+        self._dice = Random(1)
 
     def open(self) -> None:
         self._plugged = True
@@ -90,10 +111,33 @@ class MemoryWire(ChargerWire):
             self._hear(now_s, chunk)
 
     def _obey(self, request: Request, came_s: float) -> None:
-        stood = not self.charger.running
+        self._came_s, stood = came_s, not self.charger.running
         super()._obey(request, came_s)
-        if stood and self.charger.running:
+        if self._strange and stood is self.charger.running:
+            self.on_stranger(stood)
+        elif stood and self.charger.running:
             self.on_started(self._time.now_s)
+
+    def hears_stranger(self, frames: bytes) -> None:
+        """Another program writes valid frames to this port. A stop of its own is none of ours."""
+        if self.mute_rx or not (self._tty.clear and self._tty.present):
+            return
+        first_stop_s, self._strange = self.counters.first_stop_s, True
+        try:
+            self._hear(self._time.now_s, frames)
+        finally:
+            self.counters.first_stop_s, self._strange = first_stop_s, False
+
+    def _say(self, answer: bytes) -> None:
+        if self.late_s is None or self.mute_tx:
+            super()._say(answer)
+            return
+        size = -(-len(answer) // self.pieces)
+        pieces = [answer[at : at + size] for at in range(0, len(answer), size)]
+        due_s = self._came_s + self._dice.uniform(*self.late_s)
+        for left, piece in enumerate(reversed(pieces)):
+            at_s = max(due_s - left * 0.5 * (due_s - self._came_s) / self.pieces, self._time.now_s)
+            self._time.call_at(at_s, self._write, piece)
 
     def _write(self, data: bytes) -> None:
         if self._plugged:
@@ -112,7 +156,10 @@ class VirtualRig(Rig):
         charger = Charger(nature.control)
         if nature.running:
             charger.run, charger.mode, charger.current_limit = True, ChargeMode.CHARGE, len(charger.steps_a) - 1
-        self.bay = Bay(charger, nature.pack)
+        self.bay = CutBay(charger, nature.pack)
+        self.breaker = self.bay.breaker = Breaker(time) if nature.contactor else None
+        if self.breaker is not None:
+            self.breaker.on_moved = lambda _closed: self.catch_up(force=True)
         self.as_built = AsBuilt(charger.control_mode, nature.pack.ambient_c, nature.pack.cells)
         self.injected_s: float | None = None
         self.tty = tty

@@ -16,6 +16,21 @@ SPEED = 0o010017
 VMIN, VTIME = termios.VMIN, termios.VTIME
 
 Attributes = list[Any]  #: as of `termios.tcgetattr`
+#: What `stty` calls it → the index of `termios.tcgetattr`, which bits (or which character), and their value.
+STTY: dict[str, tuple[int, int, int]] = {
+    "parenb": (2, termios.PARENB | termios.PARODD, termios.PARENB),
+    "parodd": (2, termios.PARENB | termios.PARODD, termios.PARENB | termios.PARODD),
+    "cstopb": (2, termios.CSTOPB, termios.CSTOPB),
+    "cs7": (2, termios.CSIZE, termios.CS7),
+    "crtscts": (2, termios.CRTSCTS, termios.CRTSCTS),
+    "-cread": (2, termios.CREAD, 0),
+    "ixon": (0, termios.IXON, termios.IXON),
+    "istrip": (0, termios.ISTRIP, termios.ISTRIP),
+    "opost": (1, termios.OPOST, termios.OPOST),
+    "icanon": (3, termios.ICANON, termios.ICANON),
+    "min": (6, VMIN, 255),
+    "time": (6, VTIME, 50),
+}
 
 
 def fresh_attributes() -> Attributes:
@@ -39,6 +54,8 @@ class Tty:
     present: bool = True
     stalled: bool = False  #: takes nothing any more
     stolen: bool = False  #: another program reads all that comes in
+    suspended: bool = False  #: another program has stopped its output (TCOOFF); what is written waits
+    held_back: list[bytes] = field(default_factory=list)
     waiting_bytes: bytes = b""
     attributes: Attributes = field(default_factory=fresh_attributes)
     changed_s: float = 0.0  #: when somebody else changed them
@@ -61,7 +78,25 @@ class Tty:
     def take(self, data: bytes) -> None:
         """Bytes go out."""
         self.on_written(data)
-        self.listener(data if self.clear else garbled(data))
+        if self.suspended:
+            self.held_back.append(data)
+        else:
+            self.listener(data if self.clear else garbled(data))
+
+    def flow(self, *, goes: bool) -> None:
+        """`tcflow`."""
+        self.suspended = not goes
+        waiting, self.held_back = (self.held_back, []) if goes else ([], self.held_back)
+        for data in waiting:
+            self.listener(data if self.clear else garbled(data))
+
+    @property
+    def readable(self) -> bool:
+        """As n_tty has it for poll: without a time (VTIME), VMIN bytes must be there."""
+        characters = self.shown()[6]
+        raw = not self.attributes[3] & termios.ICANON
+        least = characters[VMIN] if raw and not characters[VTIME] else 1
+        return len(self.waiting_bytes) >= max(int(least), 1)
 
     def deliver(self, data: bytes) -> None:
         """Bytes come in."""
@@ -91,6 +126,16 @@ class Tty:
         settings = fresh_attributes() if line_by_line else [*self.attributes[:6], [b"\0"] * 32]
         settings[2] = (settings[2] & ~SPEED) | speed
         settings[4] = settings[5] = speed
+        self.attributes, self.changed_s = settings, self.time.now_s
+
+    def altered(self, what: str) -> None:
+        """`stty -F PORT …`, one word of it."""
+        at, bits, value = STTY[what]
+        settings = [*self.attributes[:6], list(self.attributes[6])]
+        if at == 6:
+            settings[6][bits] = value
+        else:
+            settings[at] = settings[at] & ~bits | value
         self.attributes, self.changed_s = settings, self.time.now_s
 
     def set(self, settings: Attributes) -> None:

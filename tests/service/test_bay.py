@@ -18,7 +18,7 @@ from orchestrator.service.asked import Asked
 from orchestrator.text.catalogue import say
 from tests.service.bench import STEP_S, Bench
 
-HELD = "stopped by the operator; start to go on"
+HELD = "stopped by the operator"
 
 
 @pytest.fixture(name="bench")
@@ -74,7 +74,7 @@ def test_a_stop_waits_for_nothing_and_what_it_overtook_is_refused(bench: Bench) 
     assert {say(one.answer) for one in early} == {"a stop came meanwhile: ask again if it is still wanted"}
     assert {one.answer for one in stops} == {None}
     bench.step()
-    assert say(late.answer) == "not running: stopped by the operator; start to go on"
+    assert say(late.answer) == "not running: stopped by the operator"
 
 
 def test_every_change_of_state_is_said_once(bench: Bench) -> None:
@@ -100,11 +100,11 @@ def test_an_exception_of_our_own_stops_the_bay_latches_and_is_told(
         bench.step(5)
         assert {command for command, _ in bench.charger.orders[-6:]} == {STOP}
         status = bench.bay.status()
-        assert (status["state"], status["alarm"]) == ("STOPPING", False)
+        assert (status["state"], status["alarm"]) == ("STOPPING", "none")
         assert "internal: ZeroDivisionError" in str(status["reason"])
         bench.step(12)
         status = bench.bay.status()
-        assert (status["state"], status["alarm"]) == ("UNCONTROLLABLE", True)
+        assert (status["state"], status["alarm"]) == ("UNCONTROLLABLE", "danger")
         assert str(status["reason"]).startswith("CUT THE MAINS")
         assert not bench.bay.verified
     assert sum("internal error" in line for line in said(bench)) == 1
@@ -173,7 +173,7 @@ def test_a_start_that_no_disk_takes_is_answered_no_and_starts_nothing_later(benc
     bench.step()
     assert say(again.answer).startswith("not done: a restart would forget what changes: ")
     bench.disk = True
-    assert bench.step(100) is State.IDLE, "the disk is well again, and nobody has started it since"
+    assert bench.step(100) is State.HELD, "the disk is well again, and nobody has started it since"
     assert kept(bench)[1] == HELD
     assert bench.ask(Request.START) == ""
     bench.until(State.CHARGING)
@@ -224,7 +224,7 @@ def test_what_was_charging_when_the_guardian_died_waits_for_an_operator(bench: B
     bench.bay.end("the guardian has died", orderly=False)
     bench.step(10)
     assert bench.bay.verified
-    hold = "the last run ended in mid-charge: the guardian has died; start to go on"
+    hold = "the last run ended in mid-charge: the guardian has died"
     assert kept(bench) == (False, hold, False)
 
 
@@ -261,7 +261,7 @@ def test_an_end_during_the_start_leaves_no_hold_behind(bench: Bench, steps: int)
 
 def test_it_begins_with_what_was_kept(tmp_path: Path) -> None:
     bench = Bench(tmp_path, Persisted(running=True))
-    assert bench.step(30) is State.IDLE
+    assert bench.step(30) is State.HELD
     assert [fault["id"] for fault in bench.bay.status()["faults"]] == ["found_running"]  # type: ignore[attr-defined]  # a JSON document
     assert bench.ask(Request.START) == ""
     bench.until(State.CHARGING)

@@ -144,7 +144,7 @@ def test_a_charger_that_does_not_obey_is_cut_off(bench: Bench, line: Line) -> No
     bench.until(State.UNCONTROLLABLE)
     assert not line.closed
     status = json.loads(json.dumps(bench.bay.status()))
-    assert (status["alarm"], status["contactor"]) == (True, {"closed": False, "problem": ""})
+    assert (status["alarm"], status["contactor"]) == ("danger", {"closed": False, "problem": ""})
 
 
 def test_an_exception_of_our_own_that_stays_opens_it_once_the_stop_has_had_its_time(

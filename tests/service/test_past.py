@@ -42,7 +42,7 @@ def test_its_own_past_is_taken_as_it_is() -> None:
 
 def test_a_bay_that_nobody_knows_is_held() -> None:
     past = past_of(Place("bay-3", "/dev/c", "can0", 18), [Entry(A, TRIPPED, 3)], FILE)
-    assert past == Persisted(hold=Cause.of("past_unknown", advice="start", bay="bay-3", port="/dev/c", file=FILE))
+    assert past == Persisted(hold=Cause.of("past_unknown", bay="bay-3", port="/dev/c", file=FILE))
 
 
 LAST = "when this service last ran, and"
@@ -68,7 +68,7 @@ MOVED = {
 def test_who_was_moved_is_held_with_all_that_was(name: str) -> None:
     place, said = MOVED[name]
     past = past_of(place, [Entry(A, replace(TRIPPED, running=True, paused=True), 3), Entry(B, HELD, 3)], FILE)
-    assert say(past.hold) == f"{said}: see what is wired where; start to go on"
+    assert say(past.hold) == f"{said}: see what is wired where"
     assert (past.running, past.paused, past.faults) == (True, True, TRIPPED.faults)
 
 
@@ -275,7 +275,7 @@ def test_the_second_format_is_read_and_its_sentences_are_kept() -> None:
     document = {"format": 2, "written": NEVER_SET_S, "clock_s": 1.0, "boot": "", "run": 3, "entries": [entry]}
     run, (read,) = decode(json.dumps(document).encode(), Stamp(NEVER_SET_S, 1.0, ""))
     assert (run, read.place) == (3, A)
-    assert say(read.persisted.hold) == "stopped by the operator; start to go on"
+    assert read.persisted.hold == STOPPED
     assert read.persisted.faults["emergency"] == TRIPPED.faults["emergency"]
     assert read.persisted.faults["late"] == PersistedFault(strikes=(1.0,))
     assert read.persisted.session == Session(1.0)

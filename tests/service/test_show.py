@@ -104,13 +104,14 @@ def test_what_both_said_long_ago_is_no_evidence() -> None:
 
 def test_what_needs_a_person_comes_first() -> None:
     calm, loud = bay(), bay(name="bay-9", state="UNCONTROLLABLE", reason="it runs on", port="/dev/ttyUSB9")
-    alarmed = bay(name="bay-5", state="OFFLINE", reason="silent", alarm=True)
-    lines = table([calm, alarmed, loud]).splitlines()
+    alarmed = bay(name="bay-5", state="OFFLINE", reason="silent", alarm="danger")
+    held = bay(name="bay-7", state="HELD", reason="mode 7", alarm="attention")
+    lines = table([calm, held, alarmed, loud]).splitlines()
     assert lines[:2] == [
         "ALARM: CUT THE MAINS of bay-9's charger (/dev/ttyUSB9): UNCONTROLLABLE: it runs on",
         "ALARM: CUT THE MAINS of bay-5's charger (its port is not known): OFFLINE: silent",
     ]
-    assert [line.split()[0] for line in lines[2:]] == ["BAY", "bay-9", "bay-5", "bay-1"]
+    assert [line.split()[0] for line in lines[2:]] == ["BAY", "bay-9", "bay-5", "bay-7", "bay-1"]
 
 
 def test_what_needs_a_person_is_said_once() -> None:
@@ -118,14 +119,15 @@ def test_what_needs_a_person_is_said_once() -> None:
         {**fault("will_not_stop", "cut the charger's mains now – it still delivers 14.00 A"), "effect": "TRIP"},
         fault("noisy_line", "a noisy line"),
     ]
-    text = table([bay(state="UNCONTROLLABLE", reason="CUT THE MAINS of this charger (/dev/x): it runs", faults=faults)])
+    reason = "CUT THE MAINS of this charger (/dev/x): it runs"
+    text = table([bay(state="UNCONTROLLABLE", reason=reason, cause={"id": "uncontrollable"}, faults=faults)])
     assert text.lower().count("mains") == 1
     assert text.splitlines()[2].endswith("  see ALARM")
     assert text.splitlines()[3:] == ["  WARN: a noisy line"]
 
 
 STOPPED = bay(
-    state="IDLE",
+    state="HELD",
     reason="stopped by the operator",
     port="/dev/ttyUSB1",
     command={"order": {"action": None}},
@@ -139,7 +141,10 @@ CHARGER, BATTERY = cast("dict[str, object]", STOPPED["charger"]), cast("dict[str
     "change",
     [
         {},
+        {"state": "IDLE"},
         {"state": "TRIPPED"},
+        {"state": "TRIPPED", "alarm": "attention"},
+        {"alarm": "none"},
         {"state": "SUSPENDED"},
         {"state": "FULL"},
         {"battery": {"current_a": None, "old": []}},
@@ -158,6 +163,7 @@ def test_a_charger_that_stands_by(change: dict[str, object]) -> None:
         {"state": "CHARGING"},
         {"state": "OFFLINE"},
         {"state": "UNCONTROLLABLE"},
+        {"alarm": "danger"},
         {"alarm": True},
         {"command": {"order": {"action": "stop"}}},
         {"charger": {**CHARGER, "online": False}},
@@ -178,7 +184,7 @@ def test_whatever_speaks_against_it_is_no_standby(change: dict[str, object]) -> 
     [
         ({"state": "UNCONTROLLABLE"}, "CUT THE MAINS of bay-1's charger (/dev/ttyUSB1): UNCONTROLLABLE: "),
         ({"state": "STOPPING"}, "CUT THE MAINS of bay-1's charger (/dev/ttyUSB1): STOPPING: "),
-        ({"state": "OFFLINE", "alarm": True}, "CUT THE MAINS of bay-1's charger (/dev/ttyUSB1): OFFLINE: "),
+        ({"state": "OFFLINE", "alarm": "danger"}, "CUT THE MAINS of bay-1's charger (/dev/ttyUSB1): OFFLINE: "),
         ({"state": "OFFLINE"}, "LOOK at bay-1's charger (/dev/ttyUSB1), nobody has seen that it stands by: OFFLINE: "),
     ],
 )
@@ -187,7 +193,8 @@ def test_what_to_do_is_said_before_why(change: dict[str, object], first: str) ->
 
 
 def test_advice_that_the_reason_begins_with_is_not_said_twice() -> None:
-    told = bay(state="UNCONTROLLABLE", reason="CUT THE MAINS of this charger (/dev/x): it runs on")
+    reason = "CUT THE MAINS of this charger (/dev/x): it runs on"
+    told = bay(state="UNCONTROLLABLE", reason=reason, cause={"id": "uncontrollable"})
     assert what_to_do(told) == "bay-1: CUT THE MAINS of this charger (/dev/x): it runs on"
 
 

@@ -12,6 +12,7 @@ from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S
 from orchestrator.core.memory import Memory
 from orchestrator.model import (
     ActiveFault,
+    Alarm,
     BatteryLink,
     BatteryReading,
     Cause,
@@ -98,7 +99,7 @@ def test_nothing_known_is_null() -> None:
         assert known.pop("old") == old
         ages_s = known.pop("age_s")
         assert {*known.values(), *(ages_s.values() if ages_s else (ages_s,))} == {None}
-    assert (status["step"], status["session"], status["faults"], status["alarm"]) == (None, None, [], False)
+    assert (status["step"], status["session"], status["faults"], status["alarm"]) == (None, None, [], "none")
 
 
 def test_what_is_known_is_in_the_devices_own_values() -> None:
@@ -169,8 +170,9 @@ def test_a_cause_is_data_and_a_sentence_in_the_stations_language() -> None:
 def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
     station = load_station(shipped_dir() / Path("configs/stations/one-bay.yaml"))
     stray = {"bay": "bay-9", "port": "/dev/x", "state": "STOPPING", "verified": False, "problem": ""}
-    assert station_status(station, [], "disk full", "worn", [stray]) == {
+    assert station_status(station, Alarm.DANGER, [], "disk full", "worn", [stray]) == {
         "station": "depot-1",
+        "alarm": "danger",
         "bays": [],
         "strays": [stray],
         "journal": {"problem": "disk full"},

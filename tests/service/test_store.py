@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.core.faults import FAULTS, Clear
-from orchestrator.core.operator import STOPPED
+from orchestrator.core.operator import OWN, STOPPED
 from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.errors import ServiceError
 from orchestrator.model import Cause, Session
@@ -324,12 +324,29 @@ def test_the_first_format_is_read_once_and_moved_away(tmp_path: Path) -> None:
         assert store.past(A).hold is None
 
 
+def test_a_hold_of_a_version_before_held_loses_the_end_that_said_what_to_do(tmp_path: Path) -> None:
+    """The bay says it now; the rest is what the operator did, and no alarm."""
+    with running(tmp_path, A) as store:
+        kept(store, store.put(A, HELD))
+    path, said = tmp_path / FILE, "stopped by the operator; start to go on"
+    document = json.loads(path.read_text())
+    document["format"], document["entries"][0]["hold"] = 2, said
+    path.write_text(json.dumps(document))
+    with running(tmp_path, A) as store:
+        assert store.past(A).hold == HELD.hold in OWN
+    path.unlink()
+    first = {"running": False, "hold": said, "paused": False, "faults": {}}
+    (tmp_path / FIRST_FILE).write_text(json.dumps({"bay-1": first}))
+    with running(tmp_path, A) as store:
+        assert store.past(A).hold == HELD.hold
+
+
 def test_what_is_lost_is_no_first_start(tmp_path: Path) -> None:
     (tmp_path / "events.jsonl").write_text("{}\n")
     with running(tmp_path) as store:
         assert say(store.past(A).hold) == (
             f"{tmp_path / FILE} is lost, though this service has run here before: "
-            "nobody knows which faults were latched; start to go on"
+            "nobody knows which faults were latched"
         )
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from orchestrator.core.faults import FAULTS
 from orchestrator.model import Cause, Effect
 from orchestrator.model.cause import SEVERAL, from_plain, plain, together
+from orchestrator.show import CUT_THE_MAINS
 from orchestrator.text.catalogue import LANGUAGES, advise, fields, say
 from orchestrator.text.language import language_of
 
@@ -43,8 +44,12 @@ def test_korean_is_korean() -> None:
     for texts in (KO.texts, KO.advice):
         for id_, text in texts.items():
             bare = "".join(literal for literal, *_ in Formatter().parse(text)).strip(" ,.'")
-            assert not bare or any("가" <= one <= "힣" for one in bare), id_
+            assert bare in ("", "orchestrator start") or any("가" <= one <= "힣" for one in bare), id_
     assert say(HOT, "ko") == ("팩 온도가 45.2 °C이고 상한은 45 °C입니다 (p.yaml:3). 40 °C 아래에서 다시 충전합니다")
+
+
+def test_what_is_out_of_control_begins_with_the_mains() -> None:
+    assert {id_ for id_, text in EN.texts.items() if text.startswith("CUT THE MAINS")} == CUT_THE_MAINS
 
 
 def test_what_to_do_goes_first_where_a_person_must_act() -> None:

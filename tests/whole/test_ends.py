@@ -68,7 +68,7 @@ def test_a_controller_that_died_is_not_started_into_a_charge(tmp_path: Path) -> 
 
 
 def held(plant: PlantProcess, service: Service) -> None:
-    bay = service.wait("IDLE")["bay-1"]
+    bay = service.wait("HELD")["bay-1"]
     assert [fault["id"] for fault in bay["faults"]] == ["found_running"]
     assert "the last run of this service ended in mid-charge" in bay["reason"]
     assert plant.state()["operation"] == 0
@@ -88,14 +88,17 @@ def test_a_restart_is_neither_a_reset_nor_a_start(tmp_path: Path) -> None:
         plant.inject("status_bits", 1)
         service.ask("stop", "bay-2")
         service.wait("TRIPPED", ["bay-1"])
-        service.wait("IDLE", ["bay-2"])
+        service.wait("HELD", ["bay-2"])
         plant.inject("heal", 1)
         service.signal(signal.SIGTERM)
         assert service.ended() == 0
         service.start().wait("TRIPPED", ["bay-1"])
         bay = service.bay("bay-1")
         assert "the BMU reports bmu error" in bay["reason"]
-        assert service.wait("IDLE", ["bay-2"])["bay-2"]["reason"] == "stopped by the operator; start to go on"
+        assert (
+            service.wait("HELD", ["bay-2"])["bay-2"]["reason"]
+            == "stopped by the operator; to go on: orchestrator start bay-2"
+        )
         service.wait("CHARGING", ["bay-3"])  # its stop was the service's own
         wait_until(lambda: not service.ask("reset", "bay-1")["bay-1"], what="a reset that is accepted")
         service.ask("start", "bay-1", "bay-2")

@@ -34,7 +34,7 @@ CASES = (
     Case("line_taken_over", "SUSPENDED", "line_taken_over", SILENCE_S, instead="line_changed"),  # so does this
     Case("reverse_polarity", "TRIPPED", "reverse_polarity"),
     Case("error_stop", "TRIPPED", "error_stop"),
-    Case("system_stop", "IDLE", "system_stop"),
+    Case("system_stop", "HELD", "system_stop"),
     Case("charger_silent", "UNCONTROLLABLE", "charger_silent", SILENCE_S),
     Case("charger_cut_off", "UNCONTROLLABLE", "charger_silent", None),
     Case("charger_error_frames", "UNCONTROLLABLE", "charger_silent", None),
@@ -51,21 +51,21 @@ CASES = (
     Case("volts_disagree", "TRIPPED", "volts_disagree", 3 + AT_ONCE_S),
     # The BMU goes on seeing 3 A that nobody ordered: nobody can know that it is the one that is wrong.
     Case("amps_disagree", "UNCONTROLLABLE", "amps_disagree", 5 + AT_ONCE_S),
-    Case("says_standby", "IDLE", "stopped_by_itself"),
-    Case("says_standby_now_and_then", "IDLE", "stopped_by_itself", SILENCE_S),
-    Case("stopped_elsewhere", "IDLE", "stopped_by_itself"),  # its mode 5 is no full: nothing had tapered off
+    Case("says_standby", "HELD", "stopped_by_itself"),
+    Case("says_standby_now_and_then", "HELD", "stopped_by_itself", SILENCE_S),
+    Case("stopped_elsewhere", "HELD", "stopped_by_itself"),  # its mode 5 is no full: nothing had tapered off
     Case("pack_collapsed", "TRIPPED", "pack_collapsed"),
     Case("another_pack", "TRIPPED", "pack_collapsed", instead="volts_disagree"),  # in mid-charge its volts fall first
     Case("status_bits", "TRIPPED", "status_trip"),
-    Case("emergency", "IDLE", "emergency"),
+    Case("emergency", "HELD", "emergency"),
     Case("rogue_run", "TRIPPED", "rogue_run", 2 + AT_ONCE_S, before="stopped"),
     Case("command_ignored", "TRIPPED", "setting_not_obeyed", 5 + AT_ONCE_S),
     Case("precharge_no_rise", "TRIPPED", "precharge_no_rise", 10.0, before="precharge"),
     Case("ignore_stop", "UNCONTROLLABLE", "will_not_stop"),
     Case("illegal_value", "SUSPENDED", "illegal_value"),
     Case("polarity_contradicts", "TRIPPED", "reverse_polarity"),  # with either it stops at once
-    Case("battery_exchanged", "IDLE", "battery_exchanged", SILENCE_S),
-    Case("mode_taken_over", "IDLE", "mode_taken_over"),
+    Case("battery_exchanged", "HELD", "battery_exchanged", SILENCE_S),
+    Case("mode_taken_over", "HELD", "mode_taken_over"),
     Case("battery_removed", "IDLE", "heartbeat_lost", SILENCE_S, instead="bmu_silent"),
     Case("port_gone", "UNCONTROLLABLE", "charger_silent", None),
 )
@@ -73,7 +73,7 @@ BAYS = {case.name: number for number, case in enumerate(CASES, 1)}
 #: In these the charger goes on, whatever we do: that is what the alarm is for.
 GOES_ON = {"charger_cut_off", "charger_error_frames", "ignore_stop", "port_gone"}
 #: This one shows only when somebody stops the bay.
-STOPPED_BY = "stopped by the operator; start to go on"
+STOPPED_BY = "stopped by the operator"
 
 
 def leisurely(document: Document) -> None:
@@ -108,7 +108,7 @@ def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PlantPr
                 wait_until(partial(steady, plant, BAYS[case.name]), 20, "a steady charge")
         stopped = [bay_of(case) for case in CASES if case.before == "stopped"]
         service.ask("stop", *stopped)
-        service.wait("IDLE", stopped)
+        service.wait("HELD", stopped)
         for case in CASES:
             plant.inject(case.name, BAYS[case.name])
             if case.name == "ignore_stop":
@@ -145,7 +145,7 @@ def test_a_fault_ends_where_it_should(station: tuple[PlantProcess, Service], cas
     assert truth["current_a"] == 0 or case.name in GOES_ON
     if case.stop_s is not None:
         assert truth["first_stop_s"] - truth["injected_s"] < case.stop_s
-    assert status["alarm"] == (case.state == "UNCONTROLLABLE")
+    assert (status["alarm"] == "danger") == (case.state == "UNCONTROLLABLE")
     wait_until(lambda: named(service, case), what=f"{case.fault} as the cause, in the journal")
 
 

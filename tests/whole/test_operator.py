@@ -82,10 +82,10 @@ def test_a_pause_does_not_end_the_session_and_a_stop_does(station: Station) -> N
     service.wait("SUSPENDED")
     charging(station)
     service.ask("stop", "bay-1")
-    service.wait("IDLE")
+    service.wait("HELD")
     wait_until(lambda: len(service.journal("bay-1", "session")) > before, what="the journal")
     (end,) = service.journal("bay-1", "session")[before:]
-    assert (end["event"], end["result"]) == ("end", "stopped by the operator; start to go on")
+    assert (end["event"], end["result"]) == ("end", "stopped by the operator")
 
 
 def test_stop_holds_until_start(station: Station) -> None:
@@ -96,13 +96,11 @@ def test_stop_holds_until_start(station: Station) -> None:
     assert (plant.state(1)["operation"], plant.state(2)["operation"]) == (0, 0)
     assert (stopped.returncode, stopped.stderr) == (0, "")
     assert stopped.stdout == "".join(f"bay-{number}: stop accepted; stands by, verified\n" for number in (1, 2))
-    service.wait("IDLE", ["bay-1", "bay-2"])
+    service.wait("HELD", ["bay-1", "bay-2"])
     refused = service.cli("pause", "bay-1", "bay-2")
     assert refused.returncode == 1
-    assert refused.stderr == "".join(
-        f"bay-{number}: not running: stopped by the operator; start to go on\n" for number in (1, 2)
-    )
-    assert service.bay()["reason"] == "stopped by the operator; start to go on"
+    assert refused.stderr == "".join(f"bay-{number}: not running: stopped by the operator\n" for number in (1, 2))
+    assert service.bay()["reason"] == "stopped by the operator; to go on: orchestrator start bay-1"
     charging(station)
 
 
@@ -125,7 +123,7 @@ def test_a_stop_that_is_not_obeyed_begins_with_what_to_do(station: Station) -> N
     assert done.stdout == "bay-2: stop accepted\n"
     table = service.cli("status").stdout.splitlines()
     assert table[0].startswith("ALARM: bay-2: CUT THE MAINS of this charger (")
-    assert [line.split()[0] for line in table if line.startswith("bay-")] == ["bay-2", "bay-1", "bay-3", "bay-4"]
+    assert [line.split()[0] for line in table if line.startswith("bay-")] == ["bay-2", "bay-3", "bay-1", "bay-4"]
     plant.inject("heal", 2)
     service.wait("TRIPPED", ["bay-2"])
     assert service.cli("stop", "bay-2").returncode == 0
@@ -145,8 +143,11 @@ def test_a_trip_is_refused_a_start_and_reset_only_when_its_cause_is_gone(station
     assert "status_trip is still there" in reset.stderr
     plant.inject("heal", 2)
     wait_until(lambda: not service.ask("reset", "bay-2")["bay-2"], what="a reset that is accepted")
-    service.wait("IDLE", ["bay-2"])
-    wait_until(lambda: service.bay("bay-2")["reason"] == "reset by the operator; start to go on", what="the hold")
+    service.wait("HELD", ["bay-2"])
+    wait_until(
+        lambda: service.bay("bay-2")["reason"] == "reset by the operator; to go on: orchestrator start bay-2",
+        what="the hold",
+    )
     assert plant.state(2)["operation"] == 0
     charging(station, 2)
 
@@ -187,7 +188,7 @@ def test_a_charger_that_is_not_there_at_the_start_is_used_once_it_is(station: St
 
 def test_a_charger_in_another_mode_than_the_file_says_is_not_used(station: Station) -> None:
     _, service = station
-    bay = service.wait("IDLE", ["bay-3"])["bay-3"]
+    bay = service.wait("HELD", ["bay-3"])["bay-3"]
     assert [fault["id"] for fault in bay["faults"]] == ["mode_taken_over"]
 
 
@@ -225,7 +226,7 @@ def test_an_adapter_that_is_unplugged_and_plugged_in_again(station: Station) -> 
     plant, service = station
     plant.inject("port_gone")
     bay = service.wait("UNCONTROLLABLE")["bay-1"]
-    assert bay["alarm"] is True
+    assert bay["alarm"] == "danger"
     assert "no such port" in bay["reason"]
     assert bay["charger"]["old"] is True and bay["charger"]["age_s"] > 2
     table = service.cli("status", "bay-1").stdout

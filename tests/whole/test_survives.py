@@ -17,7 +17,7 @@ from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
 from tests.whole.station import Document, Service, whole_station
 
-HELD = "stopped by the operator; start to go on"
+HELD = "stopped by the operator; to go on: orchestrator start bay-1"
 Station = tuple[PlantProcess, Service]
 
 
@@ -52,7 +52,7 @@ def test_an_accepted_stop_outlives_a_kill_right_after_it(station: Station) -> No
     service.kill_all()
     assert kept(service)["bay-1"]["hold"] == HELD
     service.start()
-    assert "then start" in service.wait("IDLE")["bay-1"]["reason"]
+    assert "then start: orchestrator start bay-1" in service.wait("HELD")["bay-1"]["reason"]
     assert plant.state(1)["operation"] == 0
     assert kept(service)["bay-1"]["hold"] == HELD
 
@@ -69,7 +69,7 @@ def test_a_stop_while_the_service_ends_is_kept(station: Station) -> None:
     assert service.ended() == 0
     service.start()
     if accepted:
-        assert service.wait("IDLE")["bay-1"]["reason"] == HELD
+        assert service.wait("HELD")["bay-1"]["reason"] == HELD
     charging(plant, service, 2)
 
 
@@ -94,7 +94,7 @@ def test_a_reader_that_stands_still_delays_neither_the_stop_nor_what_is_kept(sta
     os.close(reader)
     os.close(writer)
     service.start()
-    assert service.wait("IDLE")["bay-1"]["reason"] == HELD
+    assert service.wait("HELD")["bay-1"]["reason"] == HELD
 
 
 def test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one(station: Station) -> None:
@@ -140,7 +140,7 @@ def test_a_disk_that_hangs_delays_no_stop_and_is_named_at_the_end(station: Stati
     finally:
         service.close()
     healthy.start()
-    reason = healthy.wait("IDLE")["bay-1"]["reason"]
+    reason = healthy.wait("HELD")["bay-1"]["reason"]
     assert "ended in mid-charge" in reason, "the disk knows of its beginning, and of no end"
 
 
@@ -151,7 +151,7 @@ def test_a_disk_that_does_not_tell_the_past_holds_every_bay_after_the_stops(stat
     service = Service(healthy.directory, json.loads(healthy.file.read_text()), ("-m", "tests.whole.worn", "now-read"))
     try:
         service.start()
-        bays = service.wait("IDLE", ["bay-1", "bay-2"])
+        bays = service.wait("HELD", ["bay-1", "bay-2"])
         assert all("does not answer: nobody knows which faults were latched" in bay["reason"] for bay in bays.values())
         assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
         service.signal(signal.SIGTERM)
@@ -173,12 +173,12 @@ def test_a_charger_that_the_station_file_has_lost_is_stopped_by_the_next_start(s
     wait_until(lambda: plant.state(1)["operation"] == 0, 10, "the stop")
     wait_until(lambda: service.strays()[0]["verified"], 10, "two replies that show standby")
     (stray,) = service.strays()
-    assert (stray["bay"], stray["state"]) == ("bay-1", "IDLE")
+    assert (stray["bay"], stray["state"]) == ("bay-1", "HELD")
     assert "the station file has no bay on this port, but its charger may be running: stopping it" in service.log()
     service.signal(signal.SIGTERM)
     assert service.ended() == 0
     service.file.write_text(before, encoding="utf-8")
-    bay = service.start().wait("IDLE")["bay-1"]
+    bay = service.start().wait("HELD")["bay-1"]
     assert "while its charger was running" in bay["reason"]
     assert plant.state(1)["operation"] == 0
 
@@ -190,7 +190,7 @@ def test_one_that_does_not_stop_makes_the_end_a_bad_one(station: Station) -> Non
     service.edit(without("bay-1"))
     service.kill_all()
     service.start()
-    service.wait("IDLE", ["bay-2"])
+    service.wait("HELD", ["bay-2"])
     assert [stray["verified"] for stray in service.strays()] == [False]
     service.signal(signal.SIGTERM)
     assert service.ended() == 1
@@ -212,10 +212,10 @@ def test_two_bays_whose_ports_were_changed_over_are_held(station: Station) -> No
 
     service.edit(swap)
     service.start()
-    bays = service.wait("IDLE", ["bay-1", "bay-2"])
+    bays = service.wait("HELD", ["bay-1", "bay-2"])
     for bay in bays.values():
         assert "when this service last ran" in bay["reason"]
-        assert "see what is wired where; start to go on" in bay["reason"]
+        assert f"see what is wired where; to go on: orchestrator start {bay['name']}" in bay["reason"]
     assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
 
 

@@ -26,6 +26,7 @@ STATE_COLOURS: dict[State, str] = {
     State.STARTING: "#e0e0e0",
     State.OFFLINE: "#bdbdbd",
     State.IDLE: "#eeeeee",
+    State.HELD: "#f4cccc",
     State.QUALIFYING: "#d9d2e9",
     State.PRECHARGE_PULSE: "#9fc5e8",
     State.PRECHARGE_CONTINUOUS: "#6fa8dc",

@@ -36,6 +36,9 @@ class Shown:
     connected: bool = True
     old: frozenset[str] = frozenset()  #: values that are too old
     link: Callable[[float, Memory], Link] = field(default=lambda _now_s, _memory: {})
+    at_work: bool = (
+        False  #: only a table of steps tells it from others, so it is another one while there are steps only
+    )
 
     @property
     def volts(self) -> float:
@@ -104,12 +107,14 @@ def batteries(rules: Rules) -> dict[str, Shown]:
     base = healthy(rules)
     classes = {"healthy": base}
     for field_name, bounds in _bounds(rules).items():
-        for bound in sorted(bounds):
+        steps = {band.from_ for band in getattr(rules.policy.current, field_name) or ()}
+        for bound in sorted(bounds | steps):
             for word, value in (
                 ("just below", bound - NEAR[field_name]), ("at", bound), ("just above", bound + NEAR[field_name]),
             ):  # fmt: skip
                 name = f"{field_name} {word} {bound:g}"
-                classes[name] = replace(base, values={**base.values, **_with(rules, field_name, value)})
+                values = {**base.values, **_with(rules, field_name, value)}
+                classes[name] = replace(base, values=values, at_work=bound not in bounds)
     return classes | _events(base, rules)
 
 
@@ -123,22 +128,19 @@ def _with(rules: Rules, field_name: str, value: float) -> dict[str, float]:
 
 
 def _bounds(rules: Rules) -> dict[str, set[float]]:
-    """The thresholds of policy and station, by field."""
+    """The thresholds of policy and station, by field, but for those of the tables of steps."""
     policy = rules.policy
     volts = {policy.pack.voltage_v.low, rules.max_v}
     if policy.precharge is not None:
         volts |= {policy.precharge.below_v, policy.precharge.pulse.until_v}
     if policy.finish.taper is not None:
         volts.add(policy.finish.taper.above_v)
-    bounds = {
+    return {
         "voltage_v": volts,
         "temperature_c": {rules.temperature_c.low, rules.temperature_c.high, policy.faults.temperature_trip_c},
         "soc_pct": {policy.start.soc_below_pct, policy.recharge.soc_below_pct, policy.finish.soc_pct, 80.0},
         "soh_pct": {policy.pack.soh_min_pct},
     }
-    for name, limits in bounds.items():
-        limits |= {band.from_ for band in getattr(policy.current, name) or ()}
-    return bounds
 
 
 def _beyond(limits: Limits) -> dict[str, dict[str, float]]:

@@ -7,21 +7,24 @@ state or order, and ever larger ones while there is none. To change for ever wit
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from math import inf
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
 from orchestrator.model import ENERGISED, STOP, Request, State
 from orchestrator.workbench.prove.explore import Explorer, Node, Place, Walk
+from orchestrator.workbench.prove.gist import details
 from orchestrator.workbench.prove.properties import STANDBY
-from orchestrator.workbench.prove.story import Move, Taken
+from orchestrator.workbench.prove.story import TICK_S, Move, Taken
 
-TICK_S = 0.25
 #: While nothing changes: so many steps of each length. Beyond the last one all timers have run out.
 LADDER = ((16, TICK_S), (10, 1.0), (12, 5.0), (12, 30.0), (10, 300.0), (15, 3600.0))
 #: More changes of state than this without news: the longest orderly story is three backoffs and a latch.
 PATIENCE = 60
 #: … of which a story tells so many steps.
 SHOWN = 40
+#: So many surroundings are looked at in one job: its places are many, and go to another process with it.
+TOGETHER = 8
 #: What backoffs, hysteresis and the qualification take together, at most.
 RECOVERY_S = 600.0
 #: In this time a pack comes from any temperature to any other without looking like a broken sensor.
@@ -141,7 +144,12 @@ def settles(explorer: Explorer, some: Iterable[Node] | None = None) -> None:
     """No livelock: every node (or some of them) comes to rest in every lasting surrounding."""
     nodes = explorer.nodes if some is None else list(some)
     places = [node.place for node in nodes]
-    jobs = [(*constant, places) for constant in explorer.walk.inputs.constants()]
+    soon = [explorer.soon.get(explorer.walk.gist(place.memory), {}) for place in places]
+    constants = list(explorer.walk.inputs.constants())
+    jobs = [
+        ([(*one, [known.get(one) for known in soon]) for one in constants[at : at + TOGETHER]], places)
+        for at in range(0, len(constants), TOGETHER)
+    ]
     _keep(explorer, nodes, explorer.each(_endless, jobs))
 
 
@@ -151,37 +159,59 @@ def _keep(explorer: Explorer, nodes: Sequence[Node], found: Iterable[Sequence[Br
 
 
 def _missed(walk: Walk, which: int, places: Sequence[Place]) -> list[Broken]:
-    """The first place that does not end so, and what is broken on the way."""
+    """The first place that does not end so, and what is broken on the way.
+
+    Most ways soon lead to where one from another place has been, and from there on are the same.
+    """
     ending = ENDINGS[which]
     first = Move(ending.first_s, ending.charger, ending.battery, ending.request)
     found: list[Broken] = []
+    left_s: dict[object, float] = {}  # from what was passed on the ways so far to their end
     for number, place in enumerate(places):
         if not ending.asked_of(place.memory):
             continue
         moves: list[Move] = []
-        state, reached = place.memory.state, False
+        passed: dict[object, float] = {}
+        latest_s = place.now_s + ending.first_s + ending.within_s
+        state, end_s = place.memory.state, inf
         for taken in lasting(walk, place, first):
             moves.append(taken.move)
             found += [(name, text, number, [*moves]) for name, text in walk.news(taken)]
-            state, reached = taken.after.state, ending.reached(taken)
-            if reached or taken.now_s - place.now_s > ending.first_s + ending.within_s:
+            state, key = taken.after.state, details(taken.after)
+            end_s = taken.now_s + (0.0 if ending.reached(taken) else left_s.get(key, inf))
+            if end_s <= latest_s or taken.now_s > latest_s:
                 break
-        if not reached:
+            passed[key] = taken.now_s
+        if end_s > latest_s:
             text = f"{ending.about}: not within {ending.within_s:g} s, but {state}"
             return [*found, (ending.name, text, number, moves)]
+        left_s |= {key: max(end_s - passed_s, left_s.get(key, 0.0)) for key, passed_s in passed.items()}
     return found
 
 
-def _endless(walk: Walk, charger: str, battery: str, places: Sequence[Place]) -> list[Broken]:
-    """The first place from which the state changes for ever, and what is broken on the way."""
+#: A charger, a battery, and the gist after a moment with them, where it is known, of each place.
+Surroundings = tuple[str, str, Sequence[object]]
+
+
+def _endless(walk: Walk, surroundings: Sequence[Surroundings], places: Sequence[Place]) -> list[Broken]:
+    """The first place from which the state changes for ever, in each of these surroundings, and what is broken."""
+    return [broken for one in surroundings for broken in _circles(walk, one, places)]
+
+
+def _circles(walk: Walk, surroundings: Surroundings, places: Sequence[Place]) -> list[Broken]:
+    charger, battery, soon = surroundings
     settled: set[object] = set()
     found: list[Broken] = []
     for number, place in enumerate(places):
-        if walk.gist(place.memory) in settled:
+        own = walk.gist(place.memory)
+        if own in settled or not walk.inputs.tells(battery, place.memory.state):
+            continue
+        if soon[number] in settled:
+            settled.add(own)
             continue
         changes = 0
         moves: list[Move] = []
-        passed: set[object] = {walk.gist(place.memory)}
+        passed: set[object] = {own}
         for taken in lasting(walk, place, Move(TICK_S, charger, battery)):
             moves.append(taken.move)
             found += [(name, text, number, [*moves]) for name, text in walk.news(taken)]

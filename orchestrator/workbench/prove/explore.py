@@ -1,27 +1,22 @@
 """Walks everything that `step()` can come to, breadth-first, and holds properties against every step on the way.
 
-What goes in is cut into classes (`inputs.py`) and jumps of time; what is remembered is cut by `gist`, and the first
+What goes in is cut into classes (`inputs.py`) and jumps of time; what is remembered is cut by `gist.py`, and the first
 memory of each gist stands for all of them. So what is found is real, with the shortest story that leads to it, and what
 is not found is absent up to these cuts. Properties are data (`properties.py`); nothing here knows what they mean.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from orchestrator.core.latches import effect, raised
-from orchestrator.core.machine import RESTING, UNVERIFIED
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.core.witnesses.standby import UNORDERED_S
-from orchestrator.model import ENERGISED, Cause, Decision, Snapshot, State
+from orchestrator.model import Cause, Decision, Snapshot, State
+from orchestrator.workbench.prove.gist import gist, outline
 from orchestrator.workbench.prove.properties import Property
-from orchestrator.workbench.prove.story import BEGIN_S, Counterexample, Move, Taken
-
-#: In these standby is yet to be proved.
-WAITS = frozenset({*UNVERIFIED, State.OFFLINE, State.QUALIFYING})
+from orchestrator.workbench.prove.story import BEGIN_S, TICK_S, Counterexample, Move, Taken
 
 Step = Callable[[float, Snapshot, Memory, Rules], tuple[Decision, Memory]]
 T = TypeVar("T")
@@ -30,42 +25,20 @@ T = TypeVar("T")
 class Inputs(Protocol):
     """The classes that inputs are cut into."""
 
-    def moves(self) -> Iterable[Move]:
-        """All that may happen next, one thing at a time."""
+    def moves(self, state: State) -> Iterable[Move]:
+        """All that may happen next in a state, one thing at a time."""
 
-    def pairs(self) -> Iterable[Move]:
+    def pairs(self, state: State) -> Iterable[Move]:
         """All that may happen next, a charger's and a battery's at once."""
 
     def constants(self) -> Iterable[tuple[str, str]]:
         """Charger and battery of each surrounding that may last for ever."""
 
+    def tells(self, battery: str, state: State) -> bool:
+        """Whether this battery is a class of its own in that state."""
+
     def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
         """What the step is given."""
-
-
-def outline(memory: Memory) -> tuple[object, ...]:
-    """The coarsest cut: where a bay is, and the worst fault's effect."""
-    faults = raised(memory.faults)
-    return memory.state, effect(*faults[0]) if faults else None
-
-
-def gist(memory: Memory) -> tuple[object, ...]:
-    """What tells two memories apart here: what decides where a bay can go, without times, values and texts."""
-    energised, witnessed = memory.state in ENERGISED, memory.witnessed
-    return (
-        *outline(memory),
-        any(fault.latched for fault in memory.faults.values()),
-        bool(memory.hold),
-        memory.paused,
-        memory.session is not None,
-        memory.full_pct is not None,
-        memory.qualified_s is not None,
-        energised and (memory.resumed, memory.ran, memory.order and memory.order.action, witnessed.proved),
-        memory.state in WAITS and bool(witnessed.proof),
-        memory.unverified,
-        memory.intends,
-        memory.state in RESTING and (witnessed.sees, witnessed.unordered_s >= UNORDERED_S),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +57,7 @@ class Expanded:
     broken: Sequence[tuple[str, str, Move]]  #: properties that do not hold, by what, and the move that shows it
     changes: frozenset[tuple[State, State]]
     steps: int
+    soon: Mapping[tuple[str, str], object]  #: the gist after the next moment in lasting surroundings
 
 
 @dataclass(slots=True)
@@ -138,16 +112,22 @@ class Walk:
     def expand(self, place: Place, *, in_pairs: bool) -> Expanded:
         """Every move from there. What it has told of before, it leaves out."""
         reached, broken, changes, steps = [], [], set(), 0
-        for move in (*self.inputs.moves(), *(self.inputs.pairs() if in_pairs else ())):
+        state, soon = place.memory.state, {}
+        for move in (*self.inputs.moves(state), *(self.inputs.pairs(state) if in_pairs else ())):
             taken = self.take(place, move)
             steps += 1
             broken += [(name, text, move) for name, text in self.news(taken)]
             if taken.before.state is not taken.after.state and not move.restart:  # another life is no change of state
                 changes.add((taken.before.state, taken.after.state))
-            if not taken.error and (key := self.gist(taken.after)) not in self._told:
+            if taken.error:
+                continue
+            key = self.gist(taken.after)
+            if move.lasts and move.dt_s == TICK_S:
+                soon[move.charger, move.battery] = key
+            if key not in self._told:
                 self._told.add(key)
                 reached.append((key, move, Place(taken.after, taken.now_s)))
-        return Expanded(reached, broken, frozenset(changes), steps)
+        return Expanded(reached, broken, frozenset(changes), steps, soon)
 
 
 class Each(Protocol):
@@ -182,6 +162,7 @@ class Explorer:
     steps: int = 0
     found: dict[str, Counterexample] = field(default_factory=dict)
     changes: set[tuple[State, State]] = field(default_factory=set)  #: changes of state that were seen
+    soon: dict[object, Mapping[tuple[str, str], object]] = field(default_factory=dict)  #: by gist, as in `Expanded`
     _paired: set[object] = field(default_factory=set)  # outlines
 
     def run(self, until: str = "", most: int = 1_000_000) -> None:
@@ -209,6 +190,7 @@ class Explorer:
         self.steps += expanded.steps
         self.watch(self.steps)
         self.changes |= expanded.changes
+        self.soon[self.walk.gist(node.place.memory)] = expanded.soon
         for name, text, move in expanded.broken:
             self.find(name, text, node, (move,))
         for key, move, place in expanded.reached:

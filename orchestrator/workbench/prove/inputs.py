@@ -28,13 +28,14 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.workbench.prove.batteries import Shown, batteries
-from orchestrator.workbench.prove.story import Move
+from orchestrator.workbench.prove.story import TICK_S, Move
 
 #: Ages at the moment of the step: an order and a stop were written this long ago, readings were asked for after that.
 SENT_AGE_S, READ_AGE_S, OLD_S = 0.1, 0.05, 30.0
-TICK_S = 0.25
 #: Of two timers that are no farther apart than this, a jump past the longer one is past both.
 ALIKE = 1.1
+#: Where the tables of steps are looked at, or may be at the end of the step.
+AT_WORK = ENERGISED | {State.QUALIFYING}
 #: What flows in precharge.
 PRECHARGE_A = 1.0
 #: What a charger shows in each stage.
@@ -133,10 +134,11 @@ class StationInputs:
         """All classes that the bay's policy and station file cut."""
         return cls(rules, jumps(rules), CHARGERS, batteries(rules))
 
-    def moves(self) -> Iterator[Move]:
+    def moves(self, state: State) -> Iterator[Move]:
         """Each class in the next moment and after each jump, and every request in the plainest surroundings."""
+        constants = [(charger, battery) for charger, battery in self.constants() if self.tells(battery, state)]
         for dt_s in (TICK_S, *self.jumps_s):
-            for charger, battery in self.constants():
+            for charger, battery in constants:
                 yield Move(dt_s, charger, battery)
         for request in Request:
             for charger in ("obeys", "runs, whatever it is told", "silent", "stands by, whatever it is told"):
@@ -149,14 +151,19 @@ class StationInputs:
             if charger in self.chargers:
                 yield Move(TICK_S, charger, "healthy", restart=True)
 
-    def pairs(self) -> Iterator[Move]:
+    def pairs(self, state: State) -> Iterator[Move]:
         """Every charger with every battery in the next moment."""
-        return (Move(TICK_S, charger, battery) for charger in self.chargers for battery in self.batteries)
+        batteries = [battery for battery in self.batteries if self.tells(battery, state)]
+        return (Move(TICK_S, charger, battery) for charger in self.chargers for battery in batteries)
 
     def constants(self) -> Iterator[tuple[str, str]]:
         """Each charger with a healthy battery, each battery with an obedient charger."""
         yield from ((charger, "healthy") for charger in self.chargers)
-        yield from (("obeys", battery) for battery in self.batteries)
+        yield from (("obeys", battery) for battery in self.batteries if battery != "healthy")
+
+    def tells(self, battery: str, state: State) -> bool:
+        """Whether it is a class of its own in this state: at rest nobody looks at the tables of steps."""
+        return state in AT_WORK or not self.batteries[battery].at_work
 
     def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
         """What the step is given."""

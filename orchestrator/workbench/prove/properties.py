@@ -7,7 +7,17 @@ predicates, so that a mistake in one of those does not hide here.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from orchestrator.model import ENERGISED, STOP, Action, Decision, Effect, Operation, Request, State
+from orchestrator.model import ENERGISED, STOP, Action, Decision, Effect, Operation, State
+from orchestrator.workbench.prove.consent import (
+    UNPROVED,
+    a_death_in_mid_charge_holds,
+    alarmed,
+    held_until_started,
+    latched_until_reset,
+    operator_stops,
+    tripped_until_reset,
+    waits_for_a_start,
+)
 from orchestrator.workbench.prove.story import Taken
 
 #: The ages that evidence may have (DESIGN §6): a charger's silence is noticed within 2 s, fast values of a BMU go stale
@@ -21,9 +31,8 @@ VERIFY_S = 3.0
 FAST, SLOW = ("voltage_v", "current_a", "status", "temperature_c"), ("soc_pct", "soh_pct")
 
 RUNS = frozenset({Action.RESUME, Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE, Action.RUN})
-UNPROVED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
 #: States of verified standby.
-STANDBY = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
+STANDBY = frozenset({State.IDLE, State.HELD, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,40 +82,6 @@ def no_current_under_a_fault(taken: Taken) -> str | None:
     if worst >= Effect.PAUSE and _runs(taken):
         return f"runs with {taken.decision.faults[0].id} in force"
     return None
-
-
-def operator_stops(taken: Taken) -> str | None:
-    """A stop or a pause of the operator takes effect in the same step, unless it is answered with a reason."""
-    asked = taken.snapshot.request
-    if asked not in (Request.STOP, Request.PAUSE) or taken.decision.answer:
-        return None
-    return f"{asked} was accepted, and the bay runs" if taken.after.state in ENERGISED else None
-
-
-def held_until_started(taken: Taken) -> str | None:
-    """What an operator stopped, only an operator starts."""
-    before, after = taken.before, taken.after
-    if before.hold and not after.hold and taken.snapshot.request is not Request.START:
-        return "the hold was lifted without a start"
-    return "runs in spite of a hold" if after.hold and after.state in ENERGISED else None
-
-
-def tripped_until_reset(taken: Taken) -> str | None:
-    """TRIPPED is left by a person's reset, or to stop a charger that runs."""
-    if taken.before.state is not State.TRIPPED or taken.after.state in (State.TRIPPED, State.STOPPING):
-        return None
-    if taken.move.restart and taken.after.state in UNPROVED:
-        return None  # the stop is verified anew; what has latched is looked after by its own property
-    return None if taken.snapshot.request is Request.RESET else f"left for {taken.after.state} without a reset"
-
-
-def latched_until_reset(taken: Taken) -> str | None:
-    """A fault that has latched, only a reset takes away."""
-    gone = [
-        name for name, fault in taken.before.faults.items()
-        if fault.latched and (name not in taken.after.faults or not taken.after.faults[name].latched)
-    ]  # fmt: skip
-    return f"{gone[0]} has gone without a reset" if gone and taken.snapshot.request is not Request.RESET else None
 
 
 def charge_begins_qualified(taken: Taken) -> str | None:
@@ -169,15 +144,6 @@ def unproved_stops(taken: Taken) -> str | None:
     return None
 
 
-def alarmed(taken: Taken) -> str | None:
-    """People are told of a charger that is out of control, and of one that a run before left and nobody verified."""
-    left = taken.after.unverified and taken.after.state in (State.STARTING, State.OFFLINE)
-    shared = bool(taken.snapshot.charger_link.locked_by)
-    must, may = taken.after.state is State.UNCONTROLLABLE or left, shared or "port_locked" in taken.after.faults
-    wrong = (must and not taken.decision.alarm) or (taken.decision.alarm and not (must or may))
-    return f"alarm {taken.decision.alarm} in {taken.after.state}" if wrong else None
-
-
 def unordered_current_stops(taken: Taken) -> str | None:
     """DESIGN §2: a charger that reports 0 A while the BMU sees 14 A is running."""
     amps, before = taken.snapshot.battery.current_a, taken.before
@@ -187,14 +153,6 @@ def unordered_current_stops(taken: Taken) -> str | None:
     if taken.after.state in STANDBY and since_s >= UNORDERED_S and taken.decision.command != STOP:
         return f"{taken.after.state} without a stop, and the BMU has seen {amps.value:.1f} A for {since_s:.1f} s"
     return None
-
-
-def a_death_in_mid_charge_holds(taken: Taken) -> str | None:
-    """A charge that nobody ended waits for a person."""
-    ran = taken.before.state in ENERGISED or taken.before.unverified
-    if not taken.move.restart or not ran:
-        return None
-    return None if "found_running" in taken.after.faults else f"{taken.after.state} without a fault that waits"
 
 
 def counts_over_restarts(taken: Taken) -> str | None:
@@ -244,6 +202,7 @@ PROPERTIES: tuple[Property, ...] = (
     Property("no current", "nothing runs while a fault of effect PAUSE or worse is in force", no_current_under_a_fault),
     Property("operator", "an accepted stop or pause takes effect in the same step", operator_stops),
     Property("hold", "what an operator stopped, only an operator starts", held_until_started),
+    Property("held", "HELD is left by a person's start only, and says so", waits_for_a_start),
     Property("tripped", "TRIPPED is left by a reset, or to stop", tripped_until_reset),
     Property("latched", "a latched fault is taken away by a reset only", latched_until_reset),
     Property("qualified", "current begins after QUALIFYING only", charge_begins_qualified),
@@ -252,7 +211,7 @@ PROPERTIES: tuple[Property, ...] = (
     Property("voltage limit", "nothing runs above the station's voltage", within_volts),
     Property("temperature limit", "nothing runs outside the station's temperatures", within_temperature),
     Property("standing stop", "stop is the order until standby is proved", unproved_stops),
-    Property("alarm", "the alarm means that a charger is, or may be, out of control", alarmed),
+    Property("alarm", "danger: a charger may be out of control; attention: a fault waits for a person", alarmed),
     Property("unordered", "current that nobody ordered is stopped, whatever the charger says", unordered_current_stops),
     Property("death", "a service that dies in mid-charge waits for a person", a_death_in_mid_charge_holds),
     Property("counters", "no limit begins anew with a restart", counts_over_restarts),

@@ -10,6 +10,8 @@ from orchestrator.text.catalogue import say
 
 #: Where time begins in a story; not 0, so that nobody takes "never" for a time.
 BEGIN_S = 1000.0
+#: The next moment: how often a bay is looked at, or nearly.
+TICK_S = 0.25
 WITH_VALUE = (Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE)
 
 
@@ -24,6 +26,11 @@ class Move:
     internal: str = ""
     ending: str = ""
     restart: bool = False  #: the service has died, and begins again with what it had written down
+
+    @property
+    def lasts(self) -> bool:
+        """Nothing but surroundings, which may go on."""
+        return self.request is None and not (self.internal or self.ending or self.restart)
 
     def __str__(self) -> str:
         asked = f"; operator: {self.request}" if self.request else ""

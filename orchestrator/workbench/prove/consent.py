@@ -1,0 +1,117 @@
+"""The safety properties about people: what only they may undo, and what they are told of.
+
+As in `properties.py`, nothing here asks the core's own predicates; of the fault table it takes what a row says of
+itself.
+"""
+
+from collections.abc import Iterator
+
+from orchestrator.core.faults import ROW, Clear
+from orchestrator.core.memory import Memory
+from orchestrator.model import ENERGISED, Alarm, Cause, Request, State
+from orchestrator.workbench.prove.story import Taken
+
+UNPROVED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
+#: States in which no person need act before a charge.
+READY = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED}) | ENERGISED
+
+
+def operator_stops(taken: Taken) -> str | None:
+    """A stop or a pause of the operator takes effect in the same step, unless it is answered with a reason."""
+    asked = taken.snapshot.request
+    if asked not in (Request.STOP, Request.PAUSE) or taken.decision.answer:
+        return None
+    return f"{asked} was accepted, and the bay runs" if taken.after.state in ENERGISED else None
+
+
+def held_until_started(taken: Taken) -> str | None:
+    """What an operator stopped, only an operator starts."""
+    before, after = taken.before, taken.after
+    if before.hold and not after.hold and taken.snapshot.request is not Request.START:
+        return "the hold was lifted without a start"
+    return "runs in spite of a hold" if after.hold and after.state in ENERGISED else None
+
+
+def _waiting(memory: Memory) -> set[str]:
+    """The faults in force that only a person's start ends."""
+    return {
+        name for name, fault in memory.faults.items()
+        if fault.raised_s is not None and ROW[name].clear is Clear.OPERATOR
+    }  # fmt: skip
+
+
+def waits_for_a_start(taken: Taken) -> str | None:
+    """HELD is left by a person's start only, or to verify the stop anew; it says what to type, once.
+
+    A battery that leaves takes with it the faults that its leaving explains, and no others.
+    """
+    before, after, asked = taken.before, taken.after, taken.snapshot.request
+    gone = _waiting(before) - _waiting(after)
+    left = {name for name in gone if ROW[name].departs and not taken.snapshot.battery_link.online}
+    if gone > left and asked not in (Request.START, Request.RESET):
+        return f"{min(gone - left)} has gone without a person"
+    waits = bool(after.hold or _waiting(after))
+    if waits and after.state in READY:
+        return f"{after.state}, though a person must start"
+    if before.state is State.HELD and after.state in READY and not (asked is Request.START or left):
+        return f"HELD was left for {after.state} without a start"
+    return _says_what_to_type(taken, waits=waits) if after.state is State.HELD else None
+
+
+def _says_what_to_type(taken: Taken, *, waits: bool) -> str | None:
+    if not waits:
+        return "HELD, and nothing waits for a person"
+    told = [cause.param("bay") for cause in _parts(taken.decision.cause) if cause.id == "start_bay"]
+    return None if told == [taken.rules.bay.name] else f"HELD tells to start {told}"
+
+
+def _parts(cause: Cause) -> Iterator[Cause]:
+    """A cause and all those that are parameters in it."""
+    yield cause
+    for _, value in cause.params:
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, Cause):
+                yield from _parts(part)
+
+
+def tripped_until_reset(taken: Taken) -> str | None:
+    """TRIPPED is left by a person's reset, or to stop a charger that runs."""
+    if taken.before.state is not State.TRIPPED or taken.after.state in (State.TRIPPED, State.STOPPING):
+        return None
+    if taken.move.restart and taken.after.state in UNPROVED:
+        return None  # the stop is verified anew; what has latched is looked after by its own property
+    return None if taken.snapshot.request is Request.RESET else f"left for {taken.after.state} without a reset"
+
+
+def latched_until_reset(taken: Taken) -> str | None:
+    """A fault that has latched, only a reset takes away."""
+    gone = [
+        name for name, fault in taken.before.faults.items()
+        if fault.latched and (name not in taken.after.faults or not taken.after.faults[name].latched)
+    ]  # fmt: skip
+    return f"{gone[0]} has gone without a reset" if gone and taken.snapshot.request is not Request.RESET else None
+
+
+def a_death_in_mid_charge_holds(taken: Taken) -> str | None:
+    """A charge that nobody ended waits for a person."""
+    ran = taken.before.state in ENERGISED or taken.before.unverified
+    if not taken.move.restart or not ran:
+        return None
+    return None if "found_running" in taken.after.faults else f"{taken.after.state} without a fault that waits"
+
+
+def alarmed(taken: Taken) -> str | None:
+    """People are told of a charger that is out of control, and of one that a run before left and nobody verified.
+
+    And of one that stands by until a person has seen to a fault; but not of what an operator has stopped.
+    """
+    after, alarm = taken.after, taken.decision.alarm
+    left = after.unverified and after.state in (State.STARTING, State.OFFLINE)
+    shared = bool(taken.snapshot.charger_link.locked_by) or "port_locked" in after.faults
+    if after.state is State.UNCONTROLLABLE or left:
+        right = alarm is Alarm.DANGER
+    elif after.state is State.TRIPPED or (after.state is State.HELD and _waiting(after)):
+        right = alarm is Alarm.ATTENTION or (shared and alarm is Alarm.DANGER)
+    else:
+        right = alarm is Alarm.NONE or (shared and alarm is Alarm.DANGER)
+    return None if right else f"alarm {alarm.name} in {after.state}"
