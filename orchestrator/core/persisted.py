@@ -15,6 +15,8 @@ from orchestrator.model.cause import together
 
 #: In these a charger may be delivering current.
 RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
+#: Mere counters are written this often while nothing else changes.
+COUNTERS_S = 30.0
 UNFINISHED = Cause("unfinished")
 
 Age = float  #: seconds, at the moment when it was written down
@@ -80,8 +82,8 @@ class Persisted:
         resets = tuple(name for _, name in self.resets)
         return self.running, self.hold, self.paused, faults, resets, self.session is not None, self.full_pct is None
 
-    def aged(self, seconds: float) -> "Persisted":
-        """The same so much later."""
+    def aged(self, seconds: float, unseen_s: float | None = None) -> "Persisted":
+        """The same so much later; `unseen_s` where that is not for how long nobody has counted."""
         return replace(
             self,
             faults={
@@ -94,8 +96,25 @@ class Persisted:
                 for name, fault in self.faults.items()
             },
             resets=tuple((age_s + seconds, name) for age_s, name in self.resets),
-            session=replace(self.session, started_s=self.session.started_s + seconds) if self.session else None,
+            session=self._session(seconds, unseen_s),
             soc=(self.soc[0] + seconds, self.soc[1]) if self.soc is not None else None,
+        )
+
+    def _session(self, seconds: float, unseen_s: float | None) -> Session | None:
+        """A charger that ran has gone on after its counters were written, at the longest until they would have been
+        written again."""
+        session = self.session
+        if session is None:
+            return None
+        more_s = min(seconds if unseen_s is None else unseen_s, COUNTERS_S) if self.running else 0.0
+        continuous = session.continuous_s > 0
+        return replace(
+            session,
+            started_s=session.started_s + seconds,
+            unseen_s=session.unseen_s + more_s,
+            pulse_s=session.pulse_s + (0.0 if continuous else more_s),
+            continuous_s=session.continuous_s + (more_s if continuous else 0.0),
+            rise_s=session.rise_s + more_s,
         )
 
     def memory(self, now_s: float) -> Memory:

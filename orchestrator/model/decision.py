@@ -129,6 +129,7 @@ class Session:
     continuous_s: float = 0.0  #: … and in continuous precharge, pauses not counted
     rise_s: float = 0.0  #: spent in precharge since the pack's rise was last counted from the beginning …
     rise_v: float | None = None  #: … at this pack voltage; None: precharge has not begun
+    unseen_s: float = 0.0  #: for so long it may have gone on before a kill, uncounted: the limits count it as charged
     result: Cause | None = None  #: why it ended; None while it goes on
 
 

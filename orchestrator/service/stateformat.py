@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
 from orchestrator.config.station import Rs485
-from orchestrator.core.persisted import Persisted, from_first_format
+from orchestrator.core.persisted import COUNTERS_S, Persisted, from_first_format
 from orchestrator.model import Cause, ControlMode
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.sentences import of_sentences, said
@@ -98,7 +98,8 @@ def _entries(values: object, age_s: float, *, sentences: bool) -> Iterator[Entry
             raise ValueError(f"{', '.join(sorted(NEEDED - value.keys()))} is missing")
         plain = {key: one for key, one in value.items() if key not in PLACE}
         persisted: Persisted = structure(of_sentences(plain) if sentences else plain, Persisted)
-        yield Entry(place, persisted.aged(age_s), structure(value.get("run"), int))
+        unseen_s = age_s or COUNTERS_S  # an age that cannot be told is 0
+        yield Entry(place, persisted.aged(age_s, unseen_s), structure(value.get("run"), int))
 
 
 def _path(value: object) -> str:

@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.core.persisted import Persisted
+from orchestrator.core.persisted import COUNTERS_S, Persisted
 from orchestrator.errors import ServiceError
 from orchestrator.model import Cause
 from orchestrator.service.disk import lock_file, make_directory, replace_file
@@ -27,8 +27,6 @@ from orchestrator.service.stateformat import Stamp, encode
 LOCK = "lock"
 #: A change that is not on disk within this counts as not kept (FAULTS P9).
 KEPT_WITHIN_S = 2.0
-#: Mere counters are written this often while nothing else changes.
-COUNTERS_S = 30.0
 #: A disk that refused is asked again this often.
 RETRY_S = 1.0
 #: A service that has just been killed may hold the lock for so long.

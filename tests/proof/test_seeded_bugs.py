@@ -66,7 +66,7 @@ def trip_is_no_latch(patch: Patch) -> None:
 
 def stop_is_not_heard(patch: Patch) -> None:
     hear = operator.hear
-    patch.setattr(step_module, "hear", lambda m, asked, *now: None if asked is Request.STOP else hear(m, asked, *now))
+    patch.setattr(step_module, "hear", lambda m, asked, *more: None if asked is Request.STOP else hear(m, asked, *more))
 
 
 def reset_starts(patch: Patch) -> None:
@@ -77,7 +77,7 @@ def reset_starts(patch: Patch) -> None:
     hear = operator.hear
     patch.setattr(
         step_module, "hear",
-        lambda memory, asked, *now: reset(memory, now[0]) if asked is Request.RESET else hear(memory, asked, *now),
+        lambda m, asked, now_s, *more: reset(m, now_s) if asked is Request.RESET else hear(m, asked, now_s, *more),
     )  # fmt: skip
 
 

@@ -194,6 +194,12 @@ PORTS = {
 
 #: 6. Limits that a restart forgets.
 LIMITS = {
+    "ampere-hours over kills": scene(
+        *(one for t_s in (17.0, 37.0, 57.0) for one in (Hazard(t_s, "kill both"), Hazard(t_s + 5, "boot"))),
+        *(Hazard(t_s, "ask", 0, None, "start") for t_s in (25.0, 45.0, 65.0)),
+        bays=(Bay(small=True), Bay(), Bay()),
+        end_s=90.0,
+    ),
     "ampere-hours, the clock a day back": scene(
         *(
             one

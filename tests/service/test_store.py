@@ -14,12 +14,12 @@ import pytest
 
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.operator import OWN, STOPPED
-from orchestrator.core.persisted import Persisted, PersistedFault
+from orchestrator.core.persisted import COUNTERS_S, Persisted, PersistedFault
 from orchestrator.errors import ServiceError
 from orchestrator.model import Cause, Session
 from orchestrator.service.loading import FILE, FIRST_FILE
 from orchestrator.service.past import Place
-from orchestrator.service.store import COUNTERS_S, KEPT_WITHIN_S, Store
+from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.text.catalogue import say
 from tests.core.said import cause
 from tests.service.disks import FULL, WornDisk

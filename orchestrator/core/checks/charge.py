@@ -36,9 +36,12 @@ def precharge_too_long(f: Facts) -> Cause | None:
 def time_limit(f: Facts) -> Cause | None:
     """FAULTS C17."""
     session, hours = f.memory.session, f.rules.policy.finish.max_hours
-    if session is None or session.energised_s <= hours * 3600:
+    if session is None:
         return None
-    return f.rules.by_policy("time_limit", "finish.max_hours", lasted_h=session.energised_s / 3600, limit_h=hours)
+    took_s = session.energised_s + session.unseen_s
+    if took_s <= hours * 3600:
+        return None
+    return f.rules.by_policy("time_limit", "finish.max_hours", lasted_h=took_s / 3600, limit_h=hours)
 
 
 def ah_limit(f: Facts) -> Cause | None:
@@ -48,9 +51,10 @@ def ah_limit(f: Facts) -> Cause | None:
         return None
     begun_pct = session.soc_start_pct or 0.0
     need = min(1.0, (100.0 - begun_pct + SOC_ERROR_PCT) / 100.0)
-    if session.charged_ah <= need * max_ah:
+    charged_ah = session.charged_ah + session.unseen_s / 3600 * f.rules.bay.limits.current_a
+    if charged_ah <= need * max_ah:
         return None
     return f.rules.by_policy(
         "ah_limit", "finish.max_ah",
-        charged_ah=session.charged_ah, begun_pct=begun_pct, whole_ah=max_ah, limit_ah=need * max_ah,
+        charged_ah=charged_ah, begun_pct=begun_pct, whole_ah=max_ah, limit_ah=need * max_ah,
     )  # fmt: skip
