@@ -1,8 +1,12 @@
 """The status document as text for a terminal: what to do first, then one line a bay, and why."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
+
+from orchestrator.text.document import in_language
+from orchestrator.text.language import language_of
 
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
 #: The battery's values in the table, with their names for people.
@@ -22,8 +26,14 @@ STANDBY_A, BMU_A = 0.5, 1.0
 Bay = Mapping[str, object]
 
 
-def page(document: Mapping[str, object]) -> str:
+def own_language() -> str:
+    """What the user of this terminal reads; "" where nobody says."""
+    return language_of(os.environ)
+
+
+def page(document: Mapping[str, object], language: str = "") -> str:
     """The whole status: what to do, the bays, and what is wrong with the station itself."""
+    document = in_language(document, language)
     lines = [f"ALARM: {text}" for text in strays(document)]
     lines.append(table(cast("Sequence[Bay]", document["bays"])))
     problems = (

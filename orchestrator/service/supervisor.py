@@ -59,7 +59,7 @@ class Supervisor:
     """The service for one station. `run` returns when the service was told to end."""
 
     def __init__(self, station: Station, guardian: GuardianLink) -> None:
-        self._station, self._language = station, "en"
+        self._station, self._language = station, station.language.value
         self._guardian = guardian
         self._beat_s = 0.0
         self._lost = ""  # why the guardian cannot be relied on any more

@@ -49,15 +49,18 @@ LANGUAGES: Mapping[str, Language] = {
 }
 
 
-def say(cause: Cause | None, language: str = "en") -> str:
-    """The sentence; "" for no cause. A language that is not known is English."""
+def say(cause: Cause | None, language: str = "en", otherwise: str = "") -> str:
+    """The sentence; "" for no cause. A language that is not known is English.
+
+    `otherwise` is what to say of a cause that is not understood, if its data are not to be shown.
+    """
     if cause is None:
         return ""
     texts = LANGUAGES.get(language, LANGUAGES["en"])
     try:
         return _sentence(cause, texts)[:MOST_CHARACTERS]
     except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError):
-        return _data(cause, texts)
+        return otherwise or _data(cause, texts)
 
 
 def fields(cause: Cause | None, language: str = "en") -> dict[str, object] | None:

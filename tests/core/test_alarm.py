@@ -7,10 +7,11 @@ from orchestrator.core.faults import FAULTS, Clear, Row
 from orchestrator.core.memory import Memory
 from orchestrator.core.operator import RESET, STOPPED
 from orchestrator.model import ActiveFault, Alarm, Cause, Request, State
+from orchestrator.text.catalogue import advise
 from tests.core.bays import IN, held, idle, running_at_the_start, tripped
 from tests.core.said import reason_of
 
-ADVICE = [row.advice for row in FAULTS if row.clear is Clear.OPERATOR]
+ADVICE = [advise(row.id) for row in FAULTS if row.clear is Clear.OPERATOR]
 
 
 def test_the_worst_of_many_is_the_highest() -> None:

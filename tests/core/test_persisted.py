@@ -406,7 +406,9 @@ def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, 
         assert after.session is not None
         aged = after_s - after.session.started_s
         assert aged == pytest.approx(before_s - before.session.started_s + gap_s)
-        assert replace(after.session, started_s=0.0) == replace(before.session, started_s=0.0)
+        counted = {name: getattr(before.session, name) for name in ("pulse_s", "continuous_s", "rise_s", "unseen_s")}
+        assert all(getattr(after.session, name) >= seconds for name, seconds in counted.items())
+        assert replace(after.session, started_s=0.0, **counted) == replace(before.session, started_s=0.0)
 
 
 # --- forms ------------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from string import Formatter
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -12,6 +13,7 @@ from orchestrator.model import Cause, Effect
 from orchestrator.model.cause import SEVERAL, from_plain, plain, together
 from orchestrator.show import CUT_THE_MAINS
 from orchestrator.text.catalogue import LANGUAGES, advise, fields, say
+from orchestrator.text.document import in_language, refusals
 from orchestrator.text.language import language_of
 
 EN, KO = LANGUAGES["en"], LANGUAGES["ko"]
@@ -173,7 +175,7 @@ def test_what_is_no_cause_is_refused(value: object) -> None:
 @pytest.mark.parametrize(
     ("environment", "language"),
     [
-        ({}, "en"), ({"LANG": "C"}, "en"), ({"LANG": "C.UTF-8"}, "en"), ({"LANG": "ko_KR.UTF-8"}, "ko"),
+        ({}, ""), ({"LANG": "C"}, "en"), ({"LANG": "C.UTF-8"}, "en"), ({"LANG": "ko_KR.UTF-8"}, "ko"),
         ({"LANG": "ko"}, "ko"), ({"LANG": "de_DE.UTF-8"}, "en"), ({"LC_ALL": "en_US", "LANG": "ko_KR"}, "en"),
         ({"LC_ALL": "", "LC_MESSAGES": "ko_KR.UTF-8", "LANG": "en_GB"}, "ko"),
     ],
@@ -186,3 +188,30 @@ def test_the_effect_that_is_said_first_is_the_one_of_the_core() -> None:
     from orchestrator.text.catalogue import TRIP
 
     assert Effect.TRIP.name == TRIP
+
+
+def status(cause: Cause) -> dict[str, Any]:
+    told = fields(cause)
+    fault = {"id": "over_temperature", "text": say(cause), "cause": told}
+    return {"bays": [{"name": "bay-1", "reason": say(cause), "cause": told, "step_rule": "", "faults": [fault]}]}
+
+
+def test_a_document_is_said_in_the_readers_language() -> None:
+    document = status(HOT)
+    (bay,) = in_language(document, "ko")["bays"]
+    assert (bay["reason"], bay["faults"][0]["text"], bay["step_rule"]) == (say(HOT, "ko"), say(HOT, "ko"), "")
+    assert in_language(document, "en") == document
+    assert in_language(document, "") == document
+
+
+def test_what_a_newer_service_says_stays_as_it_said_it() -> None:
+    for cause in ({"id": "of_tomorrow", "params": {}}, {"id": "late", "params": {}}, {"id": "late", "more": 1}, None):
+        document: dict[str, Any] = {"bays": [{"reason": "what it said", "cause": cause, "faults": []}]}
+        assert in_language(document, "ko")["bays"][0]["reason"] == "what it said"
+
+
+def test_a_refusal_is_said_in_the_readers_language() -> None:
+    answer = {"results": {"bay-1": "", "bay-2": "not done"}, "causes": {"bay-2": plain(Cause("overtaken"))}}
+    assert refusals(answer, "ko") == {"bay-1": "", "bay-2": say(Cause("overtaken"), "ko")}
+    assert refusals(answer, "") == answer["results"]
+    assert refusals({"results": {"bay-2": "no"}}, "ko") == {"bay-2": "no"}
