@@ -4,6 +4,7 @@ The rules read the source, so that an import inside a function or for typing onl
 """
 
 import ast
+import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -285,3 +286,45 @@ KEPT: tuple[tuple[str, str], ...] = (
 @pytest.mark.parametrize(("name", "source"), KEPT, ids=name_of)
 def test_what_is_allowed_is_not_complained_about(name: str, source: str) -> None:
     assert [complaint for rule in RULES for complaint in rule(Module(name, source))] == []
+
+
+#: Parts that make causes. A sentence in them is one that nobody can translate, or compare.
+SILENT = ("core",)
+WORD, WORDS = re.compile("[a-z]{2,}"), 3
+#: (module, the beginning of what is still said there)
+SAID = frozenset(
+    {
+        ("core.limits", "the highest step, nothing"),
+        ("core.limits", "the station's current limit"),
+        ("core.limits", "outside of its table"),
+        ("core.machine", " is not possible in "),  # an error of the program, for who mends it
+    }
+)
+
+
+def sentences(module: Module) -> Iterator[str]:
+    """No text of three words or more but in docstrings."""
+    if not within(module.name, SILENT):
+        return
+    tree = ast.parse(module.source, module.name)
+    docs = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+            said = any(module.name == name and node.value.startswith(text) for name, text in SAID)
+            if sum(bool(WORD.search(word)) for word in node.value.split()) >= WORDS and not said:
+                yield f"{module.name}:{node.lineno}: says {node.value!r}"
+
+
+def test_the_core_says_nothing_in_words() -> None:
+    assert [complaint for module in product() for complaint in sentences(module)] == []
+
+
+def test_a_sentence_in_the_core_is_seen() -> None:
+    assert list(sentences(Module("core.step", '"""Of the module."""\nx = f"the pack has {y} V, below"\n')))
+    assert not list(sentences(Module("core.step", '"""Of the module, in words."""\nx = "a_word", "two words"\n')))

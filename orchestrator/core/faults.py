@@ -47,7 +47,7 @@ FOLLOWS_S = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One fault: when it is raised, what it does, how it ends. What to do stands in the catalogue of texts, by its id."""
+    """One fault: when it is raised, what it does, how it ends. What to do about it stands in `text/`, by its id."""
 
     id: str
     source: str  #: its number in the fault catalogue

@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -290,3 +291,23 @@ def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: py
     assert (
         "pipe.jsonl:1:1: error: cannot be read: this is a pipe (FIFO); expected is a journal" in capsys.readouterr().err
     )
+
+
+def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(journal: Path, tmp_path: Path) -> None:
+    (tmp_path / "journal").mkdir()
+    for path in journal.glob("*.jsonl"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        old = [json.dumps(_with_sentences(json.loads(line))) for line in lines]
+        (tmp_path / "journal" / path.name).write_text("\n".join(old) + "\n", encoding="utf-8")
+    record = read([tmp_path / "journal"])
+    assert record.bays == {}
+    assert {finding.text for finding in record.broken} == {
+        "an older version of this service has recorded this step: only that version can decide it again"
+    }
+
+
+def _with_sentences(line: dict[str, Any]) -> dict[str, Any]:
+    if line.get("whole"):
+        del line["memory"]["cause"]
+        line["memory"]["reason"] = "no battery"
+    return line

@@ -44,6 +44,10 @@ _CONVERTER.register_structure_hook(Path, lambda text, _: Path(text))
 _CONVERTER.register_structure_hook(Cause, lambda value, _: from_plain(value))
 
 
+class _OlderError(Exception):
+    """A line that has sentences where the core has causes now."""
+
+
 @dataclass(slots=True)
 class Recorded:
     """One step as it was taken. `memory` and `rules` are there where the record begins anew."""
@@ -102,6 +106,9 @@ class _Reader:
             line = _line(text)
             if line["kind"] == "snapshot":
                 self._snapshot(line)
+        except _OlderError:
+            self.broken(path, number, SENTENCES)
+            return
         except (BaseValidationError, LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:
             self.broken(path, number, f"this is no line of a journal: {error!r:.200}")
             return
@@ -135,7 +142,7 @@ class _Reader:
         bay, at_s, parts = line["bay"], float(line["at_s"]), self._stream.parts
         if line.get("whole"):
             if "cause" not in line["memory"]:
-                raise ValueError(SENTENCES)
+                raise _OlderError
             plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
             memory = _CONVERTER.structure(line["memory"], Memory)
             rules = Rules.of(_CONVERTER.structure(line["config"], Bay))
