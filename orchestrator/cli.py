@@ -220,19 +220,20 @@ def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[
     `every`: and at chargers that are no bay's any more.
     """
     from orchestrator.lastresort.asking import ask
-    from orchestrator.show import is_alarming, stands_by, strays, what_to_do
+    from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do
+    from orchestrator.text.document import in_language
 
-    end_s = time.monotonic() + STANDBY_S
+    end_s, language = time.monotonic() + STANDBY_S, own_language()
     while True:
         try:
-            document = ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S))
+            document = in_language(ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S)), language)
         except ServiceError as error:
             return {name: f"{name}: NOT verified, run `orchestrator estop`: {error}" for name in names}
         found = cast("list[dict[str, object]]", document["bays"])
         bays = [bay for bay in found if bay["name"] in names and not stands_by(bay)]
-        others = strays(document) if every else []
+        others = strays(document, language) if every else []
         if time.monotonic() >= end_s or (all(map(is_alarming, bays)) and not others):
-            return {str(bay["name"]): what_to_do(bay) for bay in bays} | {text: text for text in others}
+            return {str(bay["name"]): what_to_do(bay, language) for bay in bays} | {text: text for text in others}
         time.sleep(LOOK_S)
 
 

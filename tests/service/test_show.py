@@ -5,7 +5,9 @@ from typing import cast
 
 import pytest
 
+from orchestrator.model import Cause
 from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
+from orchestrator.text.catalogue import fields
 
 
 def bay(**changes: object) -> dict[str, object]:
@@ -215,3 +217,17 @@ def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_w
     ]
     assert strays({}) == []
     assert page({"bays": [], "journal": {"problem": ""}}) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"
+
+
+def test_the_page_is_in_the_readers_language() -> None:
+    cause = fields(Cause.of("stopped_first"))
+    told = bay(state="OFFLINE", alarm="danger", cause=cause, reason="the charger is being stopped", port="/dev/x")
+    document = {"bays": [told], "strays": [{"bay": "bay-7", "port": "/dev/old", "problem": "", "state": "STOPPING",
+                                            "verified": False}]}  # fmt: skip
+    lines = page(document, "ko").splitlines()
+    assert lines[0].startswith("ALARM: bay-7의 것이었던 /dev/old의 충전기의 주전원을 차단하십시오")
+    assert lines[1] == (
+        "ALARM: bay-1의 충전기(/dev/x)의 주전원을 차단하십시오: OFFLINE: 다른 무엇보다 먼저 충전기를 정지하고 있습니다"
+    )
+    assert "the charger is being stopped" in page(document)
+    assert "the charger is being stopped before anything else" in page(document, "en")

@@ -41,6 +41,15 @@ TEXTS: Mapping[str, str] = {
     "no_lasting_standby": "its status does not show a standby that lasts",
     "bmu_sees": "the BMU sees {pack_a:.1f} A",
     "bmu_not_heard": "the BMU is not heard",
+    # what the table of the status adds
+    "cut_mains_of": "CUT THE MAINS of {bay}'s charger ({port}): {state}: {reason}",
+    "cut_mains_of_stray": "CUT THE MAINS of the charger on {port}, which was {bay}'s: it may be running, nobody has seen "
+    "that it stands by: {why}",
+    "look_at": "LOOK at {bay}'s charger ({port}), nobody has seen that it stands by: {state}: {reason}",
+    "port_unknown": "its port is not known",
+    "policy_waits": "a changed one comes into force when this bay stands by",
+    "old_charger": "the charger's {charger_a:.2f} A, last heard {age:word} ago{bmu:after}",
+    "old_values": "{names:word}: last heard {age:word} ago",
     # while current flows
     "precharge_impossible": "precharge without a rule for it, or without the pack's voltage",
     "precharging_pulse": "the pack is below {below_v:g} V: pulse precharge{at}",

@@ -22,6 +22,8 @@ WORDS: Mapping[str, str] = {
     "temperature": "temperature",
     "soc": "SOC",
     "soh": "SOH",
+    "pack_voltage": "pack voltage",
+    "long": "long",
     # times within an hour
     "nth_1": "1st",
     "nth_2": "2nd",

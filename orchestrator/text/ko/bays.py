@@ -41,6 +41,15 @@ TEXTS: Mapping[str, str] = {
     "no_lasting_standby": "충전기의 상태가 지속되는 대기를 보이지 않습니다",
     "bmu_sees": "BMU에는 {pack_a:.1f} A가 보입니다",
     "bmu_not_heard": "BMU가 응답하지 않습니다",
+    # what the table of the status adds
+    "cut_mains_of": "{bay}의 충전기({port})의 주전원을 차단하십시오: {state}: {reason}",
+    "cut_mains_of_stray": "{bay}의 것이었던 {port}의 충전기의 주전원을 차단하십시오: 동작 중일 수 있으며 대기 상태가 확인되지 "
+    "않았습니다: {why}",
+    "look_at": "{bay}의 충전기({port})를 확인하십시오. 대기 상태가 확인되지 않았습니다: {state}: {reason}",
+    "port_unknown": "포트를 알 수 없음",
+    "policy_waits": "변경된 정책은 이 베이가 대기 상태가 되면 적용됩니다",
+    "old_charger": "충전기의 {charger_a:.2f} A는 {age:word} 전의 값입니다{bmu:after}",
+    "old_values": "{names:word}: {age:word} 전의 값입니다",
     # while current flows
     "precharge_impossible": "프리차지 규칙이 없거나 팩 전압을 알 수 없습니다",
     "precharging_pulse": "팩 전압이 {below_v:g} V 아래입니다: 펄스 프리차지{at}",

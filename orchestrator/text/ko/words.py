@@ -22,6 +22,8 @@ WORDS: Mapping[str, str] = {
     "temperature": "온도",
     "soc": "SOC",
     "soh": "SOH",
+    "pack_voltage": "팩 전압",
+    "long": "오래",
     # times within an hour
     "nth_1": "1",
     "nth_2": "2",
