@@ -158,7 +158,7 @@ def _speed(runs: int) -> Iterator[str]:
     """Ours and theirs on the same charge: 14 A, then constant voltage down to 1 A, then rest."""
     shipped = load_scenario("deep-discharge")
     charge = replace(shipped, hours=HOURS, visits=(Visit(battery="pack-1", from_h=0, soc_pct=10),))
-    policy = load_policy(POLICY, changes={"current.soc_pct[1].step": "4", "finish.soc_pct": "100"})
+    policy = load_policy(POLICY, changes={"current.soc_pct.rows[1].max_a": "14", "finish.full.soc_pct": "100"})
     ours_s = _median_s(lambda: simulate(policy, charge), runs)
     experiment = _experiment(pack_of(charge.batteries["pack-1"]), charge)
     set_up_s = _median_s(lambda: experiment().solve(), runs)

@@ -91,5 +91,5 @@ def _too_much(action: Action, step: int | None, charger: ChargerConfig, limits: 
         return f"{action}: what the charger's current limit {step} means is not known"
     current_a = charger.steps_a[step]
     if not current_a <= limits.current_a:
-        return f"{action}: step {step} is {current_a:g} A, above the station's {limits.current_a:g} A"
+        return f"{action}: step {step + 1} is {current_a:g} A, above the station's {limits.current_a:g} A"
     return ""

@@ -165,9 +165,14 @@ def _row(bay: Bay) -> tuple[str, ...]:
         _marked(figure(battery["voltage_v"], "{:.2f} V"), old="voltage_v" in old),
         _marked(figure(charger["current_a"], "{:.2f} A"), old=bool(charger.get("old"))),
         _marked(figure(battery["temperature_c"], "{:.1f} °C"), old="temperature_c" in old),
-        "–" if step is None else f"{step} ({figure(bay.get('step_current_a'), '{:g} A')})",
+        step_of(step, bay.get("step_current_a")),
         "see ALARM" if is_alarming(bay) else str(bay["reason"]),
     )
+
+
+def step_of(index: object, current_a: object) -> str:
+    """A current step as people count them, 1 (lowest) … 5, with its amperes; the protocol counts from 0."""
+    return f"{index + 1} ({figure(current_a, '{:.1f} A')})" if isinstance(index, int) else "–"
 
 
 def _marked(text: str, *, old: bool) -> str:

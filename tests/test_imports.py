@@ -26,7 +26,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "protocol": ("errors", "keys", "model"),
     "config": ("errors", "keys", "model", "protocol.objects"),
     "interlock": ("config.policy", "config.station", "errors", "keys", "model"),
-    "core": ("config.policy", "config.station", "errors", "keys", "model"),
+    "core": ("config.amperes", "config.policy", "config.station", "errors", "keys", "model"),
     # What must work when nothing else does. Only the station file needs PyYAML.
     "lastresort": ("config.ports", "errors", "protocol.standby"),
     "link": ("errors", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.config.map_rules import MAP_RULES
 from orchestrator.config.policy import Policy
-from orchestrator.config.policy_rules import POLICY_RULES
+from orchestrator.config.policy_rules import policy_problems
 from orchestrator.config.rules import Problems, problems
 from orchestrator.config.scenario import Scenario
 from orchestrator.config.scenario_rules import SCENARIO_RULES
@@ -29,7 +29,7 @@ class Kind:
     rules: Callable[[Mapping[str, object]], Problems]
 
 
-POLICY = Kind("policy", "policy", Policy, "policies", lambda values: problems(POLICY_RULES, values))
+POLICY = Kind("policy", "policy", Policy, "policies", policy_problems)
 MAP = Kind("map", "object map", ObjectMap, "configs/maps", lambda values: problems(MAP_RULES, values))
 STATION = Kind("station", "station", Station, "configs/stations", station_problems)
 SCENARIO = Kind("scenario", "scenario", Scenario, "configs/scenarios", lambda values: problems(SCENARIO_RULES, values))

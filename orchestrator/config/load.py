@@ -13,10 +13,12 @@ from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems
 from orchestrator.config.scenario import Scenario
 from orchestrator.config.station import Station
+from orchestrator.config.stationsteps import Steps, named_steps
 from orchestrator.config.yaml.reader import Reader
 from orchestrator.config.yaml.scalars import UnfitError, nearest
 from orchestrator.config.yaml.schema import INVALID
 from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Node, Refused, parse
+from orchestrator.config.yesterday import Yesterday
 from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
 
@@ -103,6 +105,7 @@ class _Loader:
         self._trees: dict[str, Node | None] = {}
         self._digests: dict[str, str] = {}
         self._loaded: dict[tuple[str, str], object] = {}
+        self._steps_a: dict[str, Steps] = {}  # by policy file: the steps of the chargers that are to follow it
 
     def check(self, where: Place) -> None:
         """Reads a file of a kind that it says itself."""
@@ -140,8 +143,11 @@ class _Loader:
             Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),
             ObjectMap: lambda text: self.load(MAP, find(MAP, text, base)),
         }
-        digest = self._digests[os.path.realpath(where.path)]
-        reader = Reader(self._name(where), named if kind is STATION else {}, digest)
+        real = os.path.realpath(where.path)
+        if kind is STATION:
+            self._steps_a.update(named_steps(node, base))
+        yesterday = Yesterday(node, self._steps_a.get(real, ())) if kind is POLICY else None
+        reader = Reader(self._name(where), named if kind is STATION else {}, self._digests[real], yesterday)
         value = reader.read(kind.record, node)
         for path, text in kind.rules(reader.values):
             reader.report(path, text)

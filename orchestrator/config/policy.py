@@ -1,15 +1,41 @@
-"""A charging policy: what people tune, each key with its meaning and its bounds."""
+"""A charging policy: what people tune, each key with its meaning and its bounds.
+
+It is written for a pack, in amperes or C; which step of a charger that is, is worked out at the bay (`core/limits.py`).
+"""
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from orchestrator.keys import Range, Source, key
+
+
+class CellType(StrEnum):
+    """What the cells are made of: which volts belong to which state of charge, and what frost does to them."""
+
+    NMC = "nmc"
+    NCA = "nca"
+    LFP = "lfp"
+    LTO = "lto"
+
+
+class Needs(StrEnum):
+    """How many of the signs of a full pack must be there."""
+
+    ANY = "any"
+    ALL = "all"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pack:
     """The battery that this policy is for. Outside of these values no current flows."""
 
+    chemistry: CellType = key("what the cells are made of: nmc, nca, lfp or lto")
     cells_in_series: int = key("cells in series; the voltages of this file are checked against it", ge=1, le=200)
+    capacity_ah: float | None = key(
+        "rated capacity; with it rows may say max_c, and max_ah, max_hours and taper have defaults",
+        unit="Ah", gt=0, le=2000, default=None,
+    )  # fmt: skip
+    current_a: float = key("the highest charging current that the data sheet allows", unit="A", gt=0, le=1000)
     voltage_v: Range = key("pack voltage: below it a charge is refused, above it is over-voltage", unit="V", gt=0)
     temperature_c: Range = key("outside of it charging pauses until well inside again", unit="°C", ge=-30, le=55)
     soh_min_pct: float = key("a pack with less health is refused", unit="%", ge=1, le=100)
@@ -54,9 +80,10 @@ class Rise:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrechargeRule:
-    """How a deeply discharged pack is brought to where it may be charged; always on step 0."""
+    """How a deeply discharged pack is brought to where it may be charged; always on the charger's lowest step."""
 
     below_v: float = key("precharge below this pack voltage", unit="V", gt=0)
+    max_a: float = key("no precharge at a charger whose lowest step is above this", unit="A", gt=0, le=1000)
     pulse: Pulse = key("the first stage")
     continuous: Continuous = key("the second stage")
     rise: Rise = key("what is expected of the pack meanwhile")
@@ -64,47 +91,101 @@ class PrechargeRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """One row of a table: from `from` (included) to `to` (excluded; the last row's is included) at most this step."""
+    """One row of a table: from `from` (included) to `to` (excluded; the last row's is included) at most this much.
+
+    Without `max_a` and `max_c` the pack's own `current_a` holds.
+    """
 
     from_: float = key("where the row begins (included)")
     to: float = key("where the row ends; the next row begins there")
-    step: int = key("the highest current-limit step allowed, 0 (lowest) … 4", ge=0, le=4)
+    max_a: float | None = key("at most this current; 0: a pause", unit="A", ge=0, le=1000, default=None)
+    max_c: float | None = key("at most this share of pack.capacity_ah; 0: a pause", unit="C", ge=0, le=20, default=None)
 
 
-Table = tuple[Band, ...]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """How much current by one quantity."""
+
+    hysteresis: float | None = key(
+        "more current only when the value is this far inside the next row; left out: twice the sensor's resolution",
+        ge=0, le=20, default=None,
+    )  # fmt: skip
+    rows: tuple[Band, ...] = key("no gaps, no overlaps, lowest first")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Where:
+    """A rule on more than one quantity: inside all of its ranges (ends included) at most this much."""
+
+    temperature_c: Range | None = key("[low, high] of the pack temperature", unit="°C", ge=-30, le=60, default=None)
+    soc_pct: Range | None = key("[low, high] of the state of charge", unit="%", ge=0, le=100, default=None)
+    soh_pct: Range | None = key("[low, high] of the state of health", unit="%", ge=0, le=100, default=None)
+    voltage_v: Range | None = key("[low, high] of the pack voltage", unit="V", gt=0, le=1000, default=None)
+    max_a: float | None = key("at most this current; 0: a pause", unit="A", ge=0, le=1000, default=None)
+    max_c: float | None = key("at most this share of pack.capacity_ah; 0: a pause", unit="C", ge=0, le=20, default=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Current:
-    """The current-limit step: of all tables and limits the lowest wins; down at once, up after a hold."""
+    """How much current: of everything that applies the lowest wins; down at once, up after a hold."""
 
-    raise_after_s: float = key("a higher step is taken after it was allowed for this long", unit="s", ge=1, le=3600)
+    raise_after_s: float = key("more is taken after it was allowed for this long", unit="s", ge=1, le=3600)
     temperature_c: Table = key("by pack temperature; must cover `pack.temperature_c`", unit="°C")
     soc_pct: Table | None = key("by state of charge; must cover 0 … 100", unit="%", default=None)
     soh_pct: Table | None = key("by state of health; must cover `pack.soh_min_pct` … 100", unit="%", default=None)
     voltage_v: Table | None = key("by pack voltage; must cover `pack.voltage_v`", unit="V", default=None)
+    where: tuple[Where, ...] = key("rules on more than one quantity", default=())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taper:
     """The constant-voltage phase's end: the current has fallen and stays low."""
 
-    below_a: float = key("the charger's current is below this …", unit="A", gt=0)
-    above_v: float = key("… while the pack is above this voltage …", unit="V", gt=0)
-    for_s: float = key("… for this long", unit="s", ge=1, le=3600)
+    below_a: float | None = key("the charger's current is below this …", unit="A", gt=0, le=1000, default=None)
+    below_c: float | None = key("… or below this share of pack.capacity_ah …", unit="C", gt=0, le=1, default=None)
+    above_v: float | None = key(
+        "… while the pack is above this voltage; left out: 97 % of its end voltage …", unit="V", gt=0, default=None
+    )
+    for_s: float = key("… for this long", unit="s", ge=1, le=3600, default=120.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Full:
+    """How it is known that a pack is full."""
+
+    needs: Needs = key("any or all of those that stand here", default=Needs.ANY)
+    soc_pct: float | None = key(
+        "the BMU's state of charge; leave it out where that is not to be trusted", unit="%", ge=80, le=100, default=None
+    )
+    taper: Taper | None = key("the current has tapered off at the end voltage", default=None)
+    charger: bool | None = key(
+        'the charger\'s own "full" (mode 5), after a taper; false: not believed; left out: believed, never required',
+        default=None,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finish:
-    """When a charge is over. The first that comes true ends it; hours and Ah are limits and end it as a fault."""
+    """When a charge is over. Hours and Ah are limits and end it as a fault."""
 
-    soc_pct: float = key("full at this state of charge", unit="%", ge=1, le=100)
-    taper: Taper | None = key("full when the current has tapered off", default=None)
-    charger_full: bool = key("full when the charger itself says so (mode 5)", default=True)
-    max_hours: float = key("a charge that takes longer is a fault", unit="h", gt=0, le=12)
-    max_ah: float = key(
-        "a charge that took more is a fault; one that begins above SOC 20 % may take that much less", unit="Ah", gt=0
+    target_soc_pct: float = key(
+        "below 100: the charge ends at this state of charge", unit="%", ge=20, le=100, default=100.0
     )
+    full: Full = key("how full is known", default_factory=Full)
+    hold_min: float = key("stay on at the top for so long, to balance", unit="min", ge=0, le=720, default=0.0)
+    full_every_days: float | None = key(
+        "with a target below 100: once in so many days all the way", unit="d", ge=1, le=365, default=None
+    )
+    max_hours: float | None = key(
+        "a charge that takes longer is a fault; left out: 1.5 times what the capacity takes on the lowest step that "
+        "the rows lead to",
+        unit="h", gt=0, le=240, default=None,
+    )  # fmt: skip
+    max_ah: float | None = key(
+        "a charge that took more is a fault; one that begins above SOC 20 % may take that much less; left out: 110 % "
+        "of the capacity",
+        unit="Ah", gt=0, le=2500, default=None,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,6 +218,6 @@ class Policy:
         "how a deeply discharged pack is woken; without it such a pack is refused", default=None
     )
     current: Current = key("how much current, when")
-    finish: Finish = key("when it is over")
+    finish: Finish = key("when it is over", default_factory=Finish)
     faults: Thresholds = key("stricter fault thresholds", default_factory=Thresholds)
     source: Source = field(default=Source("<policy>"), compare=False)

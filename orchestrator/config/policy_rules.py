@@ -1,8 +1,12 @@
 """What must hold between the keys of one policy."""
 
+from collections.abc import Mapping
+
+from orchestrator.config.amperes import CELL_VOLTS, END_SHARE
+from orchestrator.config.current_rules import CURRENT_RULES, amperes_problems
 from orchestrator.config.names import name_problem
-from orchestrator.config.policy import Table
-from orchestrator.config.rules import Problems, Rule
+from orchestrator.config.policy import CellType
+from orchestrator.config.rules import Problems, Rule, problems
 from orchestrator.keys import Range
 
 CELL_V = Range(2.0, 4.35)  #: no lithium cell is charged outside: below, copper dissolves; above is beyond LiHV
@@ -40,6 +44,11 @@ def _pulse(until_v: float, below_v: float) -> Problems:
         )
 
 
+def _precharge_a(max_a: float, current_a: float) -> Problems:
+    if max_a > current_a:
+        yield "precharge.max_a", f"{max_a:g} A is above pack.current_a, {current_a:g} A, the most that the pack bears"
+
+
 def _precharge_time(pulse_min: float, continuous_min: float) -> Problems:
     if pulse_min + continuous_min > PRECHARGE_MAX_MIN:
         yield (
@@ -58,19 +67,51 @@ def _rise(within_min: float, pulse_min: float, continuous_min: float) -> Problem
         )
 
 
-def _start(start_pct: float, finish_pct: float) -> Problems:
-    if start_pct > finish_pct:
+def _start(start_pct: float, target_pct: float) -> Problems:
+    if start_pct > target_pct:
         yield (
             "start.soc_below_pct",
-            f"{start_pct:g} % is above finish.soc_pct, {finish_pct:g} %: a charge would be over when it begins",
+            f"{start_pct:g} % is above finish.target_soc_pct, {target_pct:g} %: a charge would be over when it begins",
         )
 
 
-def _recharge(recharge_pct: float, finish_pct: float) -> Problems:
-    if recharge_pct >= finish_pct:
+def _recharge(recharge_pct: float, target_pct: float) -> Problems:
+    if recharge_pct >= target_pct:
         yield (
             "recharge.soc_below_pct",
-            f"{recharge_pct:g} % must be below finish.soc_pct, {finish_pct:g} %: else a full battery is charged again",
+            f"{recharge_pct:g} % must be below finish.target_soc_pct, {target_pct:g} %: else a full battery is charged "
+            "again",
+        )
+
+
+def _chemistry(kind: CellType, cells: int, voltage_v: Range) -> Problems:
+    """No more volts than its cells bear; fewer are allowed, and are a warning where they can hardly be meant."""
+    most_v = CELL_VOLTS[kind].most_v
+    if round(voltage_v.high / cells, 3) in CELL_V and voltage_v.high > round(most_v * cells, 3):
+        yield (
+            "pack.chemistry",
+            f"{voltage_v.high:g} V on {cells} cells is {voltage_v.high / cells:.2f} V a cell; "
+            f"{kind} bears {most_v:.2f} V",
+        )
+
+
+def _frost(kind: CellType, temperature_c: Range) -> Problems:
+    coldest_c = CELL_VOLTS[kind].coldest_c
+    if temperature_c.low < coldest_c:
+        yield (
+            "pack.temperature_c[0]",
+            f"{temperature_c.low:g} °C: {kind} cells plate lithium below {coldest_c:g} °C, at any current",
+        )
+
+
+def _taper(above_v: float, kind: CellType, cells: int, voltage_v: Range) -> Problems:
+    """Low in the charge a low current means anything but full."""
+    end_v = min(CELL_VOLTS[kind].end_v * cells, voltage_v.high)
+    if above_v < round(END_SHARE * end_v, 2):
+        yield (
+            "finish.full.taper.above_v",
+            f"{above_v:g} V is too low: a taper is believed within 3 % of the end voltage, {end_v:.1f} V, so from "
+            f"{END_SHARE * end_v:.1f} V on",
         )
 
 
@@ -83,36 +124,32 @@ def _trip(trip_c: float, temperature_c: Range) -> Problems:
         )
 
 
-def table_problems(at: str, table: Table, low: float, high: float, unit: str) -> Problems:
-    """Rows in order, each beginning where the one before ends, from `low` or less to `high` or more."""
-    for i, row in enumerate(table):
-        if row.from_ >= row.to:
-            yield f"{at}[{i}]", f"from {row.from_:g} to {row.to:g} is empty: `from` must be below `to`"
-        if i and row.from_ != (end := table[i - 1].to):
-            what = "leaves a gap" if row.from_ > end else "overlaps the row above or is out of order"
-            yield (
-                f"{at}[{i}].from",
-                f"{row.from_:g} {what}: the row above ends at {end:g} {unit}, so this one begins there",
-            )
-    if table[0].from_ > low:
-        yield f"{at}[0].from", f"the table begins at {table[0].from_:g} {unit}; it must begin at {low:g} or below"
-    if table[-1].to < high:
-        yield (
-            f"{at}[{len(table) - 1}].to",
-            f"the table ends at {table[-1].to:g} {unit}; it must reach {high:g} or beyond",
-        )
+def _limits(values: Mapping[str, object]) -> Problems:
+    """What has a default only where the capacity is known, and what makes no sense beside each other."""
+    if "pack.capacity_ah" in values and values["pack.capacity_ah"] is None:
+        for key, what in (("finish.max_hours", "the longest charge"), ("finish.max_ah", "the largest one")):
+            if key in values and values[key] is None:
+                yield key, f"write it, or write pack.capacity_ah, from which {what} is worked out"
+        if values.get("finish.full.taper") is not None and values.get("finish.full.taper.below_a") is None:
+            yield "finish.full.taper", "write below_a, or write pack.capacity_ah, from which it is worked out"
+    if values.get("finish.full.taper.below_a") is not None and values.get("finish.full.taper.below_c") is not None:
+        yield "finish.full.taper.below_c", "write below_a or below_c, not both"
+    if values.get("finish.full_every_days") is not None and values.get("finish.target_soc_pct") == 100:
+        yield "finish.full_every_days", "only with a target_soc_pct below 100: with 100 every charge goes all the way"
+    if values.get("finish.full.needs") == "all" and not _signs(values):
+        yield "finish.full.needs", "all of nothing: write soc_pct, taper or charger below finish.full"
 
 
-def _table(at: str, unit: str, must_cover: str) -> Rule:
-    def test(table: Table, cover: Range | float) -> Problems:
-        low, high = (cover.low, cover.high) if isinstance(cover, Range) else (cover, 100.0)
-        yield from table_problems(at, table, low, high, unit)
-
-    return Rule(test, (at, must_cover))
+def _signs(values: Mapping[str, object]) -> list[object]:
+    names = ("soc_pct", "taper", "charger")
+    return [value for name in names if (value := values.get(f"finish.full.{name}")) not in (None, False)]
 
 
-def _soc_table(table: Table) -> Problems:
-    yield from table_problems("current.soc_pct", table, 0.0, 100.0, "%")
+def policy_problems(values: Mapping[str, object]) -> Problems:
+    """All that the rules find in one policy; what is a finding already is left out."""
+    yield from problems(POLICY_RULES, values)
+    yield from _limits(values)
+    yield from amperes_problems(values)
 
 
 POLICY_RULES: tuple[Rule, ...] = (
@@ -120,15 +157,16 @@ POLICY_RULES: tuple[Rule, ...] = (
     Rule(_cells, ("pack.cells_in_series", "pack.voltage_v")),
     _inside_pack("precharge.below_v"),
     _inside_pack("precharge.pulse.until_v"),
-    _inside_pack("finish.taper.above_v"),
+    _inside_pack("finish.full.taper.above_v"),
+    Rule(_chemistry, ("pack.chemistry", "pack.cells_in_series", "pack.voltage_v")),
+    Rule(_frost, ("pack.chemistry", "pack.temperature_c")),
+    Rule(_taper, ("finish.full.taper.above_v", "pack.chemistry", "pack.cells_in_series", "pack.voltage_v")),
     Rule(_pulse, ("precharge.pulse.until_v", "precharge.below_v")),
+    Rule(_precharge_a, ("precharge.max_a", "pack.current_a")),
     Rule(_precharge_time, ("precharge.pulse.max_min", "precharge.continuous.max_min")),
     Rule(_rise, ("precharge.rise.within_min", "precharge.pulse.max_min", "precharge.continuous.max_min")),
-    Rule(_start, ("start.soc_below_pct", "finish.soc_pct")),
-    Rule(_recharge, ("recharge.soc_below_pct", "finish.soc_pct")),
+    Rule(_start, ("start.soc_below_pct", "finish.target_soc_pct")),
+    Rule(_recharge, ("recharge.soc_below_pct", "finish.target_soc_pct")),
     Rule(_trip, ("faults.temperature_trip_c", "pack.temperature_c")),
-    _table("current.temperature_c", "°C", "pack.temperature_c"),
-    Rule(_soc_table, ("current.soc_pct",)),
-    _table("current.soh_pct", "%", "pack.soh_min_pct"),
-    _table("current.voltage_v", "V", "pack.voltage_v"),
+    *CURRENT_RULES,
 )

@@ -32,8 +32,12 @@ class ChargerConfig:
     port: str = key("the serial port, best a stable name below /dev/serial/by-path", is_path=True)
     control: ControlMode = key("manual (rotary switch on 1) or automatic (2 … 5: only stop and resume)")
     steps_a: tuple[float, ...] = key(
-        "what the five current-limit steps mean on this charger, lowest first", unit="A", gt=0
+        "what flows at most on each of this charger's five current steps, lowest first", unit="A", gt=0
     )
+    tolerance_pct: float = key(
+        "how much more than steps_a may flow; 0 where they are the most that was measured",
+        unit="%", ge=0, le=20, default=0.0,
+    )  # fmt: skip
     rs485: Rs485 = key("off, or kernel for a driver that switches the direction", default=Rs485.OFF)
 
 

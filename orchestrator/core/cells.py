@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
-from orchestrator.config.policy import Pack
+from orchestrator.config.policy import CellType, Pack
 
 #: An uncalibrated gauge may be wrong by this much.
 SOC_ERROR_PCT = 20.0
@@ -52,11 +52,10 @@ NMC = Chemistry(
 )  # fmt: skip
 LFP = Chemistry("LFP", ((0, 2.80), (5, 3.00), (10, 3.15), (20, 3.22), (50, 3.29), (90, 3.33), (100, 3.45)), 0.30)
 LTO = Chemistry("LTO", ((0, 1.80), (10, 2.10), (50, 2.25), (90, 2.45), (100, 2.70)), 0.20)
-#: By the highest voltage that a policy allows a cell: the first whose least is reached.
-BY_HIGHEST_V: Mapping[float, Chemistry] = {3.9: NMC, 3.0: LFP, 0.0: LTO}
+#: NMC and NCA cannot be told apart by their volts.
+CHEMISTRIES: Mapping[CellType, Chemistry] = {CellType.NMC: NMC, CellType.NCA: NMC, CellType.LFP: LFP, CellType.LTO: LTO}
 
 
 def chemistry(pack: Pack) -> Chemistry:
-    """The chemistry that a policy's pack must be of, by the voltage that it is charged to."""
-    highest_v = pack.voltage_v.high / pack.cells_in_series
-    return next(found for least_v, found in BY_HIGHEST_V.items() if highest_v >= least_v)
+    """The chemistry that a policy's pack must be of."""
+    return CHEMISTRIES[pack.chemistry]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
-from orchestrator.core.finish import finished
+from orchestrator.core.finish import finished, full_due, goes_full, target
 from orchestrator.core.machine import RESTING, Trigger
 from orchestrator.core.operator import RESET
 from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, verified
@@ -23,6 +23,8 @@ Faults = tuple[ActiveFault, ...]
 QUALIFY_S = 2.0
 #: A stage's voltage must have been reached for this long before the next stage begins.
 REACHED_S = 2.0
+#: A battery that is to be charged all the way once in so many days, and has this much, is as good as full.
+FULL_DUE_PCT = 98.0
 #: A full battery must have lost this much before it is charged again, however high the policy's threshold.
 RECHARGE_DROP_PCT = 3.0
 
@@ -57,6 +59,8 @@ def _energised(f: Facts, faults: Faults) -> Course:
         full = finished(f)
         if full is not None:
             f.memory.full_pct = f.soc
+            if goes_full(f):
+                f.memory.full_s = f.now_s
             return Trigger.STOP, Cause.of("full", key=full.key, place=full.place, what=full)
         return None, _charging(f, faults)
     return _precharging(f)
@@ -75,8 +79,17 @@ def _charging(f: Facts, faults: Faults) -> Cause:
         rises = f.rules.by_policy("rises", "current.raise_after_s", hold_s=f.rules.policy.current.raise_after_s)
     return Cause.of(
         "charging", key=chosen.rule.key, place=chosen.rule.place,
-        step=chosen.index, step_a=chosen.current_a, rule=chosen.rule, limited=limited, rises=rises,
+        step=chosen.number, step_a=chosen.current_a, rule=chosen.rule, limited=limited, rises=rises, held=_holds(f),
     )  # fmt: skip
+
+
+def _holds(f: Facts) -> Cause | None:
+    """A full pack stays on, to balance: for how long still."""
+    session, finish = f.memory.session, f.rules.policy.finish
+    if session is None or not session.full:
+        return None
+    left_min = max(finish.hold_min - session.held_s / 60, 0.0)
+    return f.rules.by_policy("held_at_the_top", "finish.hold_min", left_min=left_min)
 
 
 def _precharging(f: Facts) -> Course:
@@ -252,9 +265,11 @@ def _wanted(f: Facts) -> tuple[bool, Cause]:
     if f.soc is None:
         return False, Cause("soc_unknown")
     if full_pct is None and f.memory.session is not None:  # what was interrupted is brought to its end
-        key, threshold = "finish.soc_pct", policy.finish.soc_pct
+        threshold, key = target(f)
     elif full_pct is None:
         key, threshold = "start.soc_below_pct", policy.start.soc_below_pct
+    elif full_due(f):  # it is full by its target only
+        key, threshold = "finish.full_every_days", FULL_DUE_PCT
     else:  # it may have been full by taper at less than the policy's SOC: it must have fallen since
         key, threshold = "recharge.soc_below_pct", min(policy.recharge.soc_below_pct, full_pct - RECHARGE_DROP_PCT)
     below = f.soc < threshold

@@ -125,6 +125,7 @@ FAULTS: tuple[Row, ...] = (
     Row("hot_trip", "B10", E.TRIP, Clear.RESET, battery.hot_trip, ALWAYS),
     Row("over_temperature", "B10", E.PAUSE, Clear.AUTO, battery.over_temperature, ALWAYS, clean_s=10),
     Row("under_temperature", "B11", E.PAUSE, Clear.AUTO, battery.under_temperature, ALWAYS, clean_s=10),
+    Row("current_paused", "P12", E.PAUSE, Clear.AUTO, charge.no_step_allowed, ENERGISED, clean_s=10),
     Row("runaway", "B12", E.TRIP, Clear.RESET, battery.runaway, ENERGISED, for_s=1),
     Row("temperature_invalid", "B13", E.TRIP, Clear.RESET, battery.temperature_invalid, ALWAYS, clean_s=5),
     Row("implausible", "B14, B17", E.STOP, Clear.BACKOFF, battery.implausible, ALWAYS),
@@ -139,6 +140,9 @@ FAULTS: tuple[Row, ...] = (
     Row("battery_exchanged", "B18", E.STOP, Clear.OPERATOR, state_of_charge.battery_exchanged, ALWAYS),
     Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, pack.another_pack, ALWAYS - ENERGISED, for_s=1, clean_s=5),
     Row("another_pack", "B25", E.STOP, Clear.OPERATOR, pack.another_pack, ENERGISED, for_s=5),
+    Row("no_step_allowed", "P12", E.NO_START, Clear.AUTO, charge.no_step_allowed, QUALIFYING, for_s=1, clean_s=5),
+    Row("precharge_too_strong", "P12", E.NO_START, Clear.AUTO, charge.precharge_too_strong, QUALIFYING,
+        for_s=1, clean_s=5),
     # who else is on the bus
     Row("other_master", "B27", E.WARN, Clear.AUTO, battery.other_master, ALWAYS, clean_s=10),
     Row("heartbeat_set", "B28", E.WARN, Clear.AUTO, battery.heartbeat_set, ALWAYS, clean_s=10),

@@ -1,29 +1,78 @@
-"""When a charge is over, by the policy. Time and Ah limits are faults and stand in the fault table."""
+"""When a charge is over, by the policy. Time and Ah limits are faults and stand in the fault table.
 
+A charge goes to the policy's target, or all the way: with a target of 100 %, and once in so many days. What is all the
+way, the pack tells: its current has tapered off at the end voltage, the charger says full after a taper, the BMU's SOC
+if the policy trusts it. Then it may stay on for a while, to balance.
+"""
+
+from orchestrator.config.amperes import END_SHARE, end_v
+from orchestrator.config.policy import Needs
 from orchestrator.core.facts import Facts
 from orchestrator.model import Cause
 
 #: A charger that ends a charge below this state of charge is wrong, or the BMU is.
 EARLY_FULL_PCT = 80.0
-#: Where a policy says nothing else, a full pack has this share of its highest voltage.
-END_SHARE = 0.97
 #: Less than this share of what was set is a current that has tapered off.
 TAPERED_SHARE = 0.5
 #: A current that has just begun is low, too: it must have flowed for this long.
 SEEN_TAPER_S = 5.0
+#: A pack that was found full and has lost this much is not full any more.
+FALLEN_PCT = 3.0
+DAY_S = 86400.0
 
 
 def finished(f: Facts) -> Cause | None:
-    """Why the battery is full, with the policy's line; None while it is not."""
+    """Why the charge is over, with the policy's line; None while it is not."""
     rule, by_policy = f.rules.policy.finish, f.rules.by_policy
-    if f.soc is not None and f.soc >= rule.soc_pct:
-        return by_policy("full_soc", "finish.soc_pct", soc_pct=f.soc, limit_pct=rule.soc_pct)
-    if rule.charger_full and f.full_mode and f.soc is not None and f.soc >= early_below_pct(f) and ends_full(f):
-        return by_policy("full_charger", "finish.charger_full")
-    taper, since_s = rule.taper, f.memory.taper_s
-    if taper is not None and since_s is not None and f.now_s - since_s >= taper.for_s:
-        return by_policy("full_taper", "finish.taper", charger_a=f.amps, below_a=taper.below_a, for_s=taper.for_s)
-    return None
+    if not goes_full(f) and f.soc is not None and f.soc >= rule.target_soc_pct:
+        return by_policy("full_soc", "finish.target_soc_pct", soc_pct=f.soc, limit_pct=rule.target_soc_pct)
+    ended = _by_charger(f)
+    if ended is not None:
+        return ended
+    session = f.memory.session
+    full = known_full(f) if session is None else session.full
+    if not full or session is None or not goes_full(f):  # above a target nothing is held
+        return full
+    if session.held_s < rule.hold_min * 60:
+        return None
+    return by_policy("full_held", "finish.hold_min", what=full, hold_min=rule.hold_min) if rule.hold_min else full
+
+
+def known_full(f: Facts) -> Cause | None:
+    """By what the pack is known to be full now; None while it is not."""
+    rule = f.rules.policy.finish.full
+    signs = {"soc_pct": _by_soc(f), "taper": _by_taper(f), "charger": _by_charger(f)}
+    if rule.needs is Needs.ANY:
+        return next((sign for sign in signs.values() if sign is not None), None)
+    needed = [signs[name] for name in signs if getattr(rule, name) not in (None, False)]
+    seen = [sign for sign in needed if sign is not None]
+    if not seen or len(seen) < len(needed):
+        return None
+    return seen[0] if len(seen) == 1 else Cause.of("full_by_all", whats=tuple(seen))
+
+
+def _by_soc(f: Facts) -> Cause | None:
+    full_pct = f.rules.policy.finish.full.soc_pct
+    if full_pct is None or f.soc is None or f.soc < full_pct:
+        return None
+    return f.rules.by_policy("full_soc", "finish.full.soc_pct", soc_pct=f.soc, limit_pct=full_pct)
+
+
+def _by_taper(f: Facts) -> Cause | None:
+    taper, since_s = f.rules.taper, f.memory.taper_s
+    if taper is None or since_s is None or f.amps is None or f.now_s - since_s < taper.for_s:
+        return None
+    key, below_a = "finish.full.taper", tapered_a(f)
+    return f.rules.by_policy("full_taper", key, charger_a=f.amps, below_a=below_a, for_s=taper.for_s)
+
+
+def _by_charger(f: Facts) -> Cause | None:
+    """A charger that ends an honest charge by itself has ended it, whatever else is needed to call the pack full."""
+    if f.rules.policy.finish.full.charger is False or not f.full_mode or f.soc is None:
+        return None
+    if f.soc < early_below_pct(f) or not ends_full(f):
+        return None
+    return f.rules.by_policy("full_charger", "finish.full.charger")
 
 
 def ends_full(f: Facts) -> bool:
@@ -31,9 +80,9 @@ def ends_full(f: Facts) -> bool:
 
     Mode 5 is also what a charger shows that somebody has stopped by other means.
     """
-    rule, high_v, trail = f.rules.policy.finish, f.rules.policy.pack.voltage_v.high, f.memory.witnessed.trail
-    end_v = rule.taper.above_v if rule.taper is not None else END_SHARE * high_v
-    if max((sample.pack_v for sample in trail), default=f.pack_v or 0.0) >= end_v:
+    pack, trail = f.rules.policy.pack, f.memory.witnessed.trail
+    full_v = f.rules.taper.above_v if f.rules.taper is not None else END_SHARE * end_v(pack)
+    if max((sample.pack_v for sample in trail), default=f.pack_v or 0.0) >= full_v:
         return True
     flowed = [sample for sample in trail if sample.charger_a > 0]
     if not flowed or flowed[-1].t_s - flowed[0].t_s < SEEN_TAPER_S:
@@ -44,12 +93,39 @@ def ends_full(f: Facts) -> bool:
 
 def early_below_pct(f: Facts) -> float:
     """Below this state of charge the charger's own "full" is not believed: the fault table has a row for it."""
-    return min(EARLY_FULL_PCT, f.rules.policy.finish.soc_pct)
+    return min(EARLY_FULL_PCT, f.rules.policy.finish.target_soc_pct)
+
+
+def tapered_a(f: Facts) -> float:
+    """Below this the current has tapered off: on a low step, whose own current is as low, only well below that."""
+    below_a = f.rules.taper.below_a if f.rules.taper is not None else 0.0
+    return min(below_a, TAPERED_SHARE * f.memory.step.current_a) if f.memory.step is not None else below_a
 
 
 def tapers(f: Facts) -> bool:
     """The current is low because the pack is nearly full, not because the charge has not begun."""
-    taper = f.rules.policy.finish.taper
+    taper = f.rules.taper
     if taper is None or f.amps is None or f.pack_v is None or f.memory.runs_s is None:
         return False
-    return f.amps < taper.below_a and f.pack_v > taper.above_v
+    return f.amps < tapered_a(f) and f.pack_v > taper.above_v
+
+
+# --- all the way, once in so many days --------------------------------------------------------------------------------
+
+
+def full_due(f: Facts) -> bool:
+    """The battery was not charged all the way for as long as the policy says."""
+    days, full_s = f.rules.policy.finish.full_every_days, f.memory.full_s
+    return days is not None and full_s is not None and f.now_s - full_s >= days * DAY_S
+
+
+def goes_full(f: Facts) -> bool:
+    """Whether this charge goes all the way."""
+    return f.rules.policy.finish.target_soc_pct >= 100 or full_due(f)
+
+
+def target(f: Facts) -> tuple[float, str]:
+    """To which state of charge, and the key that says so."""
+    if full_due(f):
+        return 100.0, "finish.full_every_days"
+    return f.rules.policy.finish.target_soc_pct, "finish.target_soc_pct"

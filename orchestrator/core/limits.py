@@ -1,61 +1,98 @@
-"""The current-limit step: of all that limits it the lowest wins, and has a name. Down at once, up after a hold."""
+"""From what a policy allows, in amperes, to the charger's step: the highest of which the worst case is not above.
 
-from orchestrator.config.policy import Table
+Of everything that applies the lowest wins, and has a name: its key, the same however it is worded. Down at once, up
+after a hold. Which rows apply, `core/rows.py` follows.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ranges, tables
+from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
+from orchestrator.core.rows import amps, values
 from orchestrator.model import ActiveFault, Cause, Effect, Step
 
-#: (step, what limits it, for whom: the key in policy or station, the value)
-Bound = tuple[int, str, str, float | None]
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """One thing that limits the current."""
+
+    allowed_a: float
+    key: str  #: of policy or station; "fault ID" for a fault
+    row: Band | Where | None = None
 
 
-def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
-    """The step for now, and since when a higher one has been allowed (None: none is).
+# --- how much they allow ----------------------------------------------------------------------------------------------
+
+
+def bounds(f: Facts, worst: ActiveFault | None) -> Iterator[Bound]:
+    """Everything that limits the current now.
 
     `worst` is the worst of the faults in force; LIMIT, and what is worse, means the lowest step.
     """
-    bound = _lowest(f, worst)
+    rules, current, rows = f.rules, f.rules.policy.current, dict(f.memory.rows)
+    yield Bound(rules.policy.pack.current_a, "pack.current_a")
+    if rules.top_step < len(rules.steps_a) - 1:
+        yield Bound(rules.worst_a[rules.top_step], "limits.current_a")
+    if worst is not None and worst.effect >= Effect.LIMIT:
+        yield Bound(rules.worst_a[0], f"fault {worst.id}")
+    known = values(f)
+    for name, table in tables(current):
+        if known[name] is None or name not in rows:  # a rule of its own ends a charge that no row covers
+            yield Bound(rules.worst_a[0], f"current.{name}")
+        else:
+            row = table.rows[rows[name]]
+            yield Bound(amps(rules, row), f"current.{name}.rows[{rows[name]}]", row)
+    for name, number in rows.items():
+        if name.startswith("where"):
+            rule = current.where[number]
+            yield Bound(amps(rules, rule), f"current.{name}", rule)
+
+
+def lowest(f: Facts, worst: ActiveFault | None = None) -> Bound:
+    """What limits the current most; of equals the first."""
+    return min(bounds(f, worst), key=lambda bound: bound.allowed_a)
+
+
+def none_allowed(f: Facts) -> Cause | None:
+    """Why not even the lowest step may be taken; None where one may. What is not known is another rule's business."""
+    bound = lowest(f)
+    if bound.allowed_a > 0 and (not f.rules.manual or highest_step(bound.allowed_a, f.rules.worst_a) is not None):
+        return None
+    rule = limit(f, bound)
+    if bound.allowed_a == 0:
+        return rule
+    return Cause.of("below_lowest_step", key=rule.key, place=rule.place, rule=rule, lowest_a=f.rules.worst_a[0])
+
+
+def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
+    """The step for now, and since when a higher one has been allowed (None: none is)."""
+    bound = lowest(f, worst)
+    index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # where none is allowed a fault has ended the charge
+    if index == len(f.rules.steps_a) - 1:
+        bound = Bound(bound.allowed_a, "")
     before, raise_s = f.memory.step, f.memory.raise_s
-    if before is None or bound[0] < before.index:
-        return _step(f, bound), None
-    if bound[0] == before.index:
-        return (before if _same_rule(before, bound) else _step(f, bound)), None
+    if before is None or index < before.index:
+        return _step(f, index, bound), None
+    if index == before.index:
+        return (before if before.key == bound.key else _step(f, index, bound)), None
     raise_s = raise_s if raise_s is not None else f.now_s
     if f.now_s - raise_s >= f.rules.policy.current.raise_after_s:
-        return _step(f, bound), None
+        return _step(f, index, bound), None
     return before, raise_s
 
 
-def _lowest(f: Facts, worst: ActiveFault | None) -> Bound:
-    current = f.rules.policy.current
-    lowest: Bound = (len(f.rules.steps_a) - 1, "the highest step, nothing limits it", "", None)
-    if f.rules.top_step < lowest[0]:
-        lowest = (f.rules.top_step, "the station's current limit", "limits.current_a", None)
-    if worst is not None and worst.effect >= Effect.LIMIT:
-        lowest = (0, f"the fault {worst.id}", "", None)
-    for name, table, value in (
-        ("temperature_c", current.temperature_c, f.temperature_c),
-        ("soc_pct", current.soc_pct, f.soc),
-        ("soh_pct", current.soh_pct, f.soh),
-        ("voltage_v", current.voltage_v, f.pack_v),
-    ):
-        if table is None:
-            continue
-        row = _row(table, value)
-        step = table[row].step if row is not None else 0
-        if step < lowest[0]:
-            lowest = (step, name, f"current.{name}[{row}]" if row is not None else f"current.{name}", value)
-    return lowest
+def _step(f: Facts, index: int, bound: Bound) -> Step:
+    return Step(index, f.rules.steps_a[index], limit(f, bound))
 
 
-def _row(table: Table, value: float | None) -> int | None:
-    """The index of the band that `value` lies in; the last band includes its end."""
-    if value is None:
-        return None
-    for index, band in enumerate(table):
-        if band.from_ <= value < band.to:
-            return index
-    return len(table) - 1 if value == table[-1].to else None
+def limit(f: Facts, bound: Bound) -> Cause:
+    """What limits the current, as a cause. Its sentence is still made here."""
+    return Cause.of("limit", key=bound.key, place=_place(f, bound.key), text=sentence(f, bound))
 
+
+# --- as sentences -----------------------------------------------------------------------------------------------------
 
 #: How each quantity is said: its name, its number format with unit.
 WORDS = {
@@ -66,30 +103,60 @@ WORDS = {
 }
 
 
-def _step(f: Facts, bound: Bound) -> Step:
-    index, what, path, value = bound
-    return Step(index, f.rules.steps_a[index], _rule(f, what, path, value))
+def _place(f: Facts, key: str) -> str:
+    """Where a key stands; "" for what stands in no file."""
+    if not key or key.startswith("fault "):
+        return ""
+    return (f.rules.bay.source if key.startswith("limits.") else f.rules.policy.source).at(key)
 
 
-def _rule(f: Facts, what: str, path: str, value: float | None) -> Cause:
-    place = f.rules.policy.source.at(path) if what in WORDS else f.rules.bay.source.at(path) if path else ""
-    return Cause.of("limit", key=path, place=place, text=_text(f, what, path, value))
+def sentence(f: Facts, bound: Bound) -> str:
+    """What limits the current, with its evidence and its place."""
+    key, place = bound.key, _place(f, bound.key)
+    if not key:
+        return "the highest step, nothing limits it"
+    if key.startswith("fault "):
+        return f"the {key}"
+    if key == "pack.current_a":
+        return f"the pack bears {bound.allowed_a:.1f} A, {place}"
+    if key.startswith("limits."):
+        return f"the station's current limit, {place}"
+    if bound.row is None:
+        name, form = WORDS[key.removeprefix("current.")]
+        value = values(f)[key.removeprefix("current.")]
+        return (
+            f"{name} unknown, {place}"
+            if value is None
+            else f"{name} {form.format(value)} outside of its table, {place}"
+        )
+    return f"{_where(f, bound)} {_allows(bound)}, {place}"
 
 
-def _text(f: Facts, what: str, path: str, value: float | None) -> str:
-    if what not in WORDS:
-        return f"{what}, {f.rules.bay.source.at(path)}" if path else what
-    name, form = WORDS[what]
-    place = f.rules.policy.source.at(path)
+def _where(f: Facts, bound: Bound) -> str:
+    row, known = bound.row, values(f)
+    if isinstance(row, Band):
+        name = next(name for name in RESOLUTION if bound.key.startswith(f"current.{name}."))
+        return _said(f, name, known[name], row.from_, row.to)
+    spans = ranges(row).items() if row is not None else ()
+    return " and ".join(_said(f, name, known[name], span.low, span.high) for name, span in spans)
+
+
+def _said(f: Facts, name: str, value: float | None, low: float, high: float) -> str:
+    """A value and the row that it is in, or was in and is not well outside of."""
+    what, form = WORDS[name]
     if value is None:
-        return f"{name} unknown, {place}"
-    table: Table = getattr(f.rules.policy.current, what)
-    row = _row(table, value)
-    where = f"in {table[row].from_:g} … {table[row].to:g}" if row is not None else "outside of its table"
-    return f"{name} {form.format(value)} {where}, {place}"
+        return f"{what} unknown"
+    if low <= value <= high:
+        return f"{what} {form.format(value)} in {low:g} … {high:g}"
+    well = hysteresis(f.rules.policy.current, name)
+    if not low - well < value < high + well:
+        return f"{what} {form.format(value)} beyond {low:g} … {high:g}, to which it came back too often in this charge:"
+    return f"{what} {form.format(value)} not yet {well:g} beyond {low:g} … {high:g}"
 
 
-def _same_rule(before: Step, bound: Bound) -> bool:
-    """Whether the step that is in force is bound by the same line of a table; its sentence then keeps its value."""
-    _, what, path, _ = bound
-    return what in WORDS and before.rule.key == path
+def _allows(bound: Bound) -> str:
+    row = bound.row
+    if bound.allowed_a == 0:
+        return "allows no current"
+    share = f" ({row.max_c:g} C)" if row is not None and row.max_c is not None else ""
+    return f"allows {bound.allowed_a:.1f} A{share}"

@@ -56,6 +56,7 @@ class Memory:
     confirmed: bool = False  #: the charger's newest reply showed the step that it was told
     search_s: float = 0.0  #: how long a running charger has been looking for a battery …
     wake_s: float = 0.0  #: … and recovering or precharging one by its own choice; both drain
+    full_s: float | None = None  #: when the battery of this bay was last charged all the way; before that, first seen
     full_pct: float | None = None  #: the SOC at which this battery was charged full here; None: it was not, or it left
     boots: int = 0  #: boot-ups of the BMU that were dealt with
     session: Session | None = None
@@ -68,6 +69,8 @@ class Memory:
     order_s: float = 0.0  #: … since when
     tries: int = 0  #: … and how often the resume was repeated for it
     qualified_s: float | None = None  #: since when everything has spoken for a charge
+    rows: tuple[tuple[str, int], ...] = ()  #: which row of each of the policy's tables is in force (`core/rows.py`) …
+    row_returns: tuple[tuple[str, int], ...] = ()  #: … and how often each brought the step down in this charge
     step: Step | None = None
     raise_s: float | None = None  #: since when a higher step has been allowed
     taper_s: float | None = None  #: since when the current has been tapered off

@@ -44,6 +44,7 @@ class Persisted:
     resets: tuple[tuple[Age, str], ...] = ()
     session: Session | None = None  #: the open charge with all that it has counted; `started_s` is an age
     full_pct: float | None = None
+    full: Age | None = None  #: since when the battery was not charged all the way; None: nobody counts yet
     soc: tuple[Age, float] | None = None  #: the newest SOC of the battery that is in the bay
 
     @classmethod
@@ -70,6 +71,7 @@ class Persisted:
             resets=tuple((now_s - t_s, name) for t_s, name in memory.resets),
             session=replace(session, started_s=now_s - session.started_s) if session is not None else None,
             full_pct=memory.full_pct,
+            full=_age(memory.full_s, now_s),
             soc=(now_s - soc_s, soc_pct) if soc_pct is not None else None,
         )
 
@@ -96,6 +98,7 @@ class Persisted:
                 for name, fault in self.faults.items()
             },
             resets=tuple((age_s + seconds, name) for age_s, name in self.resets),
+            full=None if self.full is None else self.full + seconds,
             session=self._session(seconds, unseen_s),
             soc=(self.soc[0] + seconds, self.soc[1]) if self.soc is not None else None,
         )
@@ -131,6 +134,7 @@ class Persisted:
             resets=tuple((now_s - age_s, name) for age_s, name in self.resets),
             session=replace(session, started_s=now_s - session.started_s) if session is not None else None,
             full_pct=self.full_pct,
+            full_s=None if self.full is None else now_s - self.full,
             unverified=self.running,
         )
         if self.soc is not None:

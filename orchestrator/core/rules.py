@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from orchestrator.config.amperes import DIGITS, TaperRule, max_ah, max_hours, taper_of
 from orchestrator.config.policy import Policy
 from orchestrator.config.station import Bay
 from orchestrator.keys import Range
@@ -19,13 +20,18 @@ class Rules:
     max_v: float  #: no current above this, at the charger or at the pack
     temperature_c: Range  #: no current outside
     steps_a: tuple[float, ...]  #: what each current-limit step means
+    worst_a: tuple[float, ...]  #: what may flow on each of them at most
     top_step: int  #: the highest step within the station's current limit
+    taper: TaperRule | None  #: when the current counts as tapered off; None: it never does
+    max_hours: float  #: a charge that takes longer is a fault
+    max_ah: float  #: … and one that takes more
 
     @classmethod
     def of(cls, bay: Bay) -> "Rules":
         """The stricter of station and policy, for each limit that both have."""
-        policy, limits = bay.policy, bay.limits
-        allowed = [index for index, amps in enumerate(bay.charger.steps_a) if amps <= limits.current_a]
+        policy, limits, charger = bay.policy, bay.limits, bay.charger
+        worst_a = tuple(round(amps * (1 + charger.tolerance_pct / 100), DIGITS) for amps in charger.steps_a)
+        allowed = [index for index, amps in enumerate(worst_a) if amps <= limits.current_a]
         return cls(
             bay=bay,
             policy=policy,
@@ -35,8 +41,12 @@ class Rules:
                 max(policy.pack.temperature_c.low, limits.temperature_c.low),
                 min(policy.pack.temperature_c.high, limits.temperature_c.high),
             ),
-            steps_a=bay.charger.steps_a,
+            steps_a=charger.steps_a,
+            worst_a=worst_a,
             top_step=max(allowed, default=0),
+            taper=taper_of(policy),
+            max_hours=max_hours(policy, worst_a),
+            max_ah=max_ah(policy.pack, policy.finish),
         )
 
     def by_policy(self, id_: str, key: str, /, **params: Any) -> Cause:  # noqa: ANN401 - as those of a cause

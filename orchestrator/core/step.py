@@ -13,6 +13,7 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.machine import fire
 from orchestrator.core.memory import Memory
 from orchestrator.core.operator import hear
+from orchestrator.core.rows import counted
 from orchestrator.core.rules import Rules
 from orchestrator.core.safestop import follow_stop, must_stop, stands_by
 from orchestrator.core.sequence import next_order
@@ -41,7 +42,7 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
     State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
     State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
 }
-PRECHARGE = Cause("precharge_step")
+PRECHARGE = Cause("precharge_step", key="precharge")
 #: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
 #: not end it: its limits would begin anew with each of them.
 SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})
@@ -126,7 +127,9 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step
         chosen, memory.raise_s = Step(0, rules.steps_a[0], PRECHARGE), None
     if memory.step is not None and memory.session is not None and chosen.index != memory.step.index:
         memory.session = replace(memory.session, step_changes=memory.session.step_changes + 1)
-        memory.confirmed = False  # it is told another one
+        if chosen.index < memory.step.index:
+            memory.row_returns = counted(memory.row_returns, chosen.key)
+        memory.confirmed, memory.taper_s = False, None  # it is told another one, and another current follows
     memory.step = chosen
     return Setpoint(run=True, current_limit=chosen.index, charge_mode=mode, precharge=precharge), chosen
 

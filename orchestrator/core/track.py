@@ -12,8 +12,9 @@ from orchestrator.core.checks.state_of_charge import (
 )
 from orchestrator.core.drain import drained
 from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S, Facts
-from orchestrator.core.finish import tapers
+from orchestrator.core.finish import FALLEN_PCT, known_full, tapers
 from orchestrator.core.memory import Still
+from orchestrator.core.rows import follow_rows
 from orchestrator.core.witnesses import followed
 from orchestrator.core.witnesses.measured import STILL_ABOVE_A
 from orchestrator.core.witnesses.standby import sees_current
@@ -37,6 +38,7 @@ def follow(f: Facts, last_s: float | None) -> None:
     memory.runs_s = _since(f.runs, memory.runs_s, f.now_s)
     memory.taper_s = _since(memory.state is State.CHARGING and tapers(f), memory.taper_s, f.now_s)
     memory.witnessed = followed.follow(f, passed_s)
+    follow_rows(f)
     memory.ran = memory.ran or (f.energised and (running or _began(f)))
     if reading is not None:
         _follow_modes(f, reading, passed_s)
@@ -186,6 +188,8 @@ def _follow_battery(f: Facts) -> None:
     memory = f.memory
     if f.energised:
         return
+    if memory.full_s is None and f.soc is not None:
+        memory.full_s = f.now_s
     if memory.boots != f.battery.boots or not f.battery.online:
         memory.full_pct = None
     if memory.state is not State.STOPPING:
@@ -206,6 +210,7 @@ def _follow_session(f: Facts, passed_s: float) -> None:
             hours = min(reading.t_s - memory.counted_t_s, CHARGER_STALE_S) / 3600
             ah, wh = reading.current_a * hours, reading.current_a * reading.voltage_v * hours
         memory.counted_t_s = reading.t_s
+    session = _followed_full(f, session, passed_s)
     pulse, continuous = (memory.state is stage for stage in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS))
     memory.session = replace(
         session,
@@ -218,6 +223,18 @@ def _follow_session(f: Facts, passed_s: float) -> None:
         continuous_s=session.continuous_s + (passed_s if continuous else 0.0),
         rise_s=session.rise_s + (passed_s if pulse or continuous else 0.0),
     )
+
+
+def _followed_full(f: Facts, session: Session, passed_s: float) -> Session:
+    """Once found full a pack stays so, over a pause too, until it is seen to have lost some of it."""
+    if session.full and f.soc is not None and f.soc < (session.full_pct or 0.0) - FALLEN_PCT:
+        return replace(session, full=None, full_pct=None, held_s=0.0)
+    if f.memory.state is not State.CHARGING:
+        return session
+    if session.full:
+        return replace(session, held_s=session.held_s + passed_s)
+    full = known_full(f)
+    return replace(session, full=full, full_pct=f.soc) if full else session
 
 
 def follow_state(f: Facts, before: State) -> None:

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Protocol, cast
 
 from orchestrator.demo.story import Story
-from orchestrator.show import figure
+from orchestrator.show import figure, step_of
 
 if TYPE_CHECKING:
     from rich.panel import Panel
@@ -38,7 +38,7 @@ def figures(bay: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
     """What one wants to see of a bay, name by name."""
     battery = cast("Mapping[str, object]", bay["battery"])
     charger = cast("Mapping[str, object]", bay["charger"])
-    step = "–" if bay["step"] is None else f"{bay['step']} ({figure(bay['step_current_a'], '{:g} A')})"
+    step = step_of(bay["step"], bay["step_current_a"])
     return (
         ("state", str(bay["state"])),
         ("SOC", figure(battery["soc_pct"], "{:.0f} %")),

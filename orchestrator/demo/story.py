@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
+from orchestrator.show import step_of
+
 #: Where a fault is injected and what is needed for it; the others in mid-charge.
 STAGES: Mapping[str, str] = {"precharge_no_rise": "PRECHARGE_PULSE", "rogue_run": "FULL"}
 #: Faults that show only when somebody stops the bay.
@@ -43,7 +45,7 @@ class Story:
             if state == "STOPPING":
                 self.stopped_by = reason
         elif step is not None and step != self.step:
-            self.events.append((t_s, f"step {step}", str(bay["step_rule"])))
+            self.events.append((t_s, f"step {step_of(step, bay['step_current_a'])}", str(bay["step_rule"])))
         self.step = step
         session = cast("Mapping[str, object] | None", bay["session"])
         if session is not None:

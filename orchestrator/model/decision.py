@@ -106,11 +106,31 @@ STANDBY = Setpoint()
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The current-limit step in force, and the rule that bound it."""
+    """The current step in force, and the rule that bound it."""
 
-    index: int  #: 0 (lowest) … 4
+    index: int  #: as the charger's protocol counts them: 0 (lowest) … 4
     current_a: float
     rule: Cause  #: what limits it, with the line that says so
+
+    @property
+    def key(self) -> str:
+        """What bound it, the same however it is worded: "current.temperature_c.rows[0]"; "": nothing did."""
+        return self.rule.key
+
+    @property
+    def place(self) -> str:
+        """Where that stands, FILE:LINE."""
+        return self.rule.place
+
+    @property
+    def number(self) -> int:
+        """As people count them, on the charger's display too: 1 (lowest) … 5."""
+        return self.index + 1
+
+    @property
+    def label(self) -> str:
+        """For people: "step 2 (5.0 A)"."""
+        return f"step {self.number} ({self.current_a:.1f} A)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +149,9 @@ class Session:
     continuous_s: float = 0.0  #: … and in continuous precharge, pauses not counted
     rise_s: float = 0.0  #: spent in precharge since the pack's rise was last counted from the beginning …
     rise_v: float | None = None  #: … at this pack voltage; None: precharge has not begun
+    full: Cause | None = None  #: by what the pack was found full; None while it is not …
+    full_pct: float | None = None  #: … at which SOC …
+    held_s: float = 0.0  #: … and for how long it has stayed on since
     unseen_s: float = 0.0  #: for so long it may have gone on before a kill, uncounted: the limits count it as charged
     result: Cause | None = None  #: why it ended; None while it goes on
 

@@ -1,7 +1,8 @@
 """A request of an operator on its way: decided by one step, answered when its effect is on the disk."""
 
 from collections.abc import Callable
-from threading import Event
+from itertools import takewhile
+from threading import Event, Lock
 
 from orchestrator.model import Cause, Request
 from orchestrator.service.store import KEPT_WITHIN_S, Store
@@ -14,6 +15,34 @@ class Asked:
         self.request = request
         self.answer: Cause | None = None
         self.done = Event()
+
+
+class Requests:
+    """What was asked of one bay and is not decided yet. From any thread."""
+
+    def __init__(self) -> None:
+        self._asked: list[Asked] = []
+        self._lock = Lock()
+
+    def __bool__(self) -> bool:
+        return bool(self._asked)
+
+    def put(self, asked: Asked) -> None:
+        """A stop waits for nothing: what was asked before it and is not done yet is refused."""
+        with self._lock:
+            if asked.request is Request.STOP:
+                for early in (one for one in self._asked if one.request is not Request.STOP):
+                    early.answer = Cause("overtaken")
+                    early.done.set()
+                self._asked = [one for one in self._asked if one.request is Request.STOP]
+            self._asked.append(asked)
+
+    def take(self) -> list[Asked]:
+        """The request whose turn it is, as often as it was made in a row: one step answers all of them."""
+        with self._lock:
+            taken = list(takewhile(lambda one: one.request is self._asked[0].request, self._asked))
+            del self._asked[: len(taken)]
+            return taken
 
 
 class Answers:

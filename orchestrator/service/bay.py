@@ -3,9 +3,7 @@
 import traceback
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import takewhile
 from math import inf
-from threading import Lock
 from time import monotonic, time
 
 from orchestrator.config.station import Bay
@@ -25,7 +23,7 @@ from orchestrator.model import (
     Snapshot,
     State,
 )
-from orchestrator.service.asked import Answers, Asked
+from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import Battery, Charger
 from orchestrator.service.journal import Journal
@@ -77,8 +75,7 @@ class BayRunner:
         self._starts = starts or Starts(0.0, "")  # nobody to wait for
         self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
         self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
-        self._asked: list[Asked] = []
-        self._asking = Lock()
+        self._requests = Requests()
         self._internal = ""
 
     @property
@@ -95,7 +92,7 @@ class BayRunner:
     @property
     def owes(self) -> bool:
         """Somebody waits for an answer."""
-        return bool(self._asked or self._answers.waiting)
+        return bool(self._requests or self._answers.waiting)
 
     def answer(self) -> None:
         """At the end of the service: nobody can wait any longer for an answer."""
@@ -131,35 +128,19 @@ class BayRunner:
             self._write_down_contactor(self._contactor)
 
     def ask(self, asked: Asked) -> None:
-        """Hand in an operator's request; it is answered by the next step.
-
-        A stop waits for nothing: what was asked before it and is not done yet is refused.
-        """
-        with self._asking:
-            if asked.request is Request.STOP:
-                for early in (one for one in self._asked if one.request is not Request.STOP):
-                    early.answer = Cause("overtaken")
-                    early.done.set()
-                self._asked = [one for one in self._asked if one.request is Request.STOP]
-            self._asked.append(asked)
+        """Hand in an operator's request; it is answered by the next step."""
+        self._requests.put(asked)
 
     def _withdraw(self) -> None:
         """Hold, as after a stop: a start could not be kept."""
         self.ask(Asked(Request.STOP))
-
-    def _take_asked(self) -> list[Asked]:
-        """The request whose turn it is, as often as it was made in a row: one step answers all of them."""
-        with self._asking:
-            taken = list(takewhile(lambda one: one.request is self._asked[0].request, self._asked))
-            del self._asked[: len(taken)]
-            return taken
 
     def run(self, now_s: float, asleep_s: float = 0.0) -> None:
         """Take one step. An exception of our own code stops the bay and is told to the next step.
 
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
-        asked, before = self._take_asked(), self._revision
+        asked, before = self._requests.take(), self._revision
         try:
             self._step(now_s, asleep_s, asked[0].request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on

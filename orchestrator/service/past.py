@@ -112,6 +112,7 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
         resets=tuple(sorted({reset for part in parts for reset in part.resets}, reverse=True)),
         session=max(sessions, key=lambda session: session.charged_ah, default=None),
         full_pct=min(fulls, default=None),
+        full=max((part.full for part in parts if part.full is not None), default=None),
         soc=min((part.soc for part in parts if part.soc is not None), default=None),
     )
 

@@ -44,6 +44,8 @@ def bay_status(
         "step_current_a": step.current_a if step else None,
         "step_rule": say(step.rule, language) if step else "",
         "step_cause": fields(step.rule, language) if step else None,
+        "step_key": step.key if step else "",
+        "step_place": step.place if step else "",
         "command": {**_setpoint(decision.setpoint), "order": command_fields(decision.command)},
         "charger": {
             "online": snapshot.charger_link.online,

@@ -127,7 +127,7 @@ class _Value:
         if isinstance(value, Cause):
             return (texts.frames["then"] if form == "after" else "") + _sentence(value, texts)
         if isinstance(value, tuple):
-            joint = "then" if any(isinstance(one, Cause) for one in value) else JOINS[form]
+            joint = "then" if not form and any(isinstance(one, Cause) for one in value) else JOINS[form]
             return texts.frames[joint].join(_words(value, texts))
         if form == "nth":
             return texts.words[f"nth_{value}"]

@@ -85,21 +85,23 @@ def test_lines_lead_back_to_the_files() -> None:
     assert second.source.at("name") == "x.yaml:10"
     assert first.source.at("battery.heartbeat_s") == "x.yaml:7", "not written: its parent's line"
     policy = load_policy(_write("p.yaml", POLICY))
-    assert policy.source.at("current.soc_pct[1]") == "p.yaml:23"
-    assert policy.source.at("current.soc_pct[1].step") == "p.yaml:23"
-    assert policy.source.at("pack.temperature_c") == "p.yaml:5"
-    assert policy.source.at("faults.volts_differ_v") == "p.yaml:30"
+    assert policy.source.at("current.soc_pct.rows[1]") == "p.yaml:28"
+    assert policy.source.at("current.soc_pct.rows[1].max_a") == "p.yaml:28"
+    assert policy.source.at("pack.temperature_c") == "p.yaml:7"
+    assert policy.source.at("faults.volts_differ_v") == "p.yaml:33"
     assert policy.source.at("nothing.like.it") == "p.yaml"
 
 
 def test_what_may_be_left_out_has_its_default() -> None:
     cut = POLICY[: POLICY.index("faults:")]
     cut = cut[: cut.index("precharge:")] + cut[cut.index("current:") :]
-    cut = cut.replace("  taper: {below_a: 1.0, above_v: 53.6, for_s: 120}\n", "  taper: null\n")
+    cut = cut.replace("taper: {below_a: 1.0, above_v: 53.6, for_s: 120}", "taper: null")
     policy = load_policy(_write("p.yaml", cut))
     assert policy.faults == Thresholds()
     assert policy.precharge is None
-    assert policy.finish.taper is None
+    assert policy.finish.full.taper is None
+    assert policy.finish.hold_min == 0
+    assert policy.pack.capacity_ah is None
     assert policy.current.soh_pct is None
 
 
@@ -213,7 +215,7 @@ def test_a_file_of_another_kind_is_not_read_as_this_one() -> None:
 def test_check_reports_each_file_once_under_the_name_it_was_given() -> None:
     _write("policies/mine.yaml", POLICY.replace("soh_min_pct: 60", "soh_min_pct: 600"))
     _write("stations/x.yaml", STATION.replace("policy: li-ion-48v", "policy: ../policies/mine.yaml"))
-    expected = ["policies/mine.yaml:6:16: error: pack.soh_min_pct: 600 % is too high, allowed: 1 … 100 %"]
+    expected = ["policies/mine.yaml:8:16: error: pack.soh_min_pct: 600 % is too high, allowed: 1 … 100 %"]
     assert [str(finding) for finding in check(["stations/x.yaml"])] == expected
     assert [str(finding) for finding in check(["stations/x.yaml", "stations/../policies/mine.yaml"])] == [
         expected[0].replace("policies/", "stations/../policies/")

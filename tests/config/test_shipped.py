@@ -5,7 +5,21 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.config.amperes import max_hours, row_a
 from orchestrator.config.load import check, load_map, load_policy, load_scenario, load_station
+from orchestrator.config.policy import (
+    Finish,
+    Full,
+    Pack,
+    Policy,
+    PrechargeRule,
+    Recharge,
+    Start,
+    Table,
+    Taper,
+    Thresholds,
+    Where,
+)
 from orchestrator.config.scenario import Ask, BatteryModel, ChargerModel, Scenario, SensorFault, Visit, Weather
 from orchestrator.config.shipped import shipped_dir, shipped_names
 from orchestrator.config.yaml.schema import slots
@@ -13,7 +27,9 @@ from orchestrator.keys import Range
 from orchestrator.model import ControlMode
 from orchestrator.protocol.objects import Evidence, ObjectMap
 
-POLICIES = ("lfp-48v", "li-ion-24v", "li-ion-48v", "long-life-48v")
+POLICIES = (
+    "agv-lfp-48v-100ah", "e-bike-36v", "lfp-48v", "li-ion-24v", "li-ion-48v", "long-life-48v", "telecom-lfp-15s",
+)  # fmt: skip
 MAPS = ("tabos", "tabos-lsb")
 STATIONS = ("one-bay", "two-bays-rs485")
 SCENARIOS = ("aged-pack", "agv-day", "cold-morning", "deep-discharge", "faulty-sensor", "hot-afternoon")
@@ -61,7 +77,7 @@ def test_one_scenario_shows_every_key() -> None:
 def test_over_voltage_leaves_the_charger_room_above_its_end_voltage(name: str) -> None:
     """A limit at the end voltage itself would latch at the end of every charge."""
     pack = load_policy(name).pack
-    full_v = 3.55 if name.startswith("lfp") else 4.2
+    full_v = 3.55 if "lfp" in name else 4.2
     assert pack.voltage_v.high >= pack.cells_in_series * full_v * 1.005
 
 
@@ -74,20 +90,39 @@ def test_li_ion_48v_is_what_was_agreed() -> None:
     assert policy.precharge.below_v == 39.0
     assert policy.precharge.pulse.max_min == 10
     assert policy.precharge.continuous.max_min == 20
-    assert [(row.from_, row.to, row.step) for row in policy.current.temperature_c] == [(0, 10, 0), (10, 45, 4)]
-    assert policy.current.soc_pct is not None
-    assert [(row.from_, row.to, row.step) for row in policy.current.soc_pct] == [(0, 90, 4), (90, 100, 2)]
-    assert policy.current.soh_pct is not None
-    assert [(row.from_, row.to, row.step) for row in policy.current.soh_pct] == [(60, 80, 3), (80, 100, 4)]
-    assert policy.finish.soc_pct == 100
-    assert policy.finish.charger_full
-    assert policy.finish.taper is not None
-    assert policy.finish.max_hours == 12
+    assert _amperes(policy, policy.current.temperature_c) == [(0, 10, 2.0), (10, 15, 6.0), (15, 45, 14.0)]
+    assert _amperes(policy, policy.current.soc_pct) == [(0, 90, 14.0), (90, 100, 8.0)]
+    assert _amperes(policy, policy.current.soh_pct) == [(60, 80, 11.0), (80, 100, 14.0)]
+    assert policy.finish.target_soc_pct == 100
+    assert policy.finish.full.soc_pct is None, "a BMU that reads too much would end every charge early"
+    assert policy.finish.full.charger
+    assert policy.finish.full.taper is not None
+    assert max_hours(policy, (2.0, 5.0, 8.0, 11.0, 14.0)) == 30
     assert policy.recharge.soc_below_pct == 95
 
 
-def test_long_life_stops_at_80_percent() -> None:
-    assert load_policy("long-life-48v").finish.soc_pct == 80
+def _amperes(policy: Policy, table: Table | None) -> list[tuple[float, float, float]]:
+    assert table is not None
+    pack = policy.pack
+    return [(row.from_, row.to, row_a(row, pack.current_a, pack.capacity_ah)) for row in table.rows]
+
+
+def test_long_life_stops_at_80_percent_and_goes_all_the_way_every_other_week() -> None:
+    finish = load_policy("long-life-48v").finish
+    assert (finish.target_soc_pct, finish.full_every_days) == (80, 14)
+
+
+def test_lfp_is_held_at_the_top_and_its_soc_ends_no_charge() -> None:
+    finish = load_policy("lfp-48v").finish
+    assert (finish.hold_min, finish.full.soc_pct) == (30, None)
+
+
+def test_one_policy_shows_every_key() -> None:
+    """Where keys are explained, none is left out, be it in a comment."""
+    text = (shipped_dir() / "policies/li-ion-48v.yaml").read_text(encoding="utf-8")
+    for record in (Policy, Pack, Start, Recharge, PrechargeRule, Table, Where, Finish, Full, Taper, Thresholds):
+        for name in slots(record):
+            assert re.search(rf"\b{name}\b", text), name
 
 
 def _bits(object_map: ObjectMap) -> dict[str, tuple[int, int, int]]:

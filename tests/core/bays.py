@@ -2,12 +2,11 @@
 
 from collections.abc import Callable, Mapping
 
-from orchestrator.config.load import load_policy
 from orchestrator.model import Action, ChargeMode, Request, State
-from tests.core.world import World
+from tests.core.world import POLICY, World
 
 S = State
-POLICY = load_policy("li-ion-48v")
+__all__ = ("IN", "POLICY")
 
 
 def starting() -> World:

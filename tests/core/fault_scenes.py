@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from orchestrator.config.policy import Policy
+from orchestrator.config.policy import Band, Policy, Table
 from orchestrator.keys import Range
 from orchestrator.model import (
     Action,
@@ -28,6 +28,22 @@ S = State
 
 def with_policy(policy: Policy) -> Callable[[], World]:
     return lambda: World(bay(policy)).charging()
+
+
+def paused_when_warm() -> World:
+    rows = (Band(from_=0, to=25), Band(from_=25, to=45, max_a=0.0))
+    table = Table(hysteresis=2.0, rows=rows)
+    return World(bay(replace(POLICY, current=replace(POLICY.current, temperature_c=table)))).charging()
+
+
+def too_strong() -> World:
+    """A charger whose lowest step is above what the policy allows in precharge, and for a warm pack."""
+    assert POLICY.precharge is not None
+    table = Table(rows=(Band(from_=0, to=25), Band(from_=25, to=45, max_a=1.9)))
+    current = replace(POLICY.current, temperature_c=table)
+    world = World(bay(replace(POLICY, current=current, precharge=replace(POLICY.precharge, max_a=1.9))))
+    world.until(S.QUALIFYING)
+    return world
 
 
 def finish(max_hours: float = 12.0, max_ah: float = 44.0) -> Policy:
@@ -441,6 +457,12 @@ SCENES: tuple[Scene, ...] = (
           begin=qualifying, anywhere=False),
     Scene("another_pack", value(voltage_v=45.65, soc_pct=55.0), AS_BEFORE, ("45.65 V at SOC 55 %", "at least 3.5"),
           S.HELD, 5.25, anywhere=False),
+    Scene("current_paused", value(temperature_c=25.0), value(temperature_c=22.9), ("25.0 °C in 25 … 45", "no current"),
+          S.SUSPENDED, begin=paused_when_warm, anywhere=False),
+    Scene("no_step_allowed", value(temperature_c=25.0), value(temperature_c=22.9), ("allows 1.9 A", "is 2 A"),
+          S.SUSPENDED, 1.25, begin=too_strong, anywhere=False),
+    Scene("precharge_too_strong", value(voltage_v=33.0, soc_pct=2.0), AS_BEFORE, ("33.00 V", "1.9 A", "is 2 A"),
+          S.SUSPENDED, 1.25, begin=too_strong, anywhere=False),
     Scene("other_master", somebody_else("other_master"), bmu(other_master_t_s=None), ("by another master",),
           S.CHARGING),
     Scene("heartbeat_set", somebody_else("heartbeat_set"), bmu(heartbeat_set_t_s=None), ("by another master",),

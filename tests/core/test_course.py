@@ -24,10 +24,10 @@ from orchestrator.model import (
 )
 from tests.core.bays import IN, POLICY, charging, continuous, full, idle, offline, pulse, suspended, tripped
 from tests.core.said import reason_of, say
-from tests.core.world import World, bay
+from tests.core.world import World, bay, with_full
 
 S = State
-START_AT, FULL_AT = POLICY.source.at("start.soc_below_pct"), POLICY.source.at("finish.soc_pct")
+START_AT, FULL_AT = POLICY.source.at("start.soc_below_pct"), POLICY.source.at("finish.full.soc_pct")
 
 
 def sessions(world: World) -> list[Session]:
@@ -151,10 +151,11 @@ def tapering(world: World) -> None:
 def test_full_by_taper() -> None:
     world = charging()
     tapering(world)
+    world.tick()  # another step, of which the taper is
     world.run(120)
     assert world.is_in(S.CHARGING)
     reason = reason_of(world.tick())
-    assert reason == f"full: 0.99 A, tapered below 1 A for 120 s ({POLICY.source.at('finish.taper')})"
+    assert reason == f"full: 0.99 A, tapered below 1 A for 120 s ({POLICY.source.at('finish.full.taper')})"
     world.until(S.FULL, 2)
 
 
@@ -174,7 +175,7 @@ def test_a_taper_is_low_current_at_high_voltage_without_a_break(spoil: dict[str,
 
 
 def test_no_taper_where_the_policy_has_none() -> None:
-    world = World(bay(replace(POLICY, finish=replace(POLICY.finish, taper=None)))).charging()
+    world = World(bay(with_full(taper=None))).charging()
     tapering(world)
     world.run(200)
     assert world.is_in(S.CHARGING)
@@ -197,7 +198,7 @@ def test_full_when_the_charger_says_so(soc_pct: float) -> None:
     tapers_off(world)
     charger_says_full(world)
     world.tick()
-    at = POLICY.source.at("finish.charger_full")
+    at = POLICY.source.at("finish.full.charger")
     assert reason_of(world.decision) == f"full: the charger reports full (mode 5) ({at})"
     world.until(S.FULL, 2)
     assert world.memory.full_pct == soc_pct
@@ -226,7 +227,9 @@ def test_a_standby_that_somebody_orders_is_not_named_full() -> None:
 
 
 def test_early_depends_on_where_the_policy_ends() -> None:
-    policy = replace(POLICY, finish=replace(POLICY.finish, soc_pct=60), start=replace(POLICY.start, soc_below_pct=55))
+    policy = replace(
+        POLICY, finish=replace(POLICY.finish, target_soc_pct=60), start=replace(POLICY.start, soc_below_pct=55)
+    )
     world = World(bay(policy)).charging()
     world.values["soc_pct"] = 59.9
     tapers_off(world)
@@ -236,7 +239,7 @@ def test_early_depends_on_where_the_policy_ends() -> None:
 
 
 def test_a_charger_that_is_not_believed_stopped_by_itself() -> None:
-    policy = replace(POLICY, finish=replace(POLICY.finish, charger_full=False))
+    policy = with_full(charger=False)
     world = World(bay(policy), soc_pct=92.0).charging()
     world.values["soc_pct"] = 96.0
     world.run(2)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
-from orchestrator.core.finish import ends_full, finished, tapers
+from orchestrator.core.finish import ends_full, finished, known_full, tapers
 from orchestrator.core.memory import Still
 from orchestrator.core.sequence import RESUME, RUN
 from orchestrator.core.witnesses import measured
@@ -31,6 +31,7 @@ from orchestrator.model import (
 from tests.core.bays import POLICY
 from tests.core.edges import AT, CONTINUOUS, NO_PRECHARGE, PULSE, Edge, ago, marked, raised, session, witnessed
 from tests.core.said import cause, said
+from tests.core.world import with_full
 
 LIMIT_3 = Command(Action.SET_LIMIT, 3)
 
@@ -101,23 +102,23 @@ FINISH = (
     Edge(ends_full, False, trail((1.0, 53.59, 14.0, 14.0), (0.0, 53.0, 14.0, 14.0))),
     Edge(ends_full, True, bmu={"voltage_v": 53.6}),
     Edge(ends_full, False, bmu={"voltage_v": None}),
-    Edge(ends_full, True, trail((1.0, 53.55, 14.0, 14.0)),
-         policy=replace(POLICY, finish=replace(POLICY.finish, taper=None))),
-    Edge(ends_full, False, trail((1.0, 53.54, 14.0, 14.0)),
-         policy=replace(POLICY, finish=replace(POLICY.finish, taper=None))),
+    Edge(ends_full, True, trail((1.0, 52.97, 14.0, 14.0)),
+         policy=with_full(taper=None)),
+    Edge(ends_full, False, trail((1.0, 52.95, 14.0, 14.0)),
+         policy=with_full(taper=None)),
     Edge(finished, None, bmu={"soc_pct": 99.9}),
     Edge(finished, None, bmu={"soc_pct": None}),
-    Edge(finished, f"SOC 100 % reached 100 % ({AT('finish.soc_pct')})", bmu={"soc_pct": 100.0}),
+    Edge(known_full, f"SOC 100 % reached 100 % ({AT('finish.full.soc_pct')})", bmu={"soc_pct": 100.0}),
     Edge(finished, None, bmu={"soc_pct": 79.9}, charger={"charge_mode": ChargeMode.FULL}),
-    Edge(finished, f"the charger reports full (mode 5) ({AT('finish.charger_full')})", TAPERED,
+    Edge(finished, f"the charger reports full (mode 5) ({AT('finish.full.charger')})", TAPERED,
          bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
     Edge(finished, None, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
     Edge(finished, None, TAPERED, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL},
-         policy=replace(POLICY, finish=replace(POLICY.finish, charger_full=False))),
-    Edge(finished, None, {"taper_s": ago(119.9)}),
-    Edge(finished, f"10.00 A, tapered below 1 A for 120 s ({AT('finish.taper')})", {"taper_s": ago(120)}),
-    Edge(finished, None, {"taper_s": ago(120)},
-         policy=replace(POLICY, finish=replace(POLICY.finish, taper=None))),
+         policy=with_full(charger=False)),
+    Edge(known_full, "", {"taper_s": ago(119.9)}),
+    Edge(known_full, f"10.00 A, tapered below 1 A for 120 s ({AT('finish.full.taper')})", {"taper_s": ago(120)}),
+    Edge(known_full, "", {"taper_s": ago(120)},
+         policy=with_full(taper=None)),
     Edge(tapers, True, charger={"current_a": 0.99}, bmu={"voltage_v": 53.61}),
     Edge(tapers, False, charger={"current_a": 1.0}, bmu={"voltage_v": 53.61}),
     Edge(tapers, False, charger={"current_a": 0.99}, bmu={"voltage_v": 53.6}),
@@ -125,7 +126,7 @@ FINISH = (
     Edge(tapers, False, charger={"current_a": 0.99, "t_s": ago(9)}, bmu={"voltage_v": 53.61}),
     Edge(tapers, False, {"runs_s": None}, charger={"current_a": 0.99}, bmu={"voltage_v": 53.61}),
     Edge(tapers, False, charger={"current_a": 0.99}, bmu={"voltage_v": 53.61},
-         policy=replace(POLICY, finish=replace(POLICY.finish, taper=None))),
+         policy=with_full(taper=None)),
 )  # fmt: skip
 
 NOT_OPERATIONAL = "the BMU's NMT state is {}, not operational: it sends no TPDOs, and does not obey an NMT start"
@@ -225,7 +226,7 @@ OBEDIENCE = (
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
     Edge(obedience.stopped_by_itself, NOT_FULL, TAPERED, bmu={"soc_pct": 85.0},
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL},
-         policy=replace(POLICY, finish=replace(POLICY.finish, charger_full=False))),
+         policy=with_full(charger=False)),
     Edge(obedience.stopped_by_itself, NOT_FULL, bmu={"soc_pct": 79.0},
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
     Edge(obedience.stopped_by_itself, None, TAPERED, bmu={"soc_pct": 79.0},  # that is early_full

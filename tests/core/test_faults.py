@@ -266,9 +266,9 @@ def test_only_a_stop_that_is_due_stops() -> None:
 @pytest.mark.parametrize(
     ("limits", "celsius", "place"),
     [
-        (Range(0, 45), 46.0, "policies/li-ion-48v.yaml:17"),
+        (Range(0, 45), 46.0, "policies/li-ion-48v.yaml:21"),
         (Range(0, 40), 41.0, "station.yaml:7"),
-        (Range(0, 45), -1.0, "policies/li-ion-48v.yaml:17"),
+        (Range(0, 45), -1.0, "policies/li-ion-48v.yaml:21"),
         (Range(5, 45), 4.0, "station.yaml:7"),
     ],
 )

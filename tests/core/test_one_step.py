@@ -71,17 +71,17 @@ RUNS_ON = CUT.format("it has not obeyed the stop for 3 s:", "{}")
 NEVER = CUT.format("nothing has proved for 3 s that it obeyed the stop:", "{}")
 
 GOES = (
-    Edge(goes, (None, "step 2 (8.0 A): because"), holding()),
-    Edge(goes, (None, "step 2 (8.0 A): because; a higher step is allowed, and taken after 60 s "
+    Edge(goes, (None, "step 3 (8.0 A): because"), holding()),
+    Edge(goes, (None, "step 3 (8.0 A): because; a higher step is allowed, and taken after 60 s "
                 f"({AT('current.raise_after_s')})"), holding(raise_s=ago(9))),
-    Edge(goes, (None, "step 2 (8.0 A): because"), holding(**raised("soc_jump"))),
-    Edge(goes, (None, "step 2 (8.0 A): because; text of status_limit; charging goes on, on the lowest step"),
+    Edge(goes, (None, "step 3 (8.0 A): because"), holding(**raised("soc_jump"))),
+    Edge(goes, (None, "step 3 (8.0 A): because; text of status_limit; charging goes on, on the lowest step"),
          holding(**raised("status_limit"))),
     Edge(goes, (None, "the charger charges by itself (automatic mode)"), control=ControlMode.AUTOMATIC),
     Edge(goes, (None, "as before"), {"cause": cause("as before")}),
     Edge(goes, (Trigger.STOP, "paused by the operator"), holding(paused=True)),
     Edge(goes, (Trigger.STOP, "held"), holding(paused=True, hold=cause("held"))),
-    Edge(goes, (Trigger.STOP, f"full: SOC 100 % reached 100 % ({AT('finish.soc_pct')})"), bmu={"soc_pct": 100.0}),
+    Edge(goes, (Trigger.STOP, f"full: SOC 100 % reached 100 % ({AT('finish.full.soc_pct')})"), bmu={"soc_pct": 100.0}),
     Edge(goes, (None, f"the pack is below 39 V: pulse precharge ({AT('precharge.pulse')})"), reached(1.9), PULSE,
          bmu={"voltage_v": 35.1}),
     Edge(goes, (None, f"the pack is below 39 V: pulse precharge ({AT('precharge.pulse')})"), reached(9), PULSE,
@@ -135,8 +135,8 @@ GOES = (
          bmu={"soc_pct": 98.0}),
     Edge(goes, (Trigger.QUALIFY, f"SOC 97 % is below 98 % ({AT('start.soc_below_pct')})"), {}, IDLE, **AT_REST,
          bmu={"soc_pct": 97.0}),
-    Edge(goes, (Trigger.QUALIFY, f"SOC 99 % is below 100 % ({AT('finish.soc_pct')})"), session(), SUSPENDED, **AT_REST,
-         bmu={"soc_pct": 99.0}),
+    Edge(goes, (Trigger.QUALIFY, f"SOC 99 % is below 100 % ({AT('finish.target_soc_pct')})"), session(), SUSPENDED,
+         **AT_REST, bmu={"soc_pct": 99.0}),
     Edge(goes, (None, f"SOC 95 % is not below 95 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 100.0}, FULL,
          **AT_REST, bmu={"soc_pct": 95.0}),
     Edge(goes, (None, f"SOC 87 % is not below 87 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 90.0}, FULL,

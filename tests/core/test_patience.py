@@ -66,8 +66,8 @@ def test_the_step_before_excuses_no_more_than_it_allowed() -> None:
 
 
 def test_a_step_up_excuses_nothing() -> None:
-    world = World(temperature_c=9.0).charging()
-    until_limit(world, 4, temperature_c=10.5)
+    world = World(temperature_c=14.0).charging()
+    until_limit(world, 4, temperature_c=16.5)
     world.amps = 15.8
     world.run(2 * TICK_S)
     assert "over_current" in world.raised

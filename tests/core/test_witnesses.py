@@ -7,7 +7,7 @@ from itertools import cycle
 import pytest
 
 from orchestrator.config.load import load_policy
-from orchestrator.config.policy import Policy
+from orchestrator.config.policy import CellType, Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.witnesses import pack as packs
@@ -300,7 +300,12 @@ def test_another_kind_of_pack_is_refused(name: str, policy: str, volts: float, s
 
 
 def lto() -> Policy:
-    pack = replace(POLICY.pack, cells_in_series=20, voltage_v=replace(POLICY.pack.voltage_v, low=36.0, high=55.0))
+    pack = replace(
+        POLICY.pack,
+        chemistry=CellType.LTO,
+        cells_in_series=20,
+        voltage_v=replace(POLICY.pack.voltage_v, low=36.0, high=55.0),
+    )
     return replace(POLICY, pack=pack)
 
 

@@ -45,6 +45,21 @@ MISSES_UNTIL_SILENT = 5
 BMU_SILENT_S = 1.5
 
 
+#: li-ion-48v in amperes alone; its charge is ended by the SOC, too, so that a test can end one by a word.
+TABLE = "current.temperature_c.rows"
+POLICY = load_policy("li-ion-48v", changes={
+    f"{TABLE}[0].max_c": "null", f"{TABLE}[0].max_a": "2.0", f"{TABLE}[1].max_c": "null", f"{TABLE}[1].max_a": "6.0",
+    "current.where[0].max_c": "null", "current.where[0].max_a": "2.0",
+    "pack.capacity_ah": "null", "finish.full.soc_pct": "100", "finish.max_hours": "12",
+})  # fmt: skip
+
+
+def with_full(**changes: Any) -> Policy:
+    """The same with another way to know that a pack is full."""
+    finish = POLICY.finish
+    return replace(POLICY, finish=replace(finish, full=replace(finish.full, **changes)))
+
+
 def bay(policy: Policy | None = None, control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> Bay:
     """A bay on li-ion-48v with the design's example limits."""
     return Bay(
@@ -52,7 +67,7 @@ def bay(policy: Policy | None = None, control: ControlMode = ControlMode.MANUAL,
         charger=ChargerConfig(port="/dev/ttyX", control=control, steps_a=STEPS_A),
         battery=BatteryConfig(can="can0", node_id=0x10, map=ObjectMap(map="none", objects=())),
         limits=Limits(voltage_v=58.4, current_a=current_a, temperature_c=Range(0, 45)),
-        policy=policy or load_policy("li-ion-48v"),
+        policy=policy or POLICY,
     )
 
 

@@ -34,7 +34,7 @@ NUMBERS = [
     *(f"C{number}" for number in range(1, 32)),
     *(f"B{number}" for number in range(1, 29)),
     *(f"G{number}" for number in range(1, 11)),
-    *(f"P{number}" for number in range(1, 12)),
+    *(f"P{number}" for number in range(1, 13)),
 ]
 
 

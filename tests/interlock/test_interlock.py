@@ -39,7 +39,7 @@ STOPS = {Command(Action.STOP, value) for value in range(-2, 260)}
 RESUME = Command(Action.RESUME)
 RUN = Command(Action.RUN)
 SETS = {
-    *(Command(Action.SET_LIMIT, step) for step in (0, 1, 2, 3)),  # step 4 is 14 A, above the station's 12 A
+    *(Command(Action.SET_LIMIT, step) for step in (0, 1, 2, 3)),  # step 5 is 14 A, above the station's 12 A
     *(Command(Action.SET_MODE, mode) for mode in (3, 4, 5)),
     *(Command(Action.SET_PRECHARGE, function) for function in (0, 1, 2)),
 }
@@ -129,14 +129,14 @@ def test_a_step_whose_current_the_station_does_not_state_is_refused() -> None:
         (RUN, replace(GOOD, expires_s=NOW_S - 2), MANUAL, "run: the readings that it rests on are 2.0 s too old"),
         (RUN, replace(GOOD, voltage_v=60.0), MANUAL, "run: 60 V is above the station's 58.4 V"),
         (RESUME, replace(GOOD, temperature_c=50.0), MANUAL, "resume: 50 °C is outside the station's 0 … 45 °C"),
-        (RUN, replace(GOOD, current_limit=4), MANUAL, "run: step 4 is 14 A, above the station's 12 A"),
+        (RUN, replace(GOOD, current_limit=4), MANUAL, "run: step 5 is 14 A, above the station's 12 A"),
         (
             RUN,
             replace(GOOD, current_limit=None),
             MANUAL,
             "run: what the charger's current limit None means is not known",
         ),
-        (Command(Action.SET_LIMIT, 4), GOOD, MANUAL, "set_limit: step 4 is 14 A, above the station's 12 A"),
+        (Command(Action.SET_LIMIT, 4), GOOD, MANUAL, "set_limit: step 5 is 14 A, above the station's 12 A"),
         (Command(Action.SET_MODE, 9), GOOD, MANUAL, "set_mode 9 is no order for a charger in manual mode"),
         (RUN, GOOD, AUTOMATIC, "run 0 is no order for a charger in automatic mode"),
     ],

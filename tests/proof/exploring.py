@@ -21,7 +21,7 @@ from tests.proof.virtual_service import station
 POLICIES = ("li-ion-48v", "lfp-48v", "long-life-48v", "li-ion-24v")
 #: What the quick form leaves out: the neighbours of every bound. The jumps that it keeps lead past every kind of timer.
 NEIGHBOURS = ("just above", "just below")
-QUICK_JUMPS_S = {ControlMode.MANUAL: (3.1, 70.1, 1200.1, 43200.1), ControlMode.AUTOMATIC: (3.1, 43200.1)}
+QUICK_JUMPS_S = {ControlMode.MANUAL: (3.1, 70.1, 1200.1, 108000.1), ControlMode.AUTOMATIC: (3.1, 108000.1)}
 SMALL_CHARGERS = (
     "obeys", "stands by, whatever it is told", "runs, whatever it is told", "stands by, no stop written yet",
     "full by itself", "stopped by an error", "silent", "never heard",

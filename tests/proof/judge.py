@@ -178,6 +178,11 @@ def _deep(_: "Judge", charger: Charger) -> bool:
     return volts and charger.current_a > 1.5 * model.precharge_a
 
 
+#: Only the first amperes show that cables are crossed; until then a pack is watched by another one's BMU.
+CROSSED_S = 9.0
+#: What the charger's own line tells, whoever's pack it charges.
+BY_CHARGER = frozenset({"no order", "operator's stop", "over-current", "over-voltage"})
+
 REASONS: tuple[Reason, ...] = (
     Reason("no order", LINE_S, lambda judge, c: judge.by(c).meant != "run" and not judge.wants(c)),
     Reason("operator's stop", ASKED_S, lambda _, c: c.asked_stop),
@@ -188,7 +193,7 @@ REASONS: tuple[Reason, ...] = (
     Reason("BMU silent", LINE_S, lambda _, c: c.rig.bmu.port.faults.mute),
     Reason("another pack", LINE_S + 3.0, _another),
     Reason("collapsed", LINE_S, _collapsed),
-    Reason("crossed", 9.0, _crossed),
+    Reason("crossed", CROSSED_S, _crossed),
     Reason("BMU frozen", 62.0, _frozen),
     Reason("apart, most of the time", 20.0, lambda _, c: c.rig.apart_v > 1.2),
     Reason("deep", LINE_S, _deep),
@@ -480,7 +485,9 @@ class Judge:
             port = self.by(charger)
             deaf_s = port.deaf_s + OPEN_S if port.deaf_s else 0.0
             reached_s = max(since_s, self.booted_s + OPEN_S, deaf_s, port.rig.tty.changed_s)
-            if charger.obeys and now_s - reached_s > reason.within_s:
+            blind = reason.name not in BY_CHARGER and _crossed(self, charger)
+            within_s = max(reason.within_s, CROSSED_S) if blind else reason.within_s
+            if charger.obeys and now_s - reached_s > within_s:
                 self.find(
                     charger.number, reason.name, f"current flows for {now_s - since_s:.2f} s, {self._state(charger)}"
                 )
@@ -496,6 +503,8 @@ class Judge:
             charger.onsets.append(now_s)
         onsets = charger.onsets
         if self.booted_s is None or self.entry(charger) is None or len(onsets) < RESTARTS or onsets[0] < self.booted_s:
+            return
+        if self.frozen or not self.gateway.alive(self.gateway.controller):  # nobody is there to tell
             return
         if now_s - onsets[0] < RESTARTS_S and charger.named_s < onsets[0] and now_s - onsets[-1] > MARGIN_S:
             self.find(charger.number, "nobody is told", f"it runs again and again by itself, {self._state(charger)}")

@@ -369,7 +369,7 @@ WITNESSES: tuple[Seed, ...] = (
         "witness",
         "a charger that somebody has stopped by other means is taken for full",
         ("stopped by other means",),
-        (f"{CORE}finish.py", "    rule, high_v, trail = f.rules", "    return True\n    rule, high_v, trail = f.rules"),
+        (f"{CORE}finish.py", "    pack, trail = f.rules", "    return True\n    pack, trail = f.rules"),
     ),
     hostile(
         "estop believes one answer",

@@ -48,7 +48,7 @@ class Site:
         self.reload.read()
 
     def edit_finish(self) -> None:
-        self.edit(self.policy_file, "soc_pct: 100\n", "soc_pct: 99\n")
+        self.edit(self.policy_file, "target_soc_pct: 100 ", "target_soc_pct: 99 ")
 
     @property
     def policy(self) -> dict[str, str]:
@@ -143,7 +143,7 @@ def test_a_comment_changes_the_lines_that_reasons_name(site: Site) -> None:
 def test_a_file_with_an_error_changes_nothing(site: Site) -> None:
     site.bench.step()
     before = site.policy
-    site.edit(site.policy_file, "soc_pct: 100\n", "soc_pct: 101\n")
+    site.edit(site.policy_file, "target_soc_pct: 100 ", "target_soc_pct: 101 ")
     (said,) = site.said
     first, *_, last = said.splitlines()
     assert first.startswith(f"{site.policy_file}:") or "mine.yaml:" in first
@@ -175,5 +175,5 @@ def test_what_is_taken_back_before_it_came_into_force_never_does(site: Site) -> 
     site.bench.charging()
     before = site.policy
     site.edit_finish()
-    site.edit(site.policy_file, "soc_pct: 99\n", "soc_pct: 100\n")
+    site.edit(site.policy_file, "target_soc_pct: 99 ", "target_soc_pct: 100 ")
     assert site.policy == before

@@ -14,7 +14,7 @@ def bay(**changes: object) -> dict[str, object]:
     return {
         "name": "bay-1",
         "state": "CHARGING",
-        "reason": "step 1 (5.0 A): temperature 8.4 °C in 0 … 10 °C",
+        "reason": "step 2 (5.0 A): temperature 8.4 °C in 0 … 10 °C",
         "step": 1,
         "step_current_a": 5.0,
         "charger": {"current_a": 4.98},
@@ -37,10 +37,10 @@ EMPTY = bay(
 
 def test_a_line_a_bay_with_units() -> None:
     assert table([bay(), EMPTY]) == (
-        "BAY                     STATE     SOC   PACK     CURRENT  TEMP    STEP     WHY\n"
-        "bay-1                   CHARGING  55 %  48.12 V  4.98 A   8.4 °C  1 (5 A)  "
-        "step 1 (5.0 A): temperature 8.4 °C in 0 … 10 °C\n"
-        "a-bay-with-a-long-name  IDLE      –     –        –        –       –        no battery"
+        "BAY                     STATE     SOC   PACK     CURRENT  TEMP    STEP       WHY\n"
+        "bay-1                   CHARGING  55 %  48.12 V  4.98 A   8.4 °C  2 (5.0 A)  "
+        "step 2 (5.0 A): temperature 8.4 °C in 0 … 10 °C\n"
+        "a-bay-with-a-long-name  IDLE      –     –        –        –       –          no battery"
     )
 
 

@@ -53,7 +53,7 @@ def test_status_shows_every_bay_and_why(station: Station) -> None:
     assert table.returncode == 0
     assert table.stdout.splitlines()[0].split() == ["BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY"]
     assert "bay-1" in table.stdout
-    assert "4 (14 A)  step 4 (14.0 A): the highest step, nothing limits it" in table.stdout
+    assert "5 (14.0 A)  step 5 (14.0 A): the highest step, nothing limits it" in table.stdout
     one = service.cli("status", "bay-2", "--json")
     document = json.loads(one.stdout)
     assert document["station"] == "whole"

@@ -29,7 +29,7 @@ def test_files_are_written_and_named(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_a_sweep_is_played(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ("--sweep", "finish.soc_pct=98..100:2", "--jobs", "1", "--out", str(tmp_path))
+    arguments = ("--sweep", "finish.target_soc_pct=98..100:2", "--jobs", "1", "--out", str(tmp_path))
     assert main((*RUN, *arguments)) == 0
     printed = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in printed[1:3]] == ["98", "100"]

@@ -52,11 +52,11 @@ def test_a_policy_names_its_thresholds_with_their_lines() -> None:
     policy = load_policy("li-ion-48v")
     lines = Path(__file__).parents[2].joinpath("policies", "li-ion-48v.yaml").read_text(encoding="utf-8").splitlines()
     said = [line for arrow in diagram(policy).arrows for line in arrow.lines if "(line " in line]
-    assert "SOC below 98 % (line 22)" in said
+    assert "SOC below 98 % (line 26)" in said
     for line in said:
         number = int(line.rpartition("(line ")[2].rstrip(")"))
         assert lines[number - 1].strip(), line
-    assert lines[21].strip().startswith("soc_below_pct: 98")
+    assert lines[25].strip().startswith("soc_below_pct: 98")
 
 
 def test_it_is_drawn(tmp_path: Path) -> None:

@@ -61,17 +61,18 @@ def test_leaps_decide_what_ticks_decide(played: Mapping[str, Future[tuple[Run, R
 
 
 def test_leaps_decide_what_ticks_decide_to_the_end_of_a_charge() -> None:
-    whole = scenario(0.55)
-    leaps = simulate(load_policy("li-ion-48v"), whole)
-    same(leaps, simulate(load_policy("li-ion-48v"), whole, stretch=False))
+    whole, policy = scenario(0.55), load_policy("li-ion-48v", changes={"finish.full.taper.for_s": "10"})
+    leaps = simulate(policy, whole)
+    same(leaps, simulate(policy, whole, stretch=False))
     assert leaps.trail.spans[-1].state is State.FULL
 
 
 def test_leaps_decide_what_ticks_decide_where_limits_are_held_and_left() -> None:
     """A policy with many bands, a sensor that drifts, an operator who pauses, and the Ah limit at the end."""
     policy = load_policy("lfp-48v", changes={"pack.cells_in_series": "13", "pack.voltage_v[1]": "55.2",
-                                             "current.voltage_v[2].to": "56.5", "finish.max_ah": "3",
-                                             "finish.taper.above_v": "53"})  # fmt: skip
+                                             "current.voltage_v.rows[2].to": "56.5", "finish.max_ah": "3",
+                                             "pack.chemistry": "nmc",
+                                             "finish.full.taper.above_v": "53"})  # fmt: skip
     busy = scenario(
         1.0,
         batteries={"pack-1": battery(soh_pct=77)},

@@ -27,7 +27,9 @@ def test_the_files_have_every_warning() -> None:
     for words in (
         "precharge never begins", "the pulse stage ends as it begins", "the taper is never seen", "only the BMU's own",
         "too near to full", "charging pauses outside", "is refused", "no current flows outside", "will flap",
-        "too narrow", "is never taken", "the charge is over at", "are a fault", "of a taper: full right above",
+        "too narrow", "never flow", "the charge is over at", "are a fault", "no charge begins",
+        "deeply discharged packs are refused",
+        "are few for nmc",
     ):  # fmt: skip
         assert words in said, words
 

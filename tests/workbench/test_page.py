@@ -79,8 +79,8 @@ def test_the_page_names_figures_rules_and_their_lines(files: list[Path], runs: l
         for span in run.trail.spans:
             assert re.sub(r"\s+", " ", span.why)[:30] in text
     assert "time to full, h:min" in text
-    assert "SOC 90 % in 90 … 100, policies/li-ion-48v.yaml:49" in text
-    assert "policies/long-life-48v.yaml:42" in text
+    assert "SOC 90 % in 90 … 100 allows 8.0 A, policies/li-ion-48v.yaml:60" in text
+    assert "policies/long-life-48v.yaml:50" in text
 
 
 def test_what_the_policies_do_differently_is_marked(files: list[Path]) -> None:

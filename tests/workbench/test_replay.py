@@ -56,7 +56,7 @@ def differences(journal: Path, policy: str | Path) -> list[Difference]:
 def changed_policy(tmp_path: Path, *changes: tuple[str, str]) -> Path:
     text = Path(__file__).parents[2].joinpath("policies", "li-ion-48v.yaml").read_text(encoding="utf-8")
     for old, new in changes:
-        assert text.count(old) == 1
+        assert text.count(old) == 1, old
         text = text.replace(old, new)
     path = tmp_path / "changed.yaml"
     path.write_text(text, encoding="utf-8")
@@ -101,13 +101,14 @@ def test_a_gentler_policy_is_told_with_both_lines(journal: Path, capsys: pytest.
     assert first.ah < 0
     assert main(["replay", str(journal), "--policy", "long-life-48v"]) == 0
     out = capsys.readouterr().out
-    assert "was  CHARGING: step 4 (14.0 A): the highest step" in out
+    assert "was  CHARGING: step 5 (14.0 A): the highest step" in out
     assert "policies/long-life-48v.yaml:" in out
     assert "Ah less, by a lower step" in out
 
 
 def test_a_policy_that_ends_earlier_parts_from_the_record(journal: Path, tmp_path: Path) -> None:
-    earlier = changed_policy(tmp_path, ("soc_pct: 100\n", "soc_pct: 90\n"), ("soc_below_pct: 98", "soc_below_pct: 90"),
+    earlier = changed_policy(tmp_path, ("target_soc_pct: 100 ", "target_soc_pct: 90 "),
+                             ("soc_below_pct: 98", "soc_below_pct: 90"),
                              ("soc_below_pct: 95", "soc_below_pct: 80"))  # fmt: skip
     found = [one for one in differences(journal, earlier) if one.was.state is State.CHARGING and one.parted]
     (one,) = found
@@ -121,7 +122,7 @@ def test_a_policy_that_stops_for_cold_earlier_is_compared_anew_from_the_next_res
     journal: Path, tmp_path: Path
 ) -> None:
     colder = changed_policy(tmp_path, ("temperature_c: [0, 45]", "temperature_c: [10, 45]"),
-                            ("- {from: 0, to: 10, step: 0} ", "- {from: 9, to: 10, step: 0} "))  # fmt: skip
+                            ("- {from: 0, to: 10, max_c: 0.05} ", "- {from: 9, to: 10, max_c: 0.05} "))  # fmt: skip
     found = differences(journal, colder)
     assert (found[0].was.state, found[0].now.state) == (State.CHARGING, State.STOPPING)
     assert "the limit is 10 °C" in reason_of(found[0].now)
@@ -129,7 +130,8 @@ def test_a_policy_that_stops_for_cold_earlier_is_compared_anew_from_the_next_res
 
 
 def test_the_same_policy_differs_in_nothing(journal: Path) -> None:
-    assert differences(journal, "li-ion-48v") == []
+    same = load_policy("li-ion-48v", changes={"finish.full.soc_pct": "100"})
+    assert compare(again(read([journal]).bays["bay-1"]), same) == []
 
 
 def gzipped(journal: Path, to: Path) -> None:

@@ -48,7 +48,7 @@ def test_the_spans_join_without_a_gap() -> None:
 def test_the_binding_rule_is_named_with_its_line() -> None:
     run = simulate(POLICY, scenario(1.0))
     bound = next(span for span in run.trail.spans if span.step == 2)
-    assert bound.why == f"SOC 90 % in 90 … 100, {POLICY.source.at('current.soc_pct[1]')}"
+    assert bound.why == f"SOC 90 % in 90 … 100 allows 8.0 A, {POLICY.source.at('current.soc_pct.rows[1]')}"
 
 
 def test_batteries_come_and_go_and_keep_their_charge() -> None:
@@ -110,7 +110,7 @@ def test_a_policy_for_other_cells_is_refused_with_both_lines() -> None:
     with pytest.raises(UnsuitableError) as caught:
         simulate(load_policy("li-ion-24v"), load_scenario("cold-morning"))
     assert str(caught.value) == (
-        "policy li-ion-24v is for 7 cells in series (policies/li-ion-24v.yaml:11), "
+        "policy li-ion-24v is for 7 cells in series (policies/li-ion-24v.yaml:12), "
         "pack-1 has 13 (configs/scenarios/cold-morning.yaml:34)"
     )
 

@@ -16,9 +16,9 @@ from orchestrator.workbench.simulate.figures import Figures
 from orchestrator.workbench.simulate.simulation import UnsuitableError
 from orchestrator.workbench.simulate.sweep import Axis, ClusterError, Point, Sweep, axis, best, cluster, played, rows
 
-FINISH = Axis(("finish.soc_pct",), ("80", "97", "100"))
+FINISH = Axis(("finish.target_soc_pct",), ("80", "97", "100"))
 DEEP = load_scenario("deep-discharge")
-STEP = Axis(("current.temperature_c[1].step",), ("2", "4"))
+STEP = Axis(("current.temperature_c.rows[2].max_a",), ("8", "14"))
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_every_combination_is_played_in_order(swept: Sweep) -> None:
 
 def test_the_values_are_what_the_policy_goes_by(swept: Sweep) -> None:
     found = {point.values: point.figures for point in swept.points}
-    full, gentle = found["100", "4"], found["100", "2"]
+    full, gentle = found["100", "14"], found["100", "8"]
     assert full is not None
     assert gentle is not None
     assert full.full_h is not None
@@ -48,13 +48,13 @@ def test_the_values_are_what_the_policy_goes_by(swept: Sweep) -> None:
 def test_what_the_policy_may_not_have_is_refused_with_its_line(swept: Sweep) -> None:
     refused = [point for point in swept.points if point.values[0] == "80"]
     assert all(point.figures is None for point in refused)
-    assert refused[0].refused.startswith("policies/li-ion-48v.yaml:22:18: error: start.soc_below_pct: 98 % is above")
+    assert refused[0].refused.startswith("policies/li-ion-48v.yaml:26:18: error: start.soc_below_pct: 98 % is above")
     assert any("refused" in cell for row in rows(swept) for cell in row)
 
 
 def test_a_table_has_all_points_below_its_head(swept: Sweep) -> None:
     head, *lines = rows(swept)
-    assert head[:3] == ["finish.soc_pct", "current.temperature_c[1].step", "time to full, h:min"]
+    assert head[:3] == ["finish.target_soc_pct", "current.temperature_c.rows[2].max_a", "time to full, h:min"]
     assert [line[:2] for line in lines] == [list(point.values) for point in swept.points]
     assert {len(line) for line in lines} == {len(head)}
 
@@ -65,7 +65,7 @@ def test_a_sweep_becomes_a_picture_and_a_file_of_numbers(swept: Sweep, tmp_path:
         assert picture.format == "PNG"
     with numbers.open(encoding="utf-8") as file:
         records = list(csv.DictReader(file))
-    assert [record["finish.soc_pct"] for record in records] == [point.values[0] for point in swept.points]
+    assert [record["finish.target_soc_pct"] for record in records] == [point.values[0] for point in swept.points]
     assert records[0]["full_h"] == ""
     assert float(records[-1]["full_h"]) == swept.points[-1].figures.full_h  # type: ignore[union-attr]  # it has
 

@@ -16,6 +16,7 @@ from orchestrator.config.yaml import scalars
 from orchestrator.config.yaml.scalars import UnfitError
 from orchestrator.config.yaml.schema import INVALID, Slot, join, places, slots
 from orchestrator.config.yaml.tree import Entries, Items, Mark, Node, Refused, Scalar
+from orchestrator.config.yesterday import ROWS, Yesterday
 from orchestrator.errors import Finding
 from orchestrator.keys import Key, Range, Source
 
@@ -38,7 +39,11 @@ class Reader:
     """
 
     def __init__(
-        self, file: str, references: Mapping[type, Callable[[str], object]] | None = None, digest: str = ""
+        self,
+        file: str,
+        references: Mapping[type, Callable[[str], object]] | None = None,
+        digest: str = "",
+        yesterday: Yesterday | None = None,
     ) -> None:
         self.findings: list[Finding] = []
         self.values: dict[str, object] = {}
@@ -46,6 +51,7 @@ class Reader:
         self._lines: dict[str, int] = {}
         self._file, self._digest = file, digest
         self._references = references or {}
+        self._yesterday = yesterday or Yesterday()
 
     def report(self, path: str, text: str, severity: str = "error") -> None:
         """A finding at the key `path`, or at its nearest parent that is written in the file."""
@@ -168,21 +174,33 @@ class Reader:
 
     def _record(self, node: Node, record: type, path: str) -> object:
         known = slots(record)
+        if isinstance(node, Items) and "rows" in known:
+            self.report(path, ROWS.format(name=path.rpartition(".")[2]))
+            rows = known["rows"]
+            self._items(node, get_args(rows.hint)[0], join(path, rows.name), rows.key)
+            return INVALID
         if not isinstance(node, Entries):
             self.report(path, f"needs the keys {', '.join(known)}, indented below it")
             return INVALID
         given = {name.text for name, _ in node.entries}
         values: dict[str, object] = {}
         for name, value in node.entries:
-            slot = known.get(name.text) or self._unknown(name, record, given | set(values), path)
+            slot = known.get(name.text) or self._other(name, value, record, given | set(values), path)
             if slot is not None:
                 values[slot.name] = self._entry(name, value, slot.hint, join(path, slot.name), slot.key)
         for slot in known.values():
             if slot.name not in values:
-                values[slot.name] = self._absent(slot, path)
+                values[slot.name] = self._absent(slot, record, path)
         if INVALID in values.values():
             return INVALID
         return self._build(record, {known[name].field: value for name, value in values.items()}, path)
+
+    def _other(self, name: Scalar, node: Node, record: type, taken: set[str], path: str) -> Slot | None:
+        """A key that is none of this record's: one of yesterday, or unknown."""
+        if instead := self._yesterday.instead(record, name.text, node):
+            self._report(name.mark, f"{join(path, name.text)}: {instead}")
+            return None
+        return self._unknown(name, record, taken, path)
 
     def _unknown(self, name: Scalar, record: type, taken: set[str], path: str) -> Slot | None:
         """Says what an unknown key may have meant; if that is still free, its value is read as such."""
@@ -199,10 +217,11 @@ class Reader:
         self._report(name.mark, f"unknown key {name.text!r}{at}; {hint}{', '.join(known)}")
         return known[near] if near and near not in taken and not where else None
 
-    def _absent(self, slot: Slot, path: str) -> object:
+    def _absent(self, slot: Slot, record: type, path: str) -> object:
         if slot.default is INVALID:
             about = f"{slot.key.about}, in {slot.key.unit}" if slot.key.unit else slot.key.about
-            self.report(path, f"the key {slot.name!r} is missing: {about}")
+            write = self._yesterday.missing(record, slot.name, self.values)
+            self.report(path, f"the key {slot.name!r} is missing: {about}{'; ' if write else ''}{write}")
         else:
             self._default(slot.default, join(path, slot.name))
         return slot.default

@@ -1,5 +1,6 @@
 """Faults of the charge itself: it takes too long, too much, or leads nowhere."""
 
+from orchestrator.core import limits
 from orchestrator.core.facts import Facts
 from orchestrator.model import Cause, State
 
@@ -33,9 +34,23 @@ def precharge_too_long(f: Facts) -> Cause | None:
     return f.rules.by_policy("precharge_too_long", key, lasted_min=minutes, below_v=rule.below_v)
 
 
+def no_step_allowed(f: Facts) -> Cause | None:
+    """FAULTS P12: `max_a: 0`, or a charger whose lowest step is too much."""
+    return limits.none_allowed(f)
+
+
+def precharge_too_strong(f: Facts) -> Cause | None:
+    """FAULTS P12: precharge is always on the charger's lowest step."""
+    rule, lowest_a = f.rules.policy.precharge, f.rules.worst_a[0]
+    if not f.rules.manual or rule is None or f.pack_v is None or f.pack_v >= rule.below_v or lowest_a <= rule.max_a:
+        return None
+    key = "precharge.max_a"
+    return f.rules.by_policy("precharge_too_strong", key, pack_v=f.pack_v, max_a=rule.max_a, lowest_a=lowest_a)
+
+
 def time_limit(f: Facts) -> Cause | None:
     """FAULTS C17."""
-    session, hours = f.memory.session, f.rules.policy.finish.max_hours
+    session, hours = f.memory.session, f.rules.max_hours
     if session is None:
         return None
     took_s = session.energised_s + session.unseen_s
@@ -46,7 +61,7 @@ def time_limit(f: Facts) -> Cause | None:
 
 def ah_limit(f: Facts) -> Cause | None:
     """FAULTS C17."""
-    session, max_ah = f.memory.session, f.rules.policy.finish.max_ah
+    session, max_ah = f.memory.session, f.rules.max_ah
     if session is None:
         return None
     begun_pct = session.soc_start_pct or 0.0

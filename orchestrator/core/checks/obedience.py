@@ -84,7 +84,7 @@ def stopped_by_itself(f: Facts) -> Cause | None:
         return None
     if not f.full_mode:
         return Cause("stopped_by_itself")
-    if early_full(f) is not None or (f.rules.policy.finish.charger_full and ends_full(f)):
+    if early_full(f) is not None or (f.rules.policy.finish.full.charger is not False and ends_full(f)):
         return None
     return Cause("stopped_not_full")
 

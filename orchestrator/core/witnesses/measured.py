@@ -112,7 +112,7 @@ def bmu_frozen(f: Facts) -> Cause | None:
     if frozen is None or session is None or f.volts is None or f.now_s - frozen.t_s < STILL_S:
         return None
     moved_v, moved_ah = abs(f.volts - frozen.charger_v), session.charged_ah - frozen.charged_ah
-    if moved_v <= MOVED_V and moved_ah < MOVED_SHARE * f.rules.policy.finish.max_ah:
+    if moved_v <= MOVED_V and moved_ah < MOVED_SHARE * f.rules.max_ah:
         return None
     return Cause.of("bmu_frozen", lasted_s=f.now_s - frozen.t_s, moved_v=moved_v, moved_ah=moved_ah)
 

@@ -115,6 +115,9 @@ TEXTS: Mapping[str, str] = {
     "pack_too_high": "the pack has {pack_v:.2f} V at SOC {soc_pct:.0f} %: with {cells} {kind} cells{at} that is "
     "{cell_v:.2f} V a cell, where at most {bound_v:.2f} V belong to this SOC. It is another kind of pack, or its SOC "
     "is wrong",
+    "below_lowest_step": "{rule}; the lowest step of this charger is {lowest_a:g} A",
+    "precharge_too_strong": "the pack has {pack_v:.2f} V and needs precharge with at most {max_a:g} A{at}; the lowest step "
+    "of this charger is {lowest_a:g} A",
     # who else is on the bus
     "other_master": "{seen}",
     "heartbeat_set": "{seen}",

@@ -109,6 +109,9 @@ TEXTS: Mapping[str, str] = {
     "{cell_v:.2f} V인데, 이 SOC에서는 {bound_v:.2f} V 이상이어야 합니다. 다른 종류의 팩이거나 SOC가 틀렸습니다",
     "pack_too_high": "팩 전압이 SOC {soc_pct:.0f} %에서 {pack_v:.2f} V입니다: {kind} 셀 {cells}직렬{at}이면 셀당 "
     "{cell_v:.2f} V인데, 이 SOC에서는 {bound_v:.2f} V 이하여야 합니다. 다른 종류의 팩이거나 SOC가 틀렸습니다",
+    "below_lowest_step": "{rule}. 이 충전기의 가장 낮은 단계는 {lowest_a:g} A입니다",
+    "precharge_too_strong": "팩 전압이 {pack_v:.2f} V이므로 {max_a:g} A 이하의 프리차지가 필요합니다{at}. 이 충전기의 가장 "
+    "낮은 단계는 {lowest_a:g} A입니다",
     # who else is on the bus
     "other_master": "{seen}",
     "heartbeat_set": "{seen}",

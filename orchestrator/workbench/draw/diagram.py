@@ -7,6 +7,7 @@ group is one arrow; what leads from anywhere in a group to one of its own states
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
+from orchestrator.config.amperes import max_ah, taper_of
 from orchestrator.config.policy import Policy
 from orchestrator.core.machine import ENERGISED_STAGES, RESTING, TABLE, UNVERIFIED, Trigger
 from orchestrator.model import State
@@ -115,17 +116,22 @@ def _woken(p: Policy) -> Iterator[tuple[str, str]]:
 
 
 def _ends(p: Policy) -> Iterator[tuple[str, str]]:
-    finish = p.finish
-    yield f"full: SOC {finish.soc_pct:g} %", "finish.soc_pct"
-    if finish.taper is not None:
-        yield f"full: below {finish.taper.below_a:g} A above {finish.taper.above_v:g} V", "finish.taper"
-    if finish.charger_full:
-        yield "full: the charger says so", "finish.charger_full"
+    finish, full = p.finish, p.finish.full
+    if finish.target_soc_pct < 100:
+        yield f"target: SOC {finish.target_soc_pct:g} %", "finish.target_soc_pct"
+    if full.soc_pct is not None:
+        yield f"full: SOC {full.soc_pct:g} %", "finish.full.soc_pct"
+    taper = taper_of(p)
+    if taper is not None:
+        yield f"full: below {taper.below_a:g} A above {taper.above_v:g} V", "finish.full.taper"
+    if full.charger is not False:
+        yield "full: the charger says so", "finish.full.charger"
     yield f"pause: outside {p.pack.temperature_c} °C", "pack.temperature_c"
     yield f"trip: {p.faults.temperature_trip_c:g} °C", "faults.temperature_trip_c"
     yield f"trip: above {p.pack.voltage_v.high:g} V", "pack.voltage_v"
-    yield f"trip: {finish.max_hours:g} h", "finish.max_hours"
-    yield f"trip: {finish.max_ah:g} Ah", "finish.max_ah"
+    if finish.max_hours is not None:
+        yield f"trip: {finish.max_hours:g} h", "finish.max_hours"
+    yield f"trip: {max_ah(p.pack, finish):g} Ah", "finish.max_ah"
     yield "any other fault", ""
 
 

@@ -43,7 +43,7 @@ PANELS: tuple[tuple[str, Callable[[Moment], float | None]], ...] = (
     ("pack voltage, V", lambda m: m.voltage_v),
     ("current, A", lambda m: m.current_a),
     ("temperature, °C", lambda m: m.temperature_c),
-    ("current-limit step", lambda m: m.step),
+    ("current step", lambda m: m.step + 1 if m.step is not None else None),
 )
 HEIGHTS = (3.0, 2.4, 2.4, 2.4, 1.3)
 WIDTH_IN = 12.0
@@ -208,5 +208,5 @@ def when(bound: Bound) -> str:
 
 def says(span: Span) -> str:
     """State, step and rule in one line."""
-    step = f", step {span.step} ({span.step_a:g} A)" if span.step is not None else ""
+    step = f", step {span.step + 1} ({span.step_a:.1f} A)" if span.step is not None else ""
     return f"{span.state}{step}: {span.why}"

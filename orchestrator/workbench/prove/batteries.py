@@ -1,9 +1,10 @@
 """What a battery can show, cut by a policy's thresholds."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from orchestrator.config.amperes import ranges, row_a, tables
 from orchestrator.config.station import Limits
 from orchestrator.core.cells import chemistry
 from orchestrator.core.memory import Memory
@@ -36,9 +37,7 @@ class Shown:
     connected: bool = True
     old: frozenset[str] = frozenset()  #: values that are too old
     link: Callable[[float, Memory], Link] = field(default=lambda _now_s, _memory: {})
-    at_work: bool = (
-        False  #: only a table of steps tells it from others, so it is another one while there are steps only
-    )
+    at_work: bool = False  #: only rows that allow a step tell it from others: it is another one while there are steps
 
     @property
     def volts(self) -> float:
@@ -106,9 +105,9 @@ def batteries(rules: Rules) -> dict[str, Shown]:
     """Every class for this bay, by its name."""
     base = healthy(rules)
     classes = {"healthy": base}
+    rows = _rows(rules)
     for field_name, bounds in _bounds(rules).items():
-        steps = {band.from_ for band in getattr(rules.policy.current, field_name) or ()}
-        for bound in sorted(bounds | steps):
+        for bound in sorted(bounds | rows[field_name]):
             for word, value in (
                 ("just below", bound - NEAR[field_name]), ("at", bound), ("just above", bound + NEAR[field_name]),
             ):  # fmt: skip
@@ -133,14 +132,46 @@ def _bounds(rules: Rules) -> dict[str, set[float]]:
     volts = {policy.pack.voltage_v.low, rules.max_v}
     if policy.precharge is not None:
         volts |= {policy.precharge.below_v, policy.precharge.pulse.until_v}
-    if policy.finish.taper is not None:
-        volts.add(policy.finish.taper.above_v)
-    return {
+    if rules.taper is not None:
+        volts.add(rules.taper.above_v)
+    bounds = {
         "voltage_v": volts,
         "temperature_c": {rules.temperature_c.low, rules.temperature_c.high, policy.faults.temperature_trip_c},
-        "soc_pct": {policy.start.soc_below_pct, policy.recharge.soc_below_pct, policy.finish.soc_pct, 80.0},
+        "soc_pct": {policy.start.soc_below_pct, policy.recharge.soc_below_pct, policy.finish.target_soc_pct, 80.0},
         "soh_pct": {policy.pack.soh_min_pct},
     }
+    for row in _pauses(rules):
+        for name, (low, high) in row.items():
+            bounds[name] |= {low, high}
+    return bounds
+
+
+Span = Mapping[str, tuple[float, float]]
+
+
+def _spans(rules: Rules) -> Iterator[tuple[Span, float]]:
+    """Every row of the policy: which values it is about, and what it allows, in amperes."""
+    current, pack = rules.policy.current, rules.policy.pack
+    for name, table in tables(current):
+        for band in table.rows:
+            yield {name: (band.from_, band.to)}, row_a(band, pack.current_a, pack.capacity_ah)
+    for rule in current.where:
+        spans = {name: (span.low, span.high) for name, span in ranges(rule).items()}
+        yield spans, row_a(rule, pack.current_a, pack.capacity_ah)
+
+
+def _pauses(rules: Rules) -> Iterator[Span]:
+    """Rows that allow less than the lowest step: they keep a bay at rest."""
+    return (span for span, allowed_a in _spans(rules) if allowed_a < rules.worst_a[0])
+
+
+def _rows(rules: Rules) -> dict[str, set[float]]:
+    """The bounds of all rows: what only they tell apart decides nothing at rest."""
+    rows: dict[str, set[float]] = {name: set() for name in NEAR}
+    for span, _ in _spans(rules):
+        for name, (low, high) in span.items():
+            rows[name] |= {low, high}
+    return rows
 
 
 def _beyond(limits: Limits) -> dict[str, dict[str, float]]:
@@ -152,18 +183,26 @@ def _beyond(limits: Limits) -> dict[str, dict[str, float]]:
     }
 
 
+def _full(base: Shown, rules: Rules) -> Shown:
+    """At the target, or full: its current has tapered off at the end voltage."""
+    full = {**base.values, **_with(rules, "soc_pct", rules.policy.finish.target_soc_pct)}
+    if rules.policy.finish.target_soc_pct < 100 or rules.taper is None:
+        return replace(base, values=full)
+    end_v = min(max(full["voltage_v"], rules.taper.above_v + WITHIN_V), rules.max_v - NEAR["voltage_v"])
+    return replace(base, takes=0.01, values={**full, "voltage_v": end_v})
+
+
 def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
     """What no threshold cuts: a battery that leaves, falls silent, complains or lies."""
     pack, precharge = rules.policy.pack, rules.policy.precharge
     status = {**base.values, "status": float(1 << BatteryStatus.BMU_ERROR)}
     limit = {**base.values, "status": float(1 << BatteryStatus.LOW_TEMPERATURE)}
-    full = {**base.values, **_with(rules, "soc_pct", rules.policy.finish.soc_pct)}
     deep: dict[str, Shown] = {}
     if precharge is not None and rules.manual:
         low_v = (pack.voltage_v.low + precharge.below_v) / 2
         deep["deeply discharged"] = replace(base, values={**base.values, "voltage_v": low_v, "soc_pct": 1.0})
     return deep | {
-        "full": replace(base, values=full),
+        "full": _full(base, rules),
         "takes nothing": replace(base, takes=0.0),
         "tapers": replace(base, takes=0.01, values={**base.values, **_with(rules, "voltage_v", rules.max_v - 0.1)}),
         "of another kind": replace(base, values={**base.values, "voltage_v": pack.voltage_v.low, "soc_pct": 50.0}),

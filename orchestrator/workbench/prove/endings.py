@@ -18,7 +18,7 @@ from orchestrator.workbench.prove.properties import STANDBY
 from orchestrator.workbench.prove.story import TICK_S, Move, Taken
 
 #: While nothing changes: so many steps of each length. Beyond the last one all timers have run out.
-LADDER = ((16, TICK_S), (10, 1.0), (12, 5.0), (12, 30.0), (10, 300.0), (15, 3600.0))
+LADDER = ((16, TICK_S), (10, 1.0), (12, 5.0), (12, 30.0), (10, 300.0), (4, 3600.0), (12, 6 * 3600.0))
 #: More changes of state than this without news: the longest orderly story is three backoffs and a latch.
 PATIENCE = 60
 #: … of which a story tells so many steps.
@@ -27,6 +27,8 @@ SHOWN = 40
 TOGETHER = 8
 #: What backoffs, hysteresis and the qualification take together, at most.
 RECOVERY_S = 600.0
+#: A taper and the hold after it take no longer, in what ships.
+HELD_S = 3600.0
 #: In this time a pack comes from any temperature to any other without looking like a broken sensor.
 SLOWLY_S = 30.0
 #: Faults that a charge brings with it have shown by then.
@@ -121,10 +123,10 @@ ENDINGS: tuple[Ending, ...] = (
            "obeys", "measured differently", RECOVERY_S, _charges, first_s=SLOWLY_S, asked_of=_free),
     Ending("wakes", "a deeply discharged pack is precharged",
            "obeys", "deeply discharged", RECOVERY_S, _wakes, first_s=SLOWLY_S, asked_of=_free),
-    Ending("full", "a charge is over when the BMU says so",
-           "obeys", "full", 30.0, _full, asked_of=_charging),
+    Ending("full", "a charge is over when the pack is full, or at its target",
+           "obeys", "full", HELD_S, _full, asked_of=_charging),
     Ending("ends", "a charge that leads nowhere is ended by a limit",
-           "obeys", "healthy", 14 * 3600.0, _ended, first_s=SLOWLY_S, asked_of=_energised),
+           "obeys", "healthy", 76 * 3600.0, _ended, first_s=SLOWLY_S, asked_of=_energised),
 )  # fmt: skip
 
 

@@ -219,9 +219,13 @@ def jumps(rules: Rules) -> tuple[float, ...]:
     """Just beyond every timer of core and policy, so that none of them is walked through in steps."""
     policy = rules.policy
     timers = [2.0, 3.0, 5.0, 10.0, 70.0, 310.0, 3600.0]
-    timers.append(policy.finish.max_hours * 3600)
-    if policy.finish.taper is not None:
-        timers.append(policy.finish.taper.for_s)
+    timers.append(rules.max_hours * 3600)
+    if rules.taper is not None:
+        timers.append(rules.taper.for_s)
+    if policy.finish.hold_min:
+        timers.append(policy.finish.hold_min * 60)
+    if policy.finish.full_every_days is not None:
+        timers.append(policy.finish.full_every_days * 86400)
     if policy.precharge is not None:
         rule = policy.precharge
         timers += [m * 60 for m in (rule.pulse.max_min, rule.continuous.max_min, rule.rise.within_min)]

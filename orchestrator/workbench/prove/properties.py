@@ -190,7 +190,7 @@ def precharge_ends(taken: Taken) -> str | None:
 
 def session_ends(taken: Taken) -> str | None:
     """Energised never longer than the policy's hours."""
-    session, hours = taken.after.session, taken.rules.policy.finish.max_hours
+    session, hours = taken.after.session, taken.rules.max_hours
     if taken.after.state not in ENERGISED or session is None or session.energised_s <= hours * 3600:
         return None
     return f"energised for {session.energised_s / 3600:.2f} h, allowed are {hours:g} h"

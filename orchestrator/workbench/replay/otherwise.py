@@ -18,7 +18,7 @@ from orchestrator.text.catalogue import say
 from orchestrator.workbench.replay.again import Again
 
 #: What a policy alone keeps from step to step: its own debounces and holds.
-OWN = ("faults", "step", "raise_s", "taper_s", "reached_s")
+OWN = ("faults", "step", "raise_s", "taper_s", "reached_s", "rows", "row_returns")
 
 
 @dataclass(slots=True)
@@ -72,7 +72,11 @@ class Comparison:
             self._go_on(one)
             return
         own = None if parted or self._own is None else self._own
-        given = one.memory if own is None else replace(one.memory, **{name: getattr(own, name) for name in OWN})
+        given = (
+            replace(one.memory, rows=(), row_returns=())
+            if own is None
+            else replace(one.memory, **{name: getattr(own, name) for name in OWN})
+        )
         rules = self._other(one.rules)
         snapshot = _as_told(one.recorded.snapshot, one.memory.step, given.step, rules)
         decision, self._own = step(one.recorded.at_s, snapshot, given, rules)
@@ -128,7 +132,7 @@ def told(difference: Difference) -> Iterator[str]:
 
 def _why(decision: Decision) -> str:
     step = decision.step
-    why = f"step {step.index} ({step.current_a:.1f} A): {say(step.rule)}" if step is not None else say(decision.cause)
+    why = f"{step.label}: {say(step.rule)}" if step is not None else say(decision.cause)
     return f"{decision.state}: {why}"
 
 

@@ -22,7 +22,7 @@ EVENTFUL = (
     "since_s", "resets", "hold", "paused", "stop_cause", "full_pct", "boots", "resumed", "ran", "shown", "order",
     "limit", "limit_before", "closed", "charge_step", "exchange", "reached_s", "raise_s", "taper_s", "qualified_s",
     "runs_s", "stopping_s", "verified_s", "returns", "unverified", "left_s", "left_as", "returned_s", "reverts",
-    "confirmed", "ready", "intends",
+    "confirmed", "ready", "intends", "rows", "row_returns", "full_s",
 )  # fmt: skip
 #: What it sums up, as long as there is anything to sum up.
 SUMS = ("idle_s", "search_s", "wake_s")
@@ -40,7 +40,7 @@ def outline(decision: Decision, memory: Memory) -> Outline:
         decision.closed,
         *(getattr(memory, name) for name in EVENTFUL),
         *(getattr(memory, name) > 0 for name in SUMS),
-        session.rise_v if session is not None else None,
+        (session.rise_v, session.full) if session is not None else None,
         witnessed.stop_s,
         witnessed.proved,
         tuple((name, f.present, f.raised_s, f.clean_s, f.latched, f.strikes) for name, f in memory.faults.items()),

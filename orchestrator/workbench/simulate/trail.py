@@ -35,6 +35,11 @@ class Span:
     faults: tuple[str, ...] = ()  #: the ids of those in force
 
     @property
+    def key(self) -> str:
+        """Of the policy's row that bound it, where one did."""
+        return self.cause.key
+
+    @property
     def why(self) -> str:
         """The cause in words, with the rule's line in the policy."""
         return say(self.cause)

@@ -1,0 +1,125 @@
+"""What a policy's C, and the keys that it leaves out, come to: in amperes, volts, hours and ampere-hours. Pure."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from orchestrator.config.policy import Band, CellType, Current, Finish, Needs, Pack, Policy, Table, Where
+from orchestrator.keys import Range
+
+#: The least that two readings can differ by: what the BMU's words carry (the shipped object maps), with its unit.
+RESOLUTION = {"temperature_c": (0.1, "°C"), "soc_pct": (1.0, "%"), "soh_pct": (1.0, "%"), "voltage_v": (0.01, "V")}
+#: Where a policy does not say how far inside the next row a value must be.
+HYSTERESIS = {name: 2 * least for name, (least, _) in RESOLUTION.items()}
+#: Amperes that were worked out are compared after rounding to this many digits: 0.7 C of 20 Ah are 14 A.
+DIGITS = 6
+#: A taper is believed from this share of the end voltage on.
+END_SHARE = 0.97
+#: Where a policy does not say it, the current has tapered off below this share of the capacity.
+TAPER_C = 0.05
+#: A charge may take this much longer, and this much more, than the rated capacity takes.
+LONGER, MORE = 1.5, 1.1
+
+
+@dataclass(frozen=True, slots=True)
+class CellVolts:
+    """What a cell may have: where it is full, and how high and how cold it may at most be charged."""
+
+    end_v: float
+    least_v: float  #: a highest voltage below this is not of this chemistry
+    most_v: float  #: … nor is one above
+    coldest_c: float
+
+
+#: From data sheets. Below 0 °C lithium plates on graphite, at any current; titanate has no such limit here.
+CELL_VOLTS: Mapping[CellType, CellVolts] = {
+    CellType.NMC: CellVolts(4.20, 3.90, 4.40, 0.0),
+    CellType.NCA: CellVolts(4.20, 3.90, 4.30, 0.0),
+    CellType.LFP: CellVolts(3.55, 3.40, 3.80, 0.0),
+    CellType.LTO: CellVolts(2.70, 2.50, 2.95, -30.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class TaperRule:
+    """A taper with all its values."""
+
+    below_a: float
+    above_v: float
+    for_s: float
+
+
+def row_a(row: Band | Where, current_a: float, capacity_ah: float | None) -> float:
+    """The most that a row allows; the pack's own current where it says nothing."""
+    said = [current_a]
+    if row.max_a is not None:
+        said.append(row.max_a)
+    if row.max_c is not None:
+        said.append(row.max_c * capacity_ah if capacity_ah is not None else 0.0)
+    return round(min(said), DIGITS)
+
+
+def tables(current: Current) -> Iterator[tuple[str, Table]]:
+    """The tables that a policy has, by quantity."""
+    for name in RESOLUTION:
+        table: Table | None = getattr(current, name)
+        if table is not None:
+            yield name, table
+
+
+def hysteresis(current: Current, name: str) -> float:
+    """How far inside the next row a value must be."""
+    table: Table | None = getattr(current, name)
+    said = table.hysteresis if table is not None else None
+    return HYSTERESIS[name] if said is None else said
+
+
+def ranges(rule: Where) -> dict[str, Range]:
+    """The quantities that a rule is about."""
+    return {name: value for name in RESOLUTION if (value := getattr(rule, name)) is not None}
+
+
+def highest_step(allowed_a: float, worst_a: tuple[float, ...]) -> int | None:
+    """The highest step of which the worst case is not above; None where even the lowest one is."""
+    fitting = [index for index, amps in enumerate(worst_a) if round(amps, DIGITS) <= allowed_a]
+    return max(fitting, default=None)
+
+
+def end_v(pack: Pack) -> float:
+    """The voltage of a full pack at rest: its chemistry's, or the pack's limit if that is lower."""
+    return min(CELL_VOLTS[pack.chemistry].end_v * pack.cells_in_series, pack.voltage_v.high)
+
+
+def taper_of(policy: Policy) -> TaperRule | None:
+    """The taper that ends a charge; None where there is none."""
+    pack, full = policy.pack, policy.finish.full
+    taper = full.taper
+    if taper is None:  # one that nobody wrote ends a charge, but is never required
+        if pack.capacity_ah is None or full.needs is Needs.ALL:
+            return None
+        return TaperRule(TAPER_C * pack.capacity_ah, END_SHARE * end_v(pack), 120.0)
+    below_a = taper.below_a
+    if below_a is None:
+        below_a = (TAPER_C if taper.below_c is None else taper.below_c) * (pack.capacity_ah or 0.0)
+    return TaperRule(below_a, END_SHARE * end_v(pack) if taper.above_v is None else taper.above_v, taper.for_s)
+
+
+def max_ah(pack: Pack, finish: Finish) -> float:
+    """What a charge may take at most."""
+    return finish.max_ah if finish.max_ah is not None else MORE * (pack.capacity_ah or 0.0)
+
+
+def lowest_a(policy: Policy) -> float:
+    """The least current, above none, that the rows can lead to."""
+    pack, current = policy.pack, policy.current
+    rows: list[Band | Where] = [*current.where, *(row for _, table in tables(current) for row in table.rows)]
+    amps = [row_a(row, pack.current_a, pack.capacity_ah) for row in rows]
+    return min((a for a in amps if a > 0), default=pack.current_a)
+
+
+def max_hours(policy: Policy, worst_a: tuple[float, ...]) -> float:
+    """How long a charge may take at a charger with these steps."""
+    finish, capacity_ah = policy.finish, policy.pack.capacity_ah
+    if finish.max_hours is not None:
+        return finish.max_hours
+    step = highest_step(lowest_a(policy), worst_a)
+    return LONGER * (capacity_ah or 0.0) / worst_a[step or 0] + finish.hold_min / 60

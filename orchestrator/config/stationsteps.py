@@ -1,0 +1,47 @@
+"""The steps of the chargers that follow each policy, from a station file's tree, before that file is read."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from orchestrator.config.files import POLICY, find
+from orchestrator.config.yaml.scalars import UnfitError
+from orchestrator.config.yaml.tree import Entries, Items, Node, Scalar
+
+Steps = tuple[float, ...]
+
+
+def named_steps(node: Node, base: Path) -> dict[str, Steps]:
+    """By each policy's real path the steps, in A; where chargers differ, the lowest of each. What is wrong is left out.
+
+    Whoever reads the station file says what is wrong there.
+    """
+    found: dict[str, Steps] = {}
+    for bay in _items(_get(node, "bays")):
+        name, steps = _get(bay, "policy"), tuple(_floats(_get(_get(bay, "charger"), "steps_a")))
+        if not isinstance(name, Scalar) or not steps:
+            continue
+        try:
+            real = os.path.realpath(find(POLICY, name.text, base).path)
+        except UnfitError:
+            continue
+        found[real] = tuple(min(pair) for pair in zip(found.get(real, steps), steps, strict=False))
+    return found
+
+
+def _get(node: Node | None, key: str) -> Node | None:
+    if not isinstance(node, Entries):
+        return None
+    return next((value for name, value in node.entries if name.text == key), None)
+
+
+def _items(node: Node | None) -> tuple[Node, ...]:
+    return node.items if isinstance(node, Items) else ()
+
+
+def _floats(node: Node | None) -> Iterator[float]:
+    for item in _items(node):
+        try:
+            yield float(item.text) if isinstance(item, Scalar) else 0.0
+        except ValueError:
+            return

@@ -1,0 +1,102 @@
+"""Which row of each of a policy's tables is in force: the one that the value is in, or a gentler one that holds on.
+
+A row that allows less is left only when the value is well inside the next one (`hysteresis`). One that comes back again
+and again all the same, because less current changes what it is about, stays for the rest of the charge. So nothing
+chatters at a bound.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from orchestrator.config.amperes import hysteresis, ranges, row_a, tables
+from orchestrator.config.policy import Band, Where
+from orchestrator.core.facts import Facts
+from orchestrator.core.rules import Rules
+
+#: A row that has brought the step down more often than this in one charge is not left any more.
+MOST_RETURNS = 2
+
+InForce = tuple[tuple[str, int], ...]  #: the row of each table, and the rules of `where` (`where[1]`)
+Returns = tuple[tuple[str, int], ...]  #: how often each key has brought the step down in this charge
+
+
+def values(f: Facts) -> dict[str, float | None]:
+    """What the tables are about."""
+    return {"temperature_c": f.temperature_c, "soc_pct": f.soc, "soh_pct": f.soh, "voltage_v": f.pack_v}
+
+
+def amps(rules: Rules, row: Band | Where) -> float:
+    """What a row allows."""
+    pack = rules.policy.pack
+    return row_a(row, pack.current_a, pack.capacity_ah)
+
+
+def counted(returns: Returns, key: str) -> Returns:
+    """One more time."""
+    times = dict(returns)
+    return tuple((times | {key: times.get(key, 0) + 1}).items())
+
+
+@dataclass(frozen=True, slots=True)
+class _Follower:
+    """Works out the rows of one step."""
+
+    f: Facts
+    before: Mapping[str, int]
+    returns: Mapping[str, int]
+
+    def table(self, name: str, rows: tuple[Band, ...], value: float | None) -> int | None:
+        """The row of one table; None outside of it. A value that is not known changes nothing."""
+        was = self.before.get(name)
+        if value is None:
+            return was
+        now = _row(rows, value)
+        if now is None or was is None or was >= len(rows):
+            return now
+        less, more = amps(self.f.rules, rows[was]), amps(self.f.rules, rows[now])
+        if less >= more:
+            return now
+        inside = hysteresis(self.f.rules.policy.current, name)
+        near = rows[was].from_ - inside < value < rows[was].to + inside
+        return was if near or self._stays(f"current.{name}.rows[{was}]", less) else now
+
+    def rule(self, number: int, rule: Where, known: Mapping[str, float | None]) -> bool:
+        """Whether a rule of `where` holds; what is not known is taken to be inside."""
+        name = f"where[{number}]"
+        was = name in self.before
+        for quantity, span in ranges(rule).items():
+            value = known[quantity]
+            wider = hysteresis(self.f.rules.policy.current, quantity) if was else 0.0
+            if value is not None and not span.low - wider <= value <= span.high + wider:
+                return was and self._stays(f"current.{name}", amps(self.f.rules, rule))
+        return True
+
+    def _stays(self, key: str, allowed_a: float) -> bool:
+        """Whether it came back too often. A pause may come again: it would else be for ever."""
+        return allowed_a >= self.f.rules.worst_a[0] and self.returns.get(key, 0) > MOST_RETURNS
+
+
+def follow_rows(f: Facts) -> None:
+    """Bring the memory's rows up to this step."""
+    memory, current = f.memory, f.rules.policy.current
+    if f.departed or f.battery.boots != memory.boots:
+        memory.rows, memory.row_returns = (), ()
+        return
+    if memory.session is None:
+        memory.row_returns = ()
+    follower, now, known = _Follower(f, dict(memory.rows), dict(memory.row_returns)), {}, values(f)
+    for name, table in tables(current):
+        if (found := follower.table(name, table.rows, known[name])) is not None:
+            now[name] = found
+    for number, rule in enumerate(current.where):
+        if follower.rule(number, rule, known):
+            now[f"where[{number}]"] = number
+    memory.rows = tuple(now.items())
+
+
+def _row(rows: tuple[Band, ...], value: float) -> int | None:
+    """The index of the row that `value` lies in; the last one includes its end."""
+    for index, band in enumerate(rows):
+        if band.from_ <= value < band.to:
+            return index
+    return len(rows) - 1 if value == rows[-1].to else None
