@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from orchestrator.config.policy import Band, CellType, Current, Finish, Needs, Pack, Policy, Table, Where
+from orchestrator.config.policy import Band, CellType, Current, Finish, Needs, Pack, Policy, Table, Thresholds, Where
 from orchestrator.keys import Range
 
 #: The least that two readings can differ by: what the BMU's words carry (the shipped object maps), with its unit.
@@ -16,6 +16,8 @@ DIGITS = 6
 END_SHARE = 0.97
 #: Where a policy does not say it, the current has tapered off below this share of the capacity.
 TAPER_C = 0.05
+#: What charger and BMU may differ by where a policy says nothing: cable, resolution, offset.
+DIFFER_V, DIFFER_PCT = 1.0, 2.0
 #: A charge may take this much longer, and this much more, than the rated capacity takes.
 LONGER, MORE = 1.5, 1.1
 
@@ -66,6 +68,35 @@ def tables(current: Current) -> Iterator[tuple[str, Table]]:
             yield name, table
 
 
+@dataclass(frozen=True, slots=True)
+class TableRule:
+    """A table with all its values."""
+
+    name: str
+    rows: tuple[Band, ...]
+    amps: tuple[float, ...]  #: what each row allows
+    inside: float  #: its hysteresis
+
+
+def table_rules(policy: Policy) -> tuple[TableRule, ...]:
+    """The tables that a policy has."""
+    pack, current = policy.pack, policy.current
+    return tuple(
+        TableRule(
+            name,
+            table.rows,
+            tuple(row_a(row, pack.current_a, pack.capacity_ah) for row in table.rows),
+            hysteresis(current, name),
+        )
+        for name, table in tables(current)
+    )
+
+
+def where_a(policy: Policy) -> tuple[float, ...]:
+    """What each rule of `where` allows."""
+    return tuple(row_a(rule, policy.pack.current_a, policy.pack.capacity_ah) for rule in policy.current.where)
+
+
 def hysteresis(current: Current, name: str) -> float:
     """How far inside the next row a value must be."""
     table: Table | None = getattr(current, name)
@@ -101,6 +132,14 @@ def taper_of(policy: Policy) -> TaperRule | None:
     if below_a is None:
         below_a = (TAPER_C if taper.below_c is None else taper.below_c) * (pack.capacity_ah or 0.0)
     return TaperRule(below_a, END_SHARE * end_v(pack) if taper.above_v is None else taper.above_v, taper.for_s)
+
+
+def volts_differ(faults: Thresholds, pack_v: float) -> float:
+    """By how much charger and BMU may differ: of what a policy says the stricter, else the more of both defaults."""
+    said = [faults.volts_differ_v] if faults.volts_differ_v is not None else []
+    if faults.volts_differ_pct is not None:
+        said.append(faults.volts_differ_pct / 100 * pack_v)
+    return min(said, default=max(DIFFER_V, DIFFER_PCT / 100 * pack_v))
 
 
 def max_ah(pack: Pack, finish: Finish) -> float:

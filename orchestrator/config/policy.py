@@ -199,8 +199,13 @@ class Thresholds:
     over_current_pct: float = key(
         "latch above this share of the step's current", unit="%", gt=100, le=110, default=110.0
     )
-    volts_differ_v: float = key("charger and BMU may differ by this …", unit="V", gt=0, le=1, default=1.0)
-    volts_differ_pct: float = key("… or by this share, whichever is more", unit="%", gt=0, le=2, default=2.0)
+    volts_differ_v: float | None = key(
+        "charger and BMU may differ by this; left out, both: 1 V or 2 %, whichever is more …",
+        unit="V", gt=0, le=1, default=None,
+    )  # fmt: skip
+    volts_differ_pct: float | None = key(
+        "… or by this share; where both stand here, whichever is less", unit="%", gt=0, le=2, default=None
+    )
     amps_differ_a: float = key("charger and BMU may differ by this …", unit="A", gt=0, le=1, default=1.0)
     amps_differ_pct: float = key("… or by this share, whichever is more", unit="%", gt=0, le=10, default=10.0)
 

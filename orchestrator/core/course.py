@@ -9,11 +9,12 @@ from dataclasses import replace
 from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
-from orchestrator.core.finish import finished, full_due, goes_full, target
+from orchestrator.core.finish import finished, full_due, goes_full, goes_on, target
 from orchestrator.core.machine import RESTING, Trigger
 from orchestrator.core.operator import RESET
-from orchestrator.core.safestop import LASTS_S, LOST_S, gives_up, verified
-from orchestrator.core.witnesses.standby import current_without_order, sees_current
+from orchestrator.core.outofcontrol import out_of_control, problem
+from orchestrator.core.safestop import LOST_S, gives_up, verified
+from orchestrator.core.witnesses.standby import current_without_order
 from orchestrator.model import ENERGISED, ActiveFault, Cause, Effect, State
 
 Course = tuple[Trigger | None, Cause]
@@ -59,7 +60,7 @@ def _energised(f: Facts, faults: Faults) -> Course:
         full = finished(f)
         if full is not None:
             f.memory.full_pct = f.soc
-            if goes_full(f):
+            if goes_full(f) or (f.memory.session is not None and f.memory.session.full):
                 f.memory.full_s = f.now_s
             return Trigger.STOP, Cause.of("full", key=full.key, place=full.place, what=full)
         return None, _charging(f, faults)
@@ -121,56 +122,16 @@ def _stopping(f: Facts, faults: Faults) -> Course:
     if verified(f):
         return _rest(f, faults)
     if gives_up(f):
-        return Trigger.GIVE_UP, _out_of_control(f)
+        return Trigger.GIVE_UP, out_of_control(f)
     if state is State.UNCONTROLLABLE:
-        return None, _out_of_control(f)
+        return None, out_of_control(f)
     if state is State.STARTING and not memory.unverified and not f.charger.online and f.state_s >= LOST_S:
         return Trigger.LOSE, _offline(f)
     return None, memory.cause
 
 
-def _out_of_control(f: Facts) -> Cause:
-    """First what to do, then why."""
-    memory, port = f.memory, f.rules.bay.charger.port
-    if f.stopped:
-        lasts_s = f.now_s - memory.witnessed.proof[0]
-        return Cause.of("uncontrollable_stands_by", port=port, lasts_s=lasts_s, limit_s=LASTS_S)
-    if f.charger.online and f.reading is not None and not f.runs and sees_current(f):
-        # a BMU with an offset, or one that stands still, looks the same as a charger that lies
-        charger_a, pack_a = f.reading.current_a, f.pack_a
-        return Cause.of("uncontrollable_contradicted", port=port, charger_a=charger_a, pack_a=pack_a)
-    since_s = memory.stopping_s if memory.stopping_s is not None else f.now_s - f.state_s
-    id_ = "uncontrollable" if _heard(f) and f.runs else "uncontrollable_unproved"
-    return Cause.of(id_, port=port, since_s=f.now_s - since_s, why=_witnesses(f))
-
-
-def _heard(f: Facts) -> bool:
-    """What the charger says is of now. Only then may it be said not to obey: one that is not heard may have stopped."""
-    return f.charger.online and not f.charger.problem and f.reading is not None
-
-
-def _witnesses(f: Facts) -> Cause:
-    """What each witness says, the old marked as old."""
-    bmu = Cause.of("bmu_sees", pack_a=f.pack_a) if f.pack_a is not None else Cause("bmu_not_heard")
-    if not _heard(f) or f.reading is None:
-        heard, last = f.snapshot.charger, None
-        if heard is not None:
-            last = Cause.of("last_heard", charger_a=heard.current_a, age_s=f.now_s - heard.t_s)
-        return Cause.of("witnesses", charger=_problem(f, "no_answer_on"), last=last, bmu=bmu)
-    if f.runs:
-        return Cause.of("witnesses", charger=Cause.of("delivers", charger_a=f.reading.current_a), last=None, bmu=bmu)
-    return Cause.of("witnesses", charger=Cause("no_lasting_standby"), last=None, bmu=bmu)
-
-
-def _problem(f: Facts, silent: str) -> Cause:
-    """Why the charger cannot be heard; `silent` is the id for one that only does not answer."""
-    if f.charger.problem:
-        return Cause.of("charger_problem", problem=f.charger.problem)
-    return Cause.of(silent, port=f.rules.bay.charger.port)
-
-
 def _offline(f: Facts) -> Cause:
-    return _problem(f, "charger_offline")
+    return problem(f, "charger_offline")
 
 
 def _resting(f: Facts, faults: Faults) -> Course:
@@ -265,6 +226,8 @@ def _wanted(f: Facts) -> tuple[bool, Cause]:
     if f.soc is None:
         return False, Cause("soc_unknown")
     if full_pct is None and f.memory.session is not None:  # what was interrupted is brought to its end
+        if unfinished := goes_on(f):
+            return True, unfinished
         threshold, key = target(f)
     elif full_pct is None:
         key, threshold = "start.soc_below_pct", policy.start.soc_below_pct

@@ -129,3 +129,15 @@ def target(f: Facts) -> tuple[float, str]:
     if full_due(f):
         return 100.0, "finish.full_every_days"
     return f.rules.policy.finish.target_soc_pct, "finish.target_soc_pct"
+
+
+def goes_on(f: Facts) -> Cause | None:
+    """Why a charge that was interrupted on its way to full goes on, whatever the SOC says; None where that decides."""
+    rule, session = f.rules.policy.finish, f.memory.session
+    if session is None or not goes_full(f):
+        return None
+    if session.full and session.held_s < rule.hold_min * 60:
+        return f.rules.by_policy("not_held_yet", "finish.hold_min", hold_min=rule.hold_min)
+    if not session.full and rule.full.soc_pct is None:
+        return f.rules.by_policy("not_known_full", "finish.full")
+    return None

@@ -7,10 +7,10 @@ after a hold. Which rows apply, `core/rows.py` follows.
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ranges, tables
+from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ranges
 from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
-from orchestrator.core.rows import amps, values
+from orchestrator.core.rows import values
 from orchestrator.model import ActiveFault, Cause, Effect, Step
 
 
@@ -31,23 +31,22 @@ def bounds(f: Facts, worst: ActiveFault | None) -> Iterator[Bound]:
 
     `worst` is the worst of the faults in force; LIMIT, and what is worse, means the lowest step.
     """
-    rules, current, rows = f.rules, f.rules.policy.current, dict(f.memory.rows)
+    rules, rows = f.rules, dict(f.memory.rows)
     yield Bound(rules.policy.pack.current_a, "pack.current_a")
     if rules.top_step < len(rules.steps_a) - 1:
         yield Bound(rules.worst_a[rules.top_step], "limits.current_a")
     if worst is not None and worst.effect >= Effect.LIMIT:
         yield Bound(rules.worst_a[0], f"fault {worst.id}")
     known = values(f)
-    for name, table in tables(current):
-        if known[name] is None or name not in rows:  # a rule of its own ends a charge that no row covers
+    for table in rules.tables:
+        name, row = table.name, rows.get(table.name)
+        if known[name] is None or row is None:  # a rule of its own ends a charge that no row covers
             yield Bound(rules.worst_a[0], f"current.{name}")
         else:
-            row = table.rows[rows[name]]
-            yield Bound(amps(rules, row), f"current.{name}.rows[{rows[name]}]", row)
+            yield Bound(table.amps[row], f"current.{name}.rows[{row}]", table.rows[row])
     for name, number in rows.items():
         if name.startswith("where"):
-            rule = current.where[number]
-            yield Bound(amps(rules, rule), f"current.{name}", rule)
+            yield Bound(rules.where_a[number], f"current.{name}", rules.policy.current.where[number])
 
 
 def lowest(f: Facts, worst: ActiveFault | None = None) -> Bound:

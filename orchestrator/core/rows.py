@@ -8,10 +8,9 @@ chatters at a bound.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from orchestrator.config.amperes import hysteresis, ranges, row_a, tables
+from orchestrator.config.amperes import TableRule, hysteresis, ranges
 from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
-from orchestrator.core.rules import Rules
 
 #: A row that has brought the step down more often than this in one charge is not left any more.
 MOST_RETURNS = 2
@@ -23,12 +22,6 @@ Returns = tuple[tuple[str, int], ...]  #: how often each key has brought the ste
 def values(f: Facts) -> dict[str, float | None]:
     """What the tables are about."""
     return {"temperature_c": f.temperature_c, "soc_pct": f.soc, "soh_pct": f.soh, "voltage_v": f.pack_v}
-
-
-def amps(rules: Rules, row: Band | Where) -> float:
-    """What a row allows."""
-    pack = rules.policy.pack
-    return row_a(row, pack.current_a, pack.capacity_ah)
 
 
 def counted(returns: Returns, key: str) -> Returns:
@@ -45,20 +38,16 @@ class _Follower:
     before: Mapping[str, int]
     returns: Mapping[str, int]
 
-    def table(self, name: str, rows: tuple[Band, ...], value: float | None) -> int | None:
+    def table(self, table: TableRule, value: float | None) -> int | None:
         """The row of one table; None outside of it. A value that is not known changes nothing."""
-        was = self.before.get(name)
+        was, rows, amps = self.before.get(table.name), table.rows, table.amps
         if value is None:
             return was
         now = _row(rows, value)
-        if now is None or was is None or was >= len(rows):
+        if now is None or was is None or was >= len(rows) or amps[was] >= amps[now]:
             return now
-        less, more = amps(self.f.rules, rows[was]), amps(self.f.rules, rows[now])
-        if less >= more:
-            return now
-        inside = hysteresis(self.f.rules.policy.current, name)
-        near = rows[was].from_ - inside < value < rows[was].to + inside
-        return was if near or self._stays(f"current.{name}.rows[{was}]", less) else now
+        near = rows[was].from_ - table.inside < value < rows[was].to + table.inside
+        return was if near or self._stays(f"current.{table.name}.rows[{was}]", amps[was]) else now
 
     def rule(self, number: int, rule: Where, known: Mapping[str, float | None]) -> bool:
         """Whether a rule of `where` holds; what is not known is taken to be inside."""
@@ -68,7 +57,7 @@ class _Follower:
             value = known[quantity]
             wider = hysteresis(self.f.rules.policy.current, quantity) if was else 0.0
             if value is not None and not span.low - wider <= value <= span.high + wider:
-                return was and self._stays(f"current.{name}", amps(self.f.rules, rule))
+                return was and self._stays(f"current.{name}", self.f.rules.where_a[number])
         return True
 
     def _stays(self, key: str, allowed_a: float) -> bool:
@@ -85,9 +74,9 @@ def follow_rows(f: Facts) -> None:
     if memory.session is None:
         memory.row_returns = ()
     follower, now, known = _Follower(f, dict(memory.rows), dict(memory.row_returns)), {}, values(f)
-    for name, table in tables(current):
-        if (found := follower.table(name, table.rows, known[name])) is not None:
-            now[name] = found
+    for table in f.rules.tables:
+        if (found := follower.table(table, known[table.name])) is not None:
+            now[table.name] = found
     for number, rule in enumerate(current.where):
         if follower.rule(number, rule, known):
             now[f"where[{number}]"] = number

@@ -3,7 +3,16 @@
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.config.amperes import DIGITS, TaperRule, max_ah, max_hours, taper_of
+from orchestrator.config.amperes import (
+    DIGITS,
+    TableRule,
+    TaperRule,
+    max_ah,
+    max_hours,
+    table_rules,
+    taper_of,
+    where_a,
+)
 from orchestrator.config.policy import Policy
 from orchestrator.config.station import Bay
 from orchestrator.keys import Range
@@ -22,6 +31,8 @@ class Rules:
     steps_a: tuple[float, ...]  #: what each current-limit step means
     worst_a: tuple[float, ...]  #: what may flow on each of them at most
     top_step: int  #: the highest step within the station's current limit
+    tables: tuple[TableRule, ...]  #: what the policy allows by one quantity …
+    where_a: tuple[float, ...]  #: … and by several, each rule of its `where`
     taper: TaperRule | None  #: when the current counts as tapered off; None: it never does
     max_hours: float  #: a charge that takes longer is a fault
     max_ah: float  #: … and one that takes more
@@ -44,6 +55,8 @@ class Rules:
             steps_a=charger.steps_a,
             worst_a=worst_a,
             top_step=max(allowed, default=0),
+            tables=table_rules(policy),
+            where_a=where_a(policy),
             taper=taper_of(policy),
             max_hours=max_hours(policy, worst_a),
             max_ah=max_ah(policy.pack, policy.finish),

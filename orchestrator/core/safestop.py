@@ -39,6 +39,8 @@ def follow_stop(f: Facts, before: State) -> None:
     if before in UNVERIFIED and memory.state not in UNVERIFIED:
         if f.stopped:
             memory.verified_s, memory.unverified = f.now_s, False
+        if memory.stopping_s is None and "found_running" in f.raised:  # that was a first stop, too
+            memory.stopping_s = memory.since_s
     elif before not in UNVERIFIED and memory.state in UNVERIFIED:
         lasted_s = f.now_s - memory.verified_s if memory.verified_s is not None else LASTS_S
         runs_again = (f.runs or f.unordered) and lasted_s < LASTS_S and memory.stopping_s is not None

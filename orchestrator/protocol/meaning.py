@@ -35,12 +35,11 @@ NAMES: dict[int, tuple[str, str]] = {
     Code.ERROR: ("error", "charger → controller: the frame that it received was bad"),
 }
 
+#: As the charger's document counts its steps, and as people see them everywhere.
+_STEPS = {0: "step 1, the lowest", 1: "step 2", 2: "step 3", 3: "step 4", 4: "step 5, the highest"}
 _PUSHED: dict[int, tuple[str, dict[int, str]]] = {
     Push.OPERATION: ("operation", {0: "stop", 1: "run"}),
-    Push.CURRENT_LIMIT: (
-        "current limit",
-        {0: "step 1, the lowest", 1: "step 2", 2: "step 3", 3: "step 4", 4: "step 5, the highest"},
-    ),
+    Push.CURRENT_LIMIT: ("current limit", _STEPS),
     Push.CHARGE_MODE: ("charge mode", {3: "precharge", 4: "charge", 5: "standby"}),
     Push.PRECHARGE: ("precharge function", {0: "off", 1: "pulse", 2: "continuous"}),
 }
@@ -54,6 +53,8 @@ def _raw(data: bytes) -> list[tuple[bytes, str]]:
 
 
 def _words(name: str, value: float) -> str:
+    if name == "current_limit" and (step := _STEPS.get(int(value))):
+        return f"{value} ({step})"
     if isinstance(value, IntEnum):
         return f"{value} ({value.name.lower().replace('_', ' ')})"
     return f"{value}{_UNITS.get(name.rpartition('_')[2], '')}"

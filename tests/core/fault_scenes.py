@@ -350,7 +350,7 @@ SCENES: tuple[Scene, ...] = (
           anywhere=False, lapse=False),
     Scene("stopped_by_itself", stops_by_itself, nothing, ("stopped though",), S.HELD, 0.5, lapse=False),
     Scene("setting_not_obeyed", deaf(Action.SET_LIMIT, temperature_c=16.0, soc_pct=90.0), hears,
-          ("told 'limit 2' for 5.0 s",), S.TRIPPED, 5.25, begin=nearly_at_90, anywhere=False, lapse=False),
+          ("told 'step 3' for 5.0 s",), S.TRIPPED, 5.25, begin=nearly_at_90, anywhere=False, lapse=False),
     Scene("setting_not_obeyed", shows(charge_mode=ChargeMode.PRECHARGE), shows_truth, ("told 'mode 4'",), S.TRIPPED,
           5.25, anywhere=False, lapse=False),
     Scene("setting_not_obeyed", shows(precharge=Precharge.OFF), shows_truth, ("told 'precharge 1'",), S.TRIPPED, 5.25,

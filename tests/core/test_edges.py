@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from orchestrator.config.policy import Policy
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.finish import ends_full, finished, known_full, tapers
 from orchestrator.core.memory import Still
@@ -115,9 +116,9 @@ FINISH = (
     Edge(finished, None, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
     Edge(finished, None, TAPERED, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL},
          policy=with_full(charger=False)),
-    Edge(known_full, "", {"taper_s": ago(119.9)}),
+    Edge(known_full, None, {"taper_s": ago(119.9)}),
     Edge(known_full, f"10.00 A, tapered below 1 A for 120 s ({AT('finish.full.taper')})", {"taper_s": ago(120)}),
-    Edge(known_full, "", {"taper_s": ago(120)},
+    Edge(known_full, None, {"taper_s": ago(120)},
          policy=with_full(taper=None)),
     Edge(tapers, True, charger={"current_a": 0.99}, bmu={"voltage_v": 53.61}),
     Edge(tapers, False, charger={"current_a": 1.0}, bmu={"voltage_v": 53.61}),
@@ -211,7 +212,7 @@ OBEDIENCE = (
     Edge(obedience.will_not_start, None, order(LIMIT_3, 9)),
     Edge(obedience.will_not_start, UNCONFIRMED.format("run", "9.0") + "; the interlock held it back: too old",
          order(RUN, 9), charger_link={"refused": "too old"}),
-    Edge(obedience.setting_not_obeyed, UNCONFIRMED.format("limit 3", "9.0"), order(LIMIT_3, 9)),
+    Edge(obedience.setting_not_obeyed, UNCONFIRMED.format("step 4", "9.0"), order(LIMIT_3, 9)),
     Edge(obedience.setting_not_obeyed, None, order(LIMIT_3, 9), State.STOPPING),
     Edge(obedience.setting_not_obeyed, None, order(RUN, 9)),
     Edge(obedience.stopped_by_itself, None),
@@ -311,6 +312,13 @@ SOC = (
 
 FROZEN = "the charger has said 48.00 V and 10.00 A for 60 s, while the BMU's values moved by {} V and {} A: " \
          "its measurement is frozen"  # fmt: skip
+DIFFERS = "the charger reads 48.51 V, the BMU 48.00 V: not the same battery, or a bad connection"
+
+
+def with_faults(**stricter: float) -> Policy:
+    return replace(POLICY, faults=replace(POLICY.faults, **stricter))
+
+
 PAIR = (
     Edge(measured.over_voltage, None, charger={"voltage_v": 55.2}, bmu={"voltage_v": 55.2}),
     Edge(measured.over_voltage, "55.21 V at the charger, the limit is 55.2 V", charger={"voltage_v": 55.21}),
@@ -321,6 +329,11 @@ PAIR = (
          "the charger reads 49.01 V, the BMU 48.00 V: not the same battery, or a bad connection",
          charger={"voltage_v": 49.01}),
     Edge(measured.volts_disagree, None, charger={"voltage_v": 53.0}, bmu={"voltage_v": 54.08}),
+    Edge(measured.volts_disagree, None, charger={"voltage_v": 48.5}, policy=with_faults(volts_differ_v=0.5)),
+    Edge(measured.volts_disagree, DIFFERS, charger={"voltage_v": 48.51}, policy=with_faults(volts_differ_v=0.5)),
+    Edge(measured.volts_disagree, DIFFERS, charger={"voltage_v": 48.51}, policy=with_faults(volts_differ_pct=1.0)),
+    Edge(measured.volts_disagree, DIFFERS, charger={"voltage_v": 48.51},
+         policy=with_faults(volts_differ_v=1.0, volts_differ_pct=1.0)),
     Edge(measured.volts_disagree, None, charger={"voltage_v": 9.0}, snapshot={"connected": False}),
     Edge(measured.volts_disagree, None, charger={"t_s": ago(9)}),
     Edge(measured.volts_disagree, None, bmu={"voltage_v": None}),

@@ -225,3 +225,40 @@ def test_a_pack_that_has_lost_some_is_not_full_any_more() -> None:
     world.charging()
     world.run(40 * 60, dt_s=1.0)
     assert world.is_in(S.CHARGING)
+
+
+def interrupted(world: World) -> None:
+    world.ask(Request.PAUSE)
+    world.until(S.SUSPENDED)
+    world.values["soc_pct"] = 100.0
+    world.run(30)
+    world.ask(Request.START)
+
+
+def test_a_hold_that_was_interrupted_goes_on_at_100_percent() -> None:
+    world = held()
+    interrupted(world)
+    world.charging()
+    world.run(20 * 60, dt_s=1.0)
+    assert world.is_in(S.CHARGING)
+
+
+def test_a_charge_that_was_interrupted_is_not_over_by_a_soc_that_is_not_trusted() -> None:
+    """Else a BMU that reads too much would end it after all, by a pause."""
+    world = World(bay(with_full(soc_pct=None)), soc_pct=97.0).charging()
+    interrupted(world)
+    world.charging()
+    assert world.is_in(S.CHARGING)
+    tapering(world)
+    world.values["soc_pct"] = 100.0
+    world.until(S.FULL, 130)
+
+
+def test_a_charge_that_found_the_pack_full_counts_for_the_days() -> None:
+    world = World(bay(long_life()), soc_pct=70.0).charging()
+    world.run(DAY_S / 24, dt_s=1.0)
+    tapering(world)
+    world.values["soc_pct"] = 78.0
+    world.until(S.FULL, 130)
+    assert world.memory.full_s is not None
+    assert world.now_s - world.memory.full_s < 10

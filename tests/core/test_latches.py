@@ -365,7 +365,7 @@ def test_a_reset_while_the_stop_is_being_verified_is_no_start() -> None:
 
 def test_a_reset_of_nothing_changes_nothing() -> None:
     world = charging()
-    assert world.ask(Request.RESET).startswith("nothing to reset: CHARGING: step 4")
+    assert world.ask(Request.RESET).startswith("nothing to reset: CHARGING: step 5")
     world.run(5)
     assert world.is_in(State.CHARGING)
 

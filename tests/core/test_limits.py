@@ -8,6 +8,7 @@ import pytest
 from orchestrator.config.policy import Band, Policy, Table, Where
 from orchestrator.core.facts import Facts
 from orchestrator.core.limits import choose
+from orchestrator.core.rules import Rules
 from orchestrator.core.step import PRECHARGE
 from orchestrator.keys import Range, Source
 from orchestrator.model import BatteryStatus, ChargeMode, Precharge, Request, Setpoint, Snapshot, State, Step
@@ -124,8 +125,8 @@ def test_two_tables_on_one_line_are_told_apart() -> None:
     assert say(world.decision.step.rule) == "temperature 20.0 °C in 0 … 45 allows 8.0 A, p.yaml:7"
     less = Table(rows=(Band(from_=0, to=100, max_a=8.0),))
     more = Table(rows=(Band(from_=0, to=45, max_a=9.0),))
-    world.rules = replace(world.rules, policy=replace(one_line, current=replace(one_line.current, temperature_c=more,
-                                                                                soc_pct=less)))  # fmt: skip
+    swapped = replace(one_line, current=replace(one_line.current, temperature_c=more, soc_pct=less))
+    world.rules = Rules.of(bay(swapped))
     world.tick()
     assert (world.decision.step.key, world.decision.step.place) == ("current.soc_pct.rows[0]", "p.yaml:7")
     assert say(world.decision.step.rule) == "SOC 50 % in 0 … 100 allows 8.0 A, p.yaml:7"
@@ -150,7 +151,7 @@ def test_what_no_row_covers_gets_the_lowest_step() -> None:
         step = world.decision.step
         assert step is not None
         at = wide.source.at("current.temperature_c")
-        assert (step.index, say(step.rule) == (0, f"temperature {celsius:.1f} °C outside of its table, {at}")
+        assert (step.index, say(step.rule)) == (0, f"temperature {celsius:.1f} °C outside of its table, {at}")
     world = World(the_bay, temperature_c=45.0).charging()
     assert index(world) == 4  # the last row's end is included
 
@@ -411,7 +412,7 @@ def test_a_row_that_comes_back_again_and_again_stays_for_the_rest_of_the_charge(
     assert world.decision.step is not None
     assert world.decision.step.key == "current.voltage_v.rows[2]"
     world.ask(Request.STOP)
-    world.until(State.IDLE)
+    world.until(State.HELD)
     world.ask(Request.START)
     world.charging()
     world.run(62)

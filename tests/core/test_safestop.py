@@ -287,3 +287,15 @@ def test_a_stop_is_never_given_up_for_long() -> None:
         State.STOPPING,
         State.UNCONTROLLABLE,
     ]
+
+
+def test_a_charger_that_ran_at_the_start_has_been_stopped_once_already() -> None:
+    world = running_at_the_start()
+    world.until(State.HELD)
+    for _ in range(2):
+        world.run(3)
+        assert not world.is_in(State.UNCONTROLLABLE)
+        world.charger.resting, world.charger.run = False, True
+        world.run(1)
+    world.run(0.5)
+    assert world.is_in(State.UNCONTROLLABLE)

@@ -68,7 +68,7 @@ def one(data: bytes) -> None:
     """A client that sends this, and closes."""
     LOOP.stepped.clear()
     for bay in SUPERVISOR._bays:
-        bay._asked.clear()
+        bay._requests.take()
     ours, theirs = socket.socketpair()
     with theirs:
         theirs.sendall(data)
@@ -82,7 +82,7 @@ def one(data: bytes) -> None:
     else:
         assert said["error"] and not said["error"].startswith("internal"), said["error"]
     for bay in SUPERVISOR._bays:
-        assert not bay._asked, "requests wait that somebody believes answered"
+        assert not bay._requests, "requests wait that somebody believes answered"
         assert not bay._internal, bay._internal
 
 

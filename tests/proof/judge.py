@@ -506,7 +506,7 @@ class Judge:
             return
         if self.frozen or not self.gateway.alive(self.gateway.controller):  # nobody is there to tell
             return
-        if now_s - onsets[0] < RESTARTS_S and charger.named_s < onsets[0] and now_s - onsets[-1] > MARGIN_S:
+        if now_s - onsets[0] < RESTARTS_S and charger.named_s < onsets[0] and now_s - onsets[-1] > VERIFY_S:
             self.find(charger.number, "nobody is told", f"it runs again and again by itself, {self._state(charger)}")
 
     def _judge_named(self, charger: Charger, reason: Reason, since_s: float, now_s: float) -> None:

@@ -610,8 +610,8 @@ CONDITIONS: tuple[Seed, ...] = (
 #: An arithmetic on a reading without its bounds.
 DIVIDES: Change = (
     f"{CORE}witnesses/measured.py",
-    "    if abs(volts - pack_v) <= max(limits.volts_differ_v, limits.volts_differ_pct / 100 * pack_v):",
-    "    if abs(volts - pack_v) / pack_v <= max(limits.volts_differ_v / pack_v, limits.volts_differ_pct / 100):",
+    "    if abs(volts - pack_v) <= volts_differ(f.rules.policy.faults, pack_v):",
+    "    if abs(volts - pack_v) / pack_v <= volts_differ(f.rules.policy.faults, pack_v) / pack_v:",
 )
 #: A row that raises takes the whole step with it.
 NOT_CAUGHT: Change = (
@@ -694,7 +694,7 @@ WORDS: tuple[Seed, ...] = (
         "UNCONTROLLABLE does not begin with what to do",
         ("says standby", "cut off, then killed"),
         (
-            f"{CORE}course.py",
+            f"{CORE}outofcontrol.py",
             '    id_ = "uncontrollable" if _heard(f) and f.runs else "uncontrollable_unproved"\n',
             "    return _witnesses(f)\n",
         ),

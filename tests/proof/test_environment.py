@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core import course, faults, latches, persisted, step
+from orchestrator.core import course, faults, latches, outofcontrol, persisted, step
 from orchestrator.core.facts import Facts
 from orchestrator.lastresort import lastline
 from orchestrator.model import Cause
@@ -88,9 +88,9 @@ def lets_others_run(patch: Patch) -> None:
 
 def blames(patch: Patch) -> None:
     def disobeys(f: Facts) -> Cause:
-        return Cause.of("uncontrollable", port="", since_s=3.0, why=course._witnesses(f))
+        return Cause.of("uncontrollable", port="", since_s=3.0, why=outofcontrol._witnesses(f))
 
-    patch.setattr(course, "_out_of_control", disobeys)
+    patch.setattr(course, "out_of_control", disobeys)
 
 
 #: The invariant → a bug that breaks it, and a variant that shows it, in which nothing is found without.

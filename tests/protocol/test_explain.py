@@ -213,7 +213,7 @@ def test_a_reply_of_the_services_own_length_is_taken_for_its_kinds() -> None:
         "09 07  current 23.11 A",
         "00 01  control mode 1 (manual)",
         "00 01  operation 1 (running)",
-        "00 04  current limit 4",
+        "00 04  current limit 4 (step 5, the highest)",
         "00 02  charge mode 2 (battery recovery)",
         "00 02  precharge function 2 (continuous)",
         "00 01  battery connection 1 (normal)",

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from orchestrator.config.station import Rs485
 from orchestrator.core.faults import FAULTS, Clear, Row
 from orchestrator.core.operator import STOPPED
-from orchestrator.core.persisted import COUNTERS_S, Persisted, PersistedFault
+from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.model import Cause, ControlMode, Session
 from orchestrator.service.past import Entry, Place, past_of, settled
 from orchestrator.service.stateformat import NEVER_SET_S, Stamp, decode, encode
@@ -230,8 +230,15 @@ NOW = Stamp(1_800_000_000.0, 500.0, "this boot")
 
 @given(entry_lists)
 def test_what_is_written_is_read(entries: list[Entry]) -> None:
-    unseen = [replace(entry, persisted=entry.persisted.aged(0.0, COUNTERS_S)) for entry in entries]
-    assert decode(encode(NOW, 7, entries), NOW) == (7, unseen)
+    moment = replace(NOW, clock_s=NOW.clock_s + 2**-30)  # none at all would be an age that cannot be told
+    run, read = decode(encode(NOW, 7, entries), moment)
+    assert run == 7
+    assert [(one.place, one.persisted.gist, one.run) for one in read] == [
+        (one.place, one.persisted.gist, one.run) for one in entries
+    ]
+    assert encode(moment, 7, read) == encode(
+        moment, 7, [replace(one, persisted=one.persisted.aged(2**-30)) for one in entries]
+    )
 
 
 AGES = {

@@ -73,7 +73,7 @@ def will_not_start(f: Facts) -> Cause | None:
     """FAULTS C7."""
     if f.memory.order is None or f.memory.order.action not in (Action.RUN, Action.RESUME) or not f.energised:
         return None
-    return _unconfirmed("will_not_start", f, Action.RUN, None)
+    return _unconfirmed("will_not_start", f, Action.RUN.value, None)
 
 
 def stopped_by_itself(f: Facts) -> Cause | None:
@@ -134,7 +134,9 @@ def setting_not_obeyed(f: Facts) -> Cause | None:
     order = f.memory.order
     if order is None or order.action in (Action.RUN, Action.RESUME, Action.STOP) or not f.energised:
         return None
-    return _unconfirmed("setting_not_obeyed", f, order.action, order.value)
+    if order.action is Action.SET_LIMIT:  # said as people count steps
+        return _unconfirmed("setting_not_obeyed", f, "step", order.value + 1)
+    return _unconfirmed("setting_not_obeyed", f, order.action.value.removeprefix("set_"), order.value)
 
 
 def contactor_lost(f: Facts) -> Cause | None:
@@ -142,12 +144,12 @@ def contactor_lost(f: Facts) -> Cause | None:
     return Cause.of("contactor_lost", problem=f.snapshot.contactor_problem) if f.snapshot.contactor_problem else None
 
 
-def _unconfirmed(id_: str, f: Facts, action: Action, value: int | None) -> Cause | None:
+def _unconfirmed(id_: str, f: Facts, order: str, value: int | None) -> Cause | None:
     waited_s = f.now_s - f.memory.order_s
     if waited_s < OBEY_S:
         return None
     held = Cause.of("held_back", refused=f.charger.refused) if f.charger.refused else None
-    return Cause.of(id_, order=action.value.removeprefix("set_"), value=value, waited_s=waited_s, held=held)
+    return Cause.of(id_, order=order, value=value, waited_s=waited_s, held=held)
 
 
 def over_current(f: Facts) -> Cause | None:

@@ -2,6 +2,7 @@
 
 from statistics import fmean
 
+from orchestrator.config.amperes import volts_differ
 from orchestrator.core.cells import chemistry
 from orchestrator.core.facts import Facts
 from orchestrator.core.witnesses.standby import FROZEN
@@ -33,9 +34,8 @@ def volts_disagree(f: Facts) -> Cause | None:
     """FAULTS B15."""
     if f.volts is None or f.pack_v is None or not f.connected:
         return None
-    limits = f.rules.policy.faults
     volts, pack_v = _steady(f, "charger_v", f.volts), _steady(f, "pack_v", f.pack_v)
-    if abs(volts - pack_v) <= max(limits.volts_differ_v, limits.volts_differ_pct / 100 * pack_v):
+    if abs(volts - pack_v) <= volts_differ(f.rules.policy.faults, pack_v):
         return None
     wrong = _likelier_wrong(_fits_soc(f, volts), _fits_soc(f, pack_v), Cause("by_soc"))
     return Cause.of("volts_disagree", charger_v=volts, pack_v=pack_v, wrong=wrong)

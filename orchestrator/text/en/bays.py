@@ -62,6 +62,8 @@ TEXTS: Mapping[str, str] = {
     "full_taper": "{charger_a:.2f} A, tapered below {below_a:g} A for {for_s:g} s{at}",
     "charging": "step {step} ({step_a:.1f} A): {rule}{limited:after}{rises:after}{held:after}",
     "held_at_the_top": "full, and held at the top for another {left_min:.0f} min{at}",
+    "not_held_yet": "the pack is full, and was not yet held at the top for {hold_min:g} min{at}",
+    "not_known_full": "the charge was interrupted, and the pack is not known to be full{at}",
     "full_held": "{what}, held for {hold_min:g} min{at}",
     "full_by_all": "{whats:and}",
     "rises": "a higher step is allowed, and taken after {hold_s:g} s{at}",

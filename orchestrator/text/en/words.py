@@ -35,6 +35,7 @@ WORDS: Mapping[str, str] = {
     "resume": "resume",
     "stop": "stop",
     "limit": "limit",
+    "step": "step",
     "mode": "mode",
     "precharge": "precharge",
     "length": "length",

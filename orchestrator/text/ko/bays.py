@@ -62,6 +62,8 @@ TEXTS: Mapping[str, str] = {
     "full_taper": "전류가 {for_s:g} s 동안 {below_a:g} A 아래로 줄어 {charger_a:.2f} A입니다{at}",
     "charging": "단계 {step}({step_a:.1f} A): {rule}{limited:after}{rises:after}{held:after}",
     "held_at_the_top": "충전이 완료되어 앞으로 {left_min:.0f}분 동안 유지합니다{at}",
+    "not_held_yet": "팩이 완충되었으나 아직 {hold_min:g}분 동안 유지하지 않았습니다{at}",
+    "not_known_full": "충전이 중단되었고 팩이 완충되었는지 알 수 없습니다{at}",
     "full_held": "{what}, {hold_min:g}분 동안 유지했습니다{at}",
     "full_by_all": "{whats:and}",
     "rises": "더 높은 단계가 허용되어 {hold_s:g} s 후에 적용됩니다{at}",

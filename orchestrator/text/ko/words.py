@@ -35,6 +35,7 @@ WORDS: Mapping[str, str] = {
     "resume": "재개",
     "stop": "정지",
     "limit": "전류 제한",
+    "step": "단계",
     "mode": "충전 모드",
     "precharge": "프리차지",
     "length": "Length",

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from orchestrator.config.amperes import CELL_VOLTS, RESOLUTION, row_a
 from orchestrator.config.policy import Band, CellType
 from orchestrator.config.rules import Problems, Rule, problems
+from orchestrator.core.cells import CHEMISTRIES, EMPTY_PCT
 from orchestrator.core.checks.battery import HEAT_HYSTERESIS_K
 from orchestrator.core.course import RECHARGE_DROP_PCT
 from orchestrator.keys import Range
@@ -55,6 +56,35 @@ def _chemistry(kind: CellType, cells: int, voltage_v: Range) -> Problems:
     if voltage_v.high < least_v * cells:
         text = f"{voltage_v.high / cells:.2f} V a cell are few for {kind} ({least_v:g} V or more): is it another one?"
         yield "pack.chemistry", text
+
+
+def _awake(below_v: float, kind: CellType, cells: int) -> Problems:
+    """Volts, chemistry and SOC hang together: what is precharged must be empty."""
+    empty_v = CHEMISTRIES[kind].ocv_v(EMPTY_PCT)
+    if below_v > round(empty_v * cells, 2):
+        yield (
+            "precharge.below_v",
+            f"{below_v / cells:.2f} V a cell is no deep discharge: {kind} has {empty_v:.2f} V at SOC {EMPTY_PCT:g} %",
+        )
+
+
+def _refuses(voltage_v: Range, kind: CellType, cells: int) -> Problems:
+    empty_v = CHEMISTRIES[kind].ocv_v(EMPTY_PCT)
+    if voltage_v.low > round(empty_v * cells, 2):
+        yield (
+            "pack.voltage_v[0]",
+            f"{voltage_v.low / cells:.2f} V a cell refuses packs that are not empty: {kind} has {empty_v:.2f} V at SOC "
+            f"{EMPTY_PCT:g} %",
+        )
+
+
+def _differ(volts: float, share_pct: float, voltage_v: Range) -> Problems:
+    """Two thresholds of one thing: which of them is in force."""
+    low_v, high_v = (share_pct / 100 * end_v for end_v in (voltage_v.low, voltage_v.high))
+    if volts <= low_v:
+        yield "faults.volts_differ_pct", f"never in force: {volts:g} V is stricter than {share_pct:g} % everywhere"
+    elif volts >= high_v:
+        yield "faults.volts_differ_v", f"never in force: {share_pct:g} % is stricter than {volts:g} V everywhere"
 
 
 def _recharge(recharge_pct: float, target_pct: float) -> Problems:
@@ -117,6 +147,9 @@ _RULES = (
     Rule(_window, ("pack.temperature_c",)),
     Rule(_chemistry, ("pack.chemistry", "pack.cells_in_series", "pack.voltage_v")),
     Rule(_taper, ("finish.full.taper.above_v", "pack.voltage_v")),
+    Rule(_awake, ("precharge.below_v", "pack.chemistry", "pack.cells_in_series")),
+    Rule(_refuses, ("pack.voltage_v", "pack.chemistry", "pack.cells_in_series")),
+    Rule(_differ, ("faults.volts_differ_v", "faults.volts_differ_pct", "pack.voltage_v")),
     Rule(_recharge, ("recharge.soc_below_pct", "finish.target_soc_pct")),
     Rule(_temperatures, ("current.temperature_c.rows", "pack.temperature_c")),
     Rule(_healths, ("current.soh_pct.rows", "pack.soh_min_pct")),

@@ -145,6 +145,10 @@ class _Reader:
                 raise _OlderError
             plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
             memory = _CONVERTER.structure(line["memory"], Memory)
+            if "chemistry" not in line["config"]["policy"]["pack"]:
+                raise ValueError(
+                    "its policy is of the first edition, which spoke of steps: replay it with that version"
+                )
             rules = Rules.of(_CONVERTER.structure(line["config"], Bay))
         elif bay in parts:
             before = parts[bay]
