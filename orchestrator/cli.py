@@ -176,18 +176,20 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
-    from orchestrator.show import page
+    from orchestrator.show import own_language, page
 
     if as_json:
         print(json.dumps(document, ensure_ascii=False), flush=True)
         return
-    text = page(document)
+    text = page(document, own_language())
     print(f"\x1b[H\x1b[2J{document['station']}\n{text}" if clear else text, flush=True)
 
 
 def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.lastresort.asking import ask
     from orchestrator.service.where import find_socket
+    from orchestrator.show import own_language
+    from orchestrator.text.document import refusals
 
     port = getattr(arguments, "port", None)
     if bool(arguments.bay) + arguments.all + (port is not None) != 1:
@@ -195,7 +197,7 @@ def _request(arguments: argparse.Namespace) -> int:
     bays, path = None if arguments.all else arguments.bay, find_socket(arguments.socket)
     request = {"verb": arguments.verb, "bays": bays} | ({} if port is None else {"port": os.path.abspath(port)})  # noqa: PTH100 - not resolved
     try:
-        results = cast("dict[str, str]", ask(path, request)["results"])
+        results = refusals(ask(path, request), own_language())
     except NoServiceError as error:
         without = "; to stop chargers without a service: orchestrator estop" if arguments.verb in STOPS else ""
         raise ServiceError(f"{error}{without}") from None
@@ -218,19 +220,20 @@ def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[
     `every`: and at chargers that are no bay's any more.
     """
     from orchestrator.lastresort.asking import ask
-    from orchestrator.show import is_alarming, stands_by, strays, what_to_do
+    from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do
+    from orchestrator.text.document import in_language
 
-    end_s = time.monotonic() + STANDBY_S
+    end_s, language = time.monotonic() + STANDBY_S, own_language()
     while True:
         try:
-            document = ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S))
+            document = in_language(ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S)), language)
         except ServiceError as error:
             return {name: f"{name}: NOT verified, run `orchestrator estop`: {error}" for name in names}
         found = cast("list[dict[str, object]]", document["bays"])
         bays = [bay for bay in found if bay["name"] in names and not stands_by(bay)]
-        others = strays(document) if every else []
+        others = strays(document, language) if every else []
         if time.monotonic() >= end_s or (all(map(is_alarming, bays)) and not others):
-            return {str(bay["name"]): what_to_do(bay) for bay in bays} | {text: text for text in others}
+            return {str(bay["name"]): what_to_do(bay, language) for bay in bays} | {text: text for text in others}
         time.sleep(LOOK_S)
 
 

@@ -1,11 +1,23 @@
 """The status document as text for a terminal: what to do first, then one line a bay, and why."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import cast
 
+from orchestrator.model import Cause
+from orchestrator.text.catalogue import say
+from orchestrator.text.document import in_language
+from orchestrator.text.language import language_of
+
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
-#: The battery's values in the table, with their names for people.
-BATTERY = {"soc_pct": "SOC", "voltage_v": "pack voltage", "temperature_c": "temperature"}
+#: The battery's values in the table, with their words in the catalogue.
+BATTERY = {"soc_pct": "soc", "voltage_v": "pack_voltage", "temperature_c": "temperature"}
+#: The causes that begin with what to do about a charger that does not obey.
+CUT_THE_MAINS = frozenset({
+    "uncontrollable", "uncontrollable_unproved", "uncontrollable_contradicted", "uncontrollable_stands_by",
+    "failed_uncontrollable",
+})  # fmt: skip
 #: States in which a charger stands by, if it obeys.
 RESTING = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"})
 #: The levels of `alarm`, worst first, as the table has its bays; all others come after them.
@@ -16,46 +28,62 @@ STANDBY_A, BMU_A = 0.5, 1.0
 Bay = Mapping[str, object]
 
 
-def page(document: Mapping[str, object]) -> str:
+def own_language() -> str:
+    """What the user of this terminal reads; "" where nobody says."""
+    return language_of(os.environ)
+
+
+def page(document: Mapping[str, object], language: str = "") -> str:
     """The whole status: what to do, the bays, and what is wrong with the station itself."""
-    lines = [f"ALARM: {text}" for text in strays(document)]
-    lines.append(table(cast("Sequence[Bay]", document["bays"])))
+    document = in_language(document, language)
+    lines = [f"ALARM: {text}" for text in strays(document, language)]
+    lines.append(table(cast("Sequence[Bay]", document["bays"]), language))
     problems = (
         cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
     )
     return "\n".join([*lines, *(f"WARNING: {problem}" for problem in problems if problem)])
 
 
-def strays(document: Mapping[str, object]) -> list[str]:
+def strays(document: Mapping[str, object], language: str = "") -> list[str]:
     """What to do about chargers that no bay has any more, and that nobody has seen to stand by."""
     found = cast("Sequence[Mapping[str, object]]", document.get("strays", ()))
-    return [
-        f"CUT THE MAINS of the charger on {one['port']}, which was {one['bay']}'s: it may be running, nobody has "
-        f"seen that it stands by: {one['problem'] or one['state']}"
+    causes = [
+        Cause.of("cut_mains_of_stray", port=one["port"], bay=one["bay"], why=one["problem"] or one["state"])
         for one in found
         if not one["verified"]
     ]
+    return [say(cause, language) for cause in causes]
 
 
-def table(bays: Sequence[Bay]) -> str:
+def table(bays: Sequence[Bay], language: str = "") -> str:
     """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
     bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
     rows = [HEAD, *(_row(bay) for bay in bays)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
-    lines = [f"ALARM: {what_to_do(bay)}" for bay in bays if is_alarming(bay)]
+    lines = [f"ALARM: {what_to_do(bay, language)}" for bay in bays if is_alarming(bay)]
     for row, bay in zip(rows, [None, *bays], strict=True):
         cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
         lines.append("  ".join([*cells, row[-1]]).rstrip())
         if bay is not None:
-            lines.extend(f"  {line}" for line in _below(bay))
+            lines.extend(f"  {line}" for line in _below(bay, language))
     return "\n".join(lines)
 
 
 def other_faults(bay: Bay) -> list[Mapping[str, object]]:
-    """The faults that the reason does not tell already, in the same words or as the state."""
-    faults = cast("list[Mapping[str, object]]", bay["faults"])
+    """The faults that the reason does not tell already, as its cause or as the state."""
+    faults, told = cast("list[Mapping[str, object]]", bay["faults"]), set(_told(bay.get("cause")))
     said = {"will_not_stop"} if bay["state"] == "UNCONTROLLABLE" else set()
-    return [fault for fault in faults if str(fault["text"]) not in str(bay["reason"]) and fault["id"] not in said]
+    return [one for one in faults if one["id"] not in said and told.isdisjoint(islice(_told(one.get("cause")), 1))]
+
+
+def _told(cause: object) -> Iterator[tuple[object, ...]]:
+    """Which causes a cause in the document tells: itself, then those in its parameters."""
+    if isinstance(cause, Mapping):
+        yield cause.get("id"), cause.get("key"), cause.get("advice")
+        params = cause.get("params")
+        yield from (one for value in (params.values() if isinstance(params, Mapping) else ()) for one in _told(value))
+    elif isinstance(cause, list):
+        yield from (one for value in cause for one in _told(value))
 
 
 def is_alarming(bay: Bay) -> bool:
@@ -88,37 +116,35 @@ def stands_by(bay: Bay) -> bool:
     )
 
 
-def what_to_do(bay: Bay) -> str:
+def what_to_do(bay: Bay, language: str = "") -> str:
     """About a charger that was not verified to stand by: first what to do, then why."""
-    why = f"{bay['state']}: {bay['reason']}"
-    if str(bay["reason"]).startswith("CUT THE MAINS"):
+    if next(_told(bay.get("cause")), ("",))[0] in CUT_THE_MAINS:
         return f"{bay['name']}: {bay['reason']}"
-    whose = f"{bay['name']}'s charger ({bay.get('port', 'its port is not known')})"
-    if is_alarming(bay) or bay["state"] not in RESTING | {"OFFLINE"}:
-        return f"CUT THE MAINS of {whose}: {why}"
-    return f"LOOK at {whose}, nobody has seen that it stands by: {why}"
+    dangerous = is_alarming(bay) or bay["state"] not in RESTING | {"OFFLINE"}
+    id_, port = "cut_mains_of" if dangerous else "look_at", bay.get("port") or Cause("port_unknown")
+    return say(Cause.of(id_, bay=bay["name"], port=port, state=bay["state"], reason=bay["reason"]), language)
 
 
-def _below(bay: Bay) -> Iterator[str]:
+def _below(bay: Bay, language: str) -> Iterator[str]:
     yield from (f"{fault['effect']}: {fault['text']}" for fault in other_faults(bay))
-    if old := "; ".join(_old_values(bay)):
+    if old := "; ".join(say(one, language) for one in _old_values(bay)):
         yield f"OLD: {old}"
     if cast("Mapping[str, object]", bay.get("policy", {})).get("waiting_sha256"):
-        yield "POLICY: a changed one comes into force when this bay stands by"
+        yield f"POLICY: {say(Cause('policy_waits'), language)}"
 
 
-def _old_values(bay: Bay) -> Iterator[str]:
+def _old_values(bay: Bay) -> Iterator[Cause]:
     """What is shown although it may not be true any more, and since when; what else is known instead."""
     charger, battery = _part(bay, "charger"), _part(bay, "battery")
     if charger.get("old"):
-        text = f"the charger's {figure(charger['current_a'], '{:.2f} A')}, last heard {_age(charger['age_s'])} ago"
         fresh = battery.get("current_a") is not None and "current_a" not in _old(bay)
-        yield f"{text}; the BMU sees {figure(battery['current_a'], '{:.1f} A')}" if fresh else text
+        bmu = Cause.of("bmu_sees", pack_a=battery["current_a"]) if fresh else None
+        yield Cause.of("old_charger", charger_a=charger["current_a"], age=_age(charger["age_s"]), bmu=bmu)
     by_age: dict[str, list[str]] = {}
     ages_s = cast("Mapping[str, object]", battery.get("age_s", {}))
     for name in (name for name in BATTERY if name in _old(bay)):
         by_age.setdefault(_age(ages_s.get(name)), []).append(BATTERY[name])
-    yield from (f"{', '.join(names)}: last heard {age} ago" for age, names in by_age.items())
+    yield from (Cause.of("old_values", names=tuple(names), age=age) for age, names in by_age.items())
 
 
 def _old(bay: Bay) -> Sequence[str]:

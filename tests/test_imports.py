@@ -4,6 +4,7 @@ The rules read the source, so that an import inside a function or for typing onl
 """
 
 import ast
+import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     "errors": (),
     "keys": (),
     "model": (),
+    # Core makes causes; sentences are made of them at the edges only.
+    "text": ("model",),
     "protocol": ("errors", "keys", "model"),
     "config": ("errors", "keys", "model", "protocol.objects"),
     "interlock": ("config.policy", "config.station", "errors", "keys", "model"),
@@ -29,20 +32,22 @@ EDGES: dict[str, tuple[str, ...]] = {
     "link": ("errors", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
     # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
-    "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol"),
+    "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol",
+        "text",
+    ),
     "commissioning": ("config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile"),
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
     # What it checks and tries is the core itself, on the models of the emulators, without any line between them.
     "workbench": (
         "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
-        "sim.chemistry", "sim.pack",
+        "sim.chemistry", "sim.pack", "text",
     ),
-    "show": (),
-    "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim"),
+    "show": ("model", "text"),
+    "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
         "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort", "link",
-        "model", "protocol", "service", "show", "sim", "workbench",
+        "model", "protocol", "service", "show", "sim", "text", "workbench",
     ),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
@@ -65,7 +70,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
 }
 
 #: These give the same answer to the same arguments, for ever: of the standard library they may use only LIBRARY.
-PURE = ("core", "errors", "interlock", "keys", "model", "protocol")
+PURE = ("core", "errors", "interlock", "keys", "model", "protocol", "text")
 LIBRARY = frozenset({
     "abc", "bisect", "collections", "contextlib", "dataclasses", "decimal", "enum", "fractions", "functools", "heapq",
     "itertools", "math", "operator", "re", "statistics", "string", "struct", "types", "typing",
@@ -281,3 +286,41 @@ KEPT: tuple[tuple[str, str], ...] = (
 @pytest.mark.parametrize(("name", "source"), KEPT, ids=name_of)
 def test_what_is_allowed_is_not_complained_about(name: str, source: str) -> None:
     assert [complaint for rule in RULES for complaint in rule(Module(name, source))] == []
+
+
+#: Parts that make causes. A sentence in them is one that nobody can translate, or compare.
+SILENT = ("core",)
+WORD, WORDS = re.compile("[a-z]{2,}"), 3
+#: (module, the beginning of what is still said there)
+SAID = frozenset({
+    ("core.limits", ""),  # what binds the current: key and place are data, the sentence is English still
+    ("core.machine", " is not possible in "),  # an error of the program, for who mends it
+})  # fmt: skip
+
+
+def sentences(module: Module) -> Iterator[str]:
+    """No text of three words or more but in docstrings."""
+    if not within(module.name, SILENT):
+        return
+    tree = ast.parse(module.source, module.name)
+    docs = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+            said = any(module.name == name and node.value.startswith(text) for name, text in SAID)
+            if sum(bool(WORD.search(word)) for word in node.value.split()) >= WORDS and not said:
+                yield f"{module.name}:{node.lineno}: says {node.value!r}"
+
+
+def test_the_core_says_nothing_in_words() -> None:
+    assert [complaint for module in product() for complaint in sentences(module)] == []
+
+
+def test_a_sentence_in_the_core_is_seen() -> None:
+    assert list(sentences(Module("core.step", '"""Of the module."""\nx = f"the pack has {y} V, below"\n')))
+    assert not list(sentences(Module("core.step", '"""Of the module, in words."""\nx = "a_word", "two words"\n')))

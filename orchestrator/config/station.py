@@ -18,6 +18,13 @@ class Rs485(StrEnum):
     KERNEL = "kernel"  #: the serial driver switches RTS (TIOCSRS485)
 
 
+class Language(StrEnum):
+    """What people are told in."""
+
+    EN = "en"  #: English
+    KO = "ko"  #: Korean
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChargerConfig:
     """One charger on one serial port (its address is always 0x90)."""
@@ -115,6 +122,7 @@ class Station:
         le=60,
         default=3.0,
     )
+    language: Language = key("what status, log, journal and answers are written in: en or ko", default=Language.EN)
     control: Control = key("the control socket")
     journal: JournalConfig = key("the journal")
     source: Source = field(default=Source("<station>"), compare=False)

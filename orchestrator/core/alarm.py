@@ -27,4 +27,4 @@ def _waits(memory: Memory, faults: Faults) -> bool:
     if memory.state is not State.HELD:
         return memory.state is State.TRIPPED
     by_fault = any(ROW[fault.id].clear is Clear.OPERATOR for fault in faults)
-    return by_fault or memory.hold not in ("", *OWN)
+    return by_fault or memory.hold not in (None, *OWN)

@@ -11,6 +11,7 @@ from orchestrator.core.witnesses import standby
 from orchestrator.model import (
     ENERGISED,
     BatteryLink,
+    Cause,
     ChargeMode,
     ChargerLink,
     ChargerReading,
@@ -96,8 +97,8 @@ class Facts:
         self.soc = _fresh(battery.soc_pct, now_s, slow_s)
         self.soh = _fresh(battery.soh_pct, now_s, slow_s)
         self.connected = snapshot.connected
-        #: what of our own could not be judged in this step, in words
-        self.broken: list[str] = []
+        #: what of our own could not be judged in this step
+        self.broken: list[Cause] = []
         self.energised = memory.state in ENERGISED
         self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
         #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
@@ -133,17 +134,17 @@ class Facts:
         return None not in (self.pack_v, self.pack_a, self.status, self.temperature_c, self.soc, self.soh)
 
     @property
-    def missing(self) -> str:
-        """What the BMU has not told freshly, of all that a charge needs; for people."""
+    def missing(self) -> tuple[str, ...]:
+        """What the BMU has not told freshly, of all that a charge needs."""
         values = {
             "voltage": self.pack_v,
             "current": self.pack_a,
             "status": self.status,
             "temperature": self.temperature_c,
-            "SOC": self.soc,
-            "SOH": self.soh,
+            "soc": self.soc,
+            "soh": self.soh,
         }
-        return ", ".join(name for name, value in values.items() if value is None)
+        return tuple(name for name, value in values.items() if value is None)
 
     @property
     def standby(self) -> bool:

@@ -10,10 +10,9 @@ from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.safestop import OBEY_STOP_S
-from orchestrator.model import STOP, Alarm, Decision, Request, Snapshot, State
+from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 
 FAULT = "internal"
-ANSWERS = "this is a defect of the software; the charger is being stopped"
 
 
 def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tuple[Decision, Memory]:
@@ -22,11 +21,12 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     memory.last_s = now_s
     if memory.state not in UNVERIFIED or memory.stopping_s is None:
         memory.stopping_s = memory.since_s = now_s
-        memory.state, memory.stop_reason = State.STOPPING, f"{FAULT}: {error}"
+        memory.state, memory.stop_cause = State.STOPPING, Cause.of("failed", error=error)
     memory.unverified, memory.ready, memory.intends, memory.order = True, False, False, None
     known = memory.faults.get(FAULT)
     since_s = known.raised_s if known is not None and known.raised_s is not None else now_s
-    memory.faults[FAULT] = FaultMemory(present=True, raised_s=since_s, text=error, latched=True)
+    what = Cause.of("internal_error", error=error)
+    memory.faults[FAULT] = FaultMemory(present=True, raised_s=since_s, cause=what, latched=True)
     if snapshot.request is Request.STOP:
         memory.hold = STOPPED
     tried_s = now_s - memory.stopping_s
@@ -34,17 +34,14 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
         memory.state = State.UNCONTROLLABLE
     out = memory.state is State.UNCONTROLLABLE
     memory.closed = closes(memory.state, closed=memory.closed, standby=False)
-    memory.reason = (
-        f"CUT THE MAINS of this charger: this software has failed to judge the bay for {tried_s:.0f} s, and cannot "
-        f"verify the stop that it repeats ({error})"
-        if out
-        else f"stopping: {FAULT}: {error}"
-    )
+    memory.cause = Cause.of("failed_stopping", error=error)
+    if out:
+        memory.cause = Cause.of("failed_uncontrollable", tried_s=tried_s, error=error)
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
-    answer = f"internal error: {error}; {ANSWERS}" if refused else ""
+    answer = Cause.of("failed_request", error=error) if refused else None
     level = Alarm.DANGER if out else Alarm.NONE
     decision = Decision(
-        memory.state, memory.reason, STOP, faults=shown(memory.faults, now_s), alarm=level, closed=memory.closed,
+        memory.state, memory.cause, STOP, faults=shown(memory.faults, now_s), alarm=level, closed=memory.closed,
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory

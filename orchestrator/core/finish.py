@@ -8,6 +8,7 @@ if the policy trusts it. Then it may stay on for a while, to balance.
 from orchestrator.config.amperes import END_SHARE, end_v
 from orchestrator.config.policy import Needs
 from orchestrator.core.facts import Facts
+from orchestrator.model import Cause
 
 #: A charger that ends a charge below this state of charge is wrong, or the BMU is.
 EARLY_FULL_PCT = 80.0
@@ -20,56 +21,58 @@ FALLEN_PCT = 3.0
 DAY_S = 86400.0
 
 
-def finished(f: Facts) -> str | None:
+def finished(f: Facts) -> Cause | None:
     """Why the charge is over, with the policy's line; None while it is not."""
-    rule, source = f.rules.policy.finish, f.rules.policy.source
+    rule, by_policy = f.rules.policy.finish, f.rules.by_policy
     if not goes_full(f) and f.soc is not None and f.soc >= rule.target_soc_pct:
-        return f"SOC {f.soc:.0f} % reached {rule.target_soc_pct:g} % ({source.at('finish.target_soc_pct')})"
+        return by_policy("full_soc", "finish.target_soc_pct", soc_pct=f.soc, limit_pct=rule.target_soc_pct)
     ended = _by_charger(f)
     if ended is not None:
         return ended
     session = f.memory.session
     full = known_full(f) if session is None else session.full
     if not full or session is None or not goes_full(f):  # above a target nothing is held
-        return full or None
+        return full
     if session.held_s < rule.hold_min * 60:
         return None
-    held = f", held for {rule.hold_min:g} min ({source.at('finish.hold_min')})" if rule.hold_min else ""
-    return full + held
+    return by_policy("full_held", "finish.hold_min", what=full, hold_min=rule.hold_min) if rule.hold_min else full
 
 
-def known_full(f: Facts) -> str:
-    """By what the pack is known to be full now; "" while it is not."""
+def known_full(f: Facts) -> Cause | None:
+    """By what the pack is known to be full now; None while it is not."""
     rule = f.rules.policy.finish.full
-    signs = {"soc_pct": _by_soc(f), "taper": _by_taper(f), "charger": _by_charger(f) or ""}
+    signs = {"soc_pct": _by_soc(f), "taper": _by_taper(f), "charger": _by_charger(f)}
     if rule.needs is Needs.ANY:
-        return next((text for text in signs.values() if text), "")
-    needed = [name for name in signs if getattr(rule, name) not in (None, False)]
-    return " and ".join(signs[name] for name in needed) if all(signs[name] for name in needed) else ""
+        return next((sign for sign in signs.values() if sign is not None), None)
+    needed = [signs[name] for name in signs if getattr(rule, name) not in (None, False)]
+    seen = [sign for sign in needed if sign is not None]
+    if not seen or len(seen) < len(needed):
+        return None
+    return seen[0] if len(seen) == 1 else Cause.of("full_by_all", whats=tuple(seen))
 
 
-def _by_soc(f: Facts) -> str:
-    full_pct, source = f.rules.policy.finish.full.soc_pct, f.rules.policy.source
+def _by_soc(f: Facts) -> Cause | None:
+    full_pct = f.rules.policy.finish.full.soc_pct
     if full_pct is None or f.soc is None or f.soc < full_pct:
-        return ""
-    return f"SOC {f.soc:.0f} % reached {full_pct:g} % ({source.at('finish.full.soc_pct')})"
+        return None
+    return f.rules.by_policy("full_soc", "finish.full.soc_pct", soc_pct=f.soc, limit_pct=full_pct)
 
 
-def _by_taper(f: Facts) -> str:
+def _by_taper(f: Facts) -> Cause | None:
     taper, since_s = f.rules.taper, f.memory.taper_s
     if taper is None or since_s is None or f.amps is None or f.now_s - since_s < taper.for_s:
-        return ""
-    at = f.rules.policy.source.at("finish.full.taper")
-    return f"{f.amps:.2f} A, tapered below {tapered_a(f):g} A for {taper.for_s:g} s ({at})"
+        return None
+    key, below_a = "finish.full.taper", tapered_a(f)
+    return f.rules.by_policy("full_taper", key, charger_a=f.amps, below_a=below_a, for_s=taper.for_s)
 
 
-def _by_charger(f: Facts) -> str | None:
+def _by_charger(f: Facts) -> Cause | None:
     """A charger that ends an honest charge by itself has ended it, whatever else is needed to call the pack full."""
     if f.rules.policy.finish.full.charger is False or not f.full_mode or f.soc is None:
         return None
     if f.soc < early_below_pct(f) or not ends_full(f):
         return None
-    return f"the charger reports full (mode 5) ({f.rules.policy.source.at('finish.full.charger')})"
+    return f.rules.by_policy("full_charger", "finish.full.charger")
 
 
 def ends_full(f: Facts) -> bool:
@@ -128,14 +131,13 @@ def target(f: Facts) -> tuple[float, str]:
     return f.rules.policy.finish.target_soc_pct, "finish.target_soc_pct"
 
 
-def goes_on(f: Facts) -> str:
-    """Why a charge that was interrupted on its way to full goes on, whatever the SOC says; "" where the SOC decides."""
-    rule, source, session = f.rules.policy.finish, f.rules.policy.source, f.memory.session
+def goes_on(f: Facts) -> Cause | None:
+    """Why a charge that was interrupted on its way to full goes on, whatever the SOC says; None where that decides."""
+    rule, session = f.rules.policy.finish, f.memory.session
     if session is None or not goes_full(f):
-        return ""
+        return None
     if session.full and session.held_s < rule.hold_min * 60:
-        at = source.at("finish.hold_min")
-        return f"the pack is full, and was not yet held at the top for {rule.hold_min:g} min ({at})"
+        return f.rules.by_policy("not_held_yet", "finish.hold_min", hold_min=rule.hold_min)
     if not session.full and rule.full.soc_pct is None:
-        return f"the charge was interrupted, and the pack is not known to be full ({source.at('finish.full')})"
-    return ""
+        return f.rules.by_policy("not_known_full", "finish.full")
+    return None

@@ -18,12 +18,11 @@ from orchestrator.core.faults import FAULTS, ROW, Clear, Row
 from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory
 from orchestrator.core.safestop import verified
-from orchestrator.model import ActiveFault, Effect
+from orchestrator.model import ActiveFault, Cause, Effect
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
 BACKOFF_S = (10.0, 60.0, 300.0)
-ORDINALS = ("1st", "2nd", "3rd")
 MINUTE_S = 60.0
 #: Strikes are forgotten after this long; one more than there are backoffs latches.
 STRIKES_S = 3600.0
@@ -57,12 +56,12 @@ def update(f: Facts) -> dict[str, FaultMemory]:
     return after
 
 
-def _seen(row: Row, f: Facts) -> str | None:
+def _seen(row: Row, f: Facts) -> Cause | None:
     """What the row's predicate sees."""
     try:
         return row.check(f)
     except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
-        f.broken.append(f"{row.id} cannot be judged: {error!r}")
+        f.broken.append(Cause.of("not_judged", fault=row.id, error=repr(error)))
         return None
 
 
@@ -74,7 +73,7 @@ def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
     return (fault.polls + 1 if holds else max(0.0, fault.polls - DRAIN)), poll_t_s
 
 
-def _present(row: Row, fault: FaultMemory, seen: str, f: Facts, passed_s: float) -> FaultMemory:
+def _present(row: Row, fault: FaultMemory, seen: Cause, f: Facts, passed_s: float) -> FaultMemory:
     polls, poll_t_s = _polls(fault, f, holds=True)
     # The time before its first look is nobody's: the condition may have come just now.
     seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
@@ -85,7 +84,7 @@ def _present(row: Row, fault: FaultMemory, seen: str, f: Facts, passed_s: float)
     if row.clear is Clear.BACKOFF:
         strikes = (*(t for t in strikes if f.now_s - t < STRIKES_S), f.now_s)
     latched = row.clear is Clear.RESET or len(strikes) > len(BACKOFF_S)
-    return replace(fault, raised_s=f.now_s, text=seen, latched=latched, strikes=strikes)
+    return replace(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes)
 
 
 def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMemory | None:
@@ -102,10 +101,10 @@ def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMem
     wait_s = clear_after_s(row, fault)
     if wait_s is not None and now_s - clean_s >= wait_s:
         return FaultMemory(strikes=fault.strikes) if fault.strikes else None
-    text = fault.text
-    if row.past is not None and f.memory.state in UNVERIFIED and verified(f):
-        text = row.past(text, row.for_s + clean_s - fault.raised_s)
-    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, text=text)
+    cause = fault.cause
+    if row.past is not None and cause is not None and f.memory.state in UNVERIFIED and verified(f):
+        cause = row.past(cause, row.for_s + clean_s - fault.raised_s)
+    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause)
 
 
 def clear_after_s(row: Row, fault: FaultMemory) -> float | None:
@@ -130,51 +129,50 @@ def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
 
 
 def shown(faults: dict[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
-    """The faults in force, for people: what was seen and what to do. What has tripped begins with what to do.
+    """The faults in force: what was seen, and the id of what to do.
 
     `at_rest`: the charger stands by, verified.
     """
     return tuple(
-        ActiveFault(name, effect(name, fault), _text(ROW[name], fault, now_s, at_rest=at_rest), fault.raised_s or 0.0)
+        ActiveFault(name, effect(name, fault), _cause(ROW[name], fault, now_s, at_rest=at_rest), fault.raised_s or 0.0)
         for name, fault in raised(faults)
     )
 
 
-def _text(row: Row, fault: FaultMemory, now_s: float, *, at_rest: bool) -> str:
-    advice = row.at_rest if at_rest and row.at_rest else row.advice
+def _cause(row: Row, fault: FaultMemory, now_s: float, *, at_rest: bool) -> Cause:
+    """What a person reads of it: the evidence, the advice, and what bears on either."""
+    more: dict[str, object] = {"effect": effect(row.id, fault).name}
     if fault.latched and row.clear is not Clear.RESET:
-        advice = f"{advice}; it came {len(fault.strikes)} times within an hour: reset by a person"
-    if effect(row.id, fault) is Effect.TRIP:
-        return f"{advice} – {fault.text}"
-    return f"{fault.text}{_ago(now_s - (fault.raised_s or 0.0)) if row.moment else ''}; {advice}"
+        more["strikes"] = len(fault.strikes)
+    if row.moment:
+        more["ago_min"] = _whole_min(now_s - (fault.raised_s or 0.0))
+    return (fault.cause or Cause(row.id)).with_(row.at_rest if at_rest and row.at_rest else row.id, **more)
 
 
-def _ago(age_s: float) -> str:
-    return f", {age_s / 60:.0f} min ago" if age_s >= MINUTE_S else ", just now"
+def _whole_min(age_s: float) -> int:
+    return round(age_s / MINUTE_S) if age_s >= MINUTE_S else 0
 
 
-def goes_on(f: Facts) -> str:
-    """For the end of a sentence: when a bay goes on whose worst fault has a backoff, or what a person types for that.
+def goes_on(f: Facts) -> Cause | None:
+    """When a bay goes on whose worst fault has a backoff, or what a person types for that.
 
-    "" for all other faults, whose own words say it. Made anew in each step, and part of no fault: who looks for news
+    None for all other faults, whose own words say it. Made anew in each step, and part of no fault: who looks for news
     compares ids.
     """
     name, fault = raised(f.memory.faults)[0]
     if ROW[name].clear is not Clear.BACKOFF:
-        return ""
+        return None
     if fault.latched:
-        bay = f.rules.bay.name
-        gone = f"; its cause is gone: orchestrator reset {bay}, then orchestrator start {bay}"
-        return gone if fault.clean_s is not None else ""
+        return Cause.of("goes_on_by_reset", bay=f.rules.bay.name) if fault.clean_s is not None else None
     others = [(one, other) for one, other in raised(f.memory.faults) if effect(one, other) >= Effect.NO_START]
     lefts_s = [_left_s(ROW[one], other, f.now_s) for one, other in others]
-    own_s, strikes = _left_s(ROW[name], fault, f.now_s), max(len(fault.strikes), 1)
-    which = f"({ORDINALS[strikes - 1]} of {len(BACKOFF_S)} within an hour)"
+    own_s, strike = _left_s(ROW[name], fault, f.now_s), max(len(fault.strikes), 1)
     if own_s is None:
-        return f"; goes on by itself {clear_after_s(ROW[name], fault):g} s after its cause is gone {which}"
+        wait_s = clear_after_s(ROW[name], fault)
+        return Cause.of("goes_on_after", wait_s=wait_s, strike=strike, of=len(BACKOFF_S))
     known_s = [left_s for left_s in lefts_s if left_s is not None]
-    earliest = " at the earliest" if len(known_s) < len(lefts_s) else ""
-    return f"; its cause is gone, goes on by itself in {ceil(max(known_s))} s{earliest} {which}"
+    id_ = "goes_on_in_at_the_earliest" if len(known_s) < len(lefts_s) else "goes_on_in"
+    return Cause.of(id_, left_s=ceil(max(known_s)), strike=strike, of=len(BACKOFF_S))
 
 
 def _left_s(row: Row, fault: FaultMemory, now_s: float) -> float | None:
@@ -185,28 +183,28 @@ def _left_s(row: Row, fault: FaultMemory, now_s: float) -> float | None:
 
 def release(
     faults: dict[str, FaultMemory], now_s: float, *, by_reset: bool
-) -> tuple[dict[str, FaultMemory], list[str]]:
+) -> tuple[dict[str, FaultMemory], list[Cause]]:
     """Clear what a person may clear: by a reset everything, by a start what waits for a start.
 
-    Returns the faults that are left and the reasons why some of them cannot be cleared; then none is.
+    Returns the faults that are left and the causes why some of them cannot be cleared; then none is.
     """
     waiting = {
         name: fault
         for name, fault in faults.items()
         if fault.raised_s is not None and clear_after_s(ROW[name], fault) is None
     }
-    reasons = [reason for name, fault in waiting.items() if (reason := _kept_by(name, fault, now_s, by_reset=by_reset))]
-    left = {name: fault for name, fault in faults.items() if reasons or name not in waiting}
-    return left, reasons
+    causes = [cause for name, fault in waiting.items() if (cause := _kept_by(name, fault, now_s, by_reset=by_reset))]
+    left = {name: fault for name, fault in faults.items() if causes or name not in waiting}
+    return left, causes
 
 
-def _kept_by(name: str, fault: FaultMemory, now_s: float, *, by_reset: bool) -> str:
-    """Why a person may not clear this fault now; "" if they may."""
+def _kept_by(name: str, fault: FaultMemory, now_s: float, *, by_reset: bool) -> Cause | None:
+    """Why a person may not clear this fault now; None if they may."""
     row = ROW[name]
     if not by_reset and fault.latched:
-        return f"{name} is latched and needs a reset: {fault.text}"
+        return Cause.of("needs_reset", fault=name, what=fault.cause)
     if fault.clean_s is None:
-        return f"{name} is still there: {fault.text}"
+        return Cause.of("still_there", fault=name, what=fault.cause)
     if now_s - fault.clean_s < row.clean_s:
-        return f"{name} must be gone for {row.clean_s:g} s first"
-    return ""
+        return Cause.of("gone_first", fault=name, clean_s=row.clean_s)
+    return None

@@ -11,7 +11,7 @@ from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ra
 from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
 from orchestrator.core.rows import values
-from orchestrator.model import ActiveFault, Effect, Step
+from orchestrator.model import ActiveFault, Cause, Effect, Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +54,15 @@ def lowest(f: Facts, worst: ActiveFault | None = None) -> Bound:
     return min(bounds(f, worst), key=lambda bound: bound.allowed_a)
 
 
-def none_allowed(f: Facts) -> str | None:
+def none_allowed(f: Facts) -> Cause | None:
     """Why not even the lowest step may be taken; None where one may. What is not known is another rule's business."""
     bound = lowest(f)
     if bound.allowed_a > 0 and (not f.rules.manual or highest_step(bound.allowed_a, f.rules.worst_a) is not None):
         return None
+    rule = limit(f, bound)
     if bound.allowed_a == 0:
-        return sentence(f, bound)
-    return f"{sentence(f, bound)}; the lowest step of this charger is {f.rules.worst_a[0]:g} A"
+        return rule
+    return Cause.of("below_lowest_step", key=rule.key, place=rule.place, rule=rule, lowest_a=f.rules.worst_a[0])
 
 
 def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
@@ -82,7 +83,12 @@ def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
 
 
 def _step(f: Facts, index: int, bound: Bound) -> Step:
-    return Step(index, f.rules.steps_a[index], sentence(f, bound), bound.key, _place(f, bound.key))
+    return Step(index, f.rules.steps_a[index], limit(f, bound))
+
+
+def limit(f: Facts, bound: Bound) -> Cause:
+    """What limits the current, as a cause. Its sentence is still made here."""
+    return Cause.of("limit", key=bound.key, place=_place(f, bound.key), text=sentence(f, bound))
 
 
 # --- as sentences -----------------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from orchestrator.core.witnesses.followed import Witnessed
-from orchestrator.model import Command, Session, State, Step
+from orchestrator.model import Cause, Command, Session, State, Step
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class FaultMemory:
     poll_t_s: float = 0.0  #: the newest reading that was looked at
     raised_s: float | None = None  #: when it became a fault, None while it is being debounced
     clean_s: float | None = None  #: when the condition became false again
-    text: str = ""  #: what was seen when it was raised
+    cause: Cause | None = None  #: what was seen when it was raised
     latched: bool = False  #: a person must reset it
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
 
@@ -40,11 +40,11 @@ class Memory:
     since_s: float | None = None  #: when the state was entered; None before the first step
     last_s: float | None = None  #: when the last step was taken
     looked_s: float | None = None  #: when the fault table was last looked through
-    reason: str = "the service has just started"
+    cause: Cause = Cause("service_started")
     faults: dict[str, FaultMemory] = field(default_factory=dict)
-    stop_reason: str = ""  #: why the last charge was stopped
+    stop_cause: Cause | None = None  #: why the last charge was stopped
     resets: tuple[tuple[float, str], ...] = ()  #: (when, fault id) of a person's resets within the last hour
-    hold: str = ""  #: why a person must start before the next charge; "" is free to go
+    hold: Cause | None = None  #: why a person must start before the next charge; None is free to go
     paused: bool = False  #: the operator paused the bay
     stopping_s: float | None = None  #: since when a stop has been tried that was not proved to last …
     verified_s: float | None = None  #: … and when standby was last proved
@@ -78,8 +78,8 @@ class Memory:
     sample: tuple[float, float] | None = None  #: (t_s, °C), the newest …
     sample_before: tuple[float, float] | None = None  #: … and the one before
     charge: tuple[float, float | None] = (0.0, None)  #: (t_s, SOC), the newest; None since this battery is here
-    charge_step: tuple[float, str] | None = None  #: when the SOC took a step that no charge explains, and which
-    exchange: tuple[float, str] | None = None  #: the same over a gap in which nobody could see the BMU
+    charge_step: tuple[float, Cause] | None = None  #: when the SOC took a step that no charge explains, and which
+    exchange: tuple[float, Cause] | None = None  #: the same over a gap in which nobody could see the BMU
     peak: tuple[float, float] | None = None  #: (t_s, SOC) of the highest SOC of the present run of the charger
     warmth: tuple[tuple[float, float], ...] = ()  #: (t_s, °C) of the last minutes, oldest first
     runs_s: float | None = None  #: since when the charger has reported that it runs, or delivers current

@@ -9,90 +9,85 @@ from collections.abc import Callable
 from orchestrator.core import latches
 from orchestrator.core.memory import Memory
 from orchestrator.core.safestop import LASTS_S
-from orchestrator.model import ENERGISED, Request, State
+from orchestrator.model import ENERGISED, Cause, Request, State
+from orchestrator.model.cause import together
 
 #: A charge has been started already.
 AT_WORK = ENERGISED | {State.QUALIFYING}
-STOPPED = "stopped by the operator"
+STOPPED = Cause("operator_stop")
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
-RESET = "reset by the operator"
+RESET = Cause("operator_reset")
 #: The holds that are an operator's own doing.
 OWN = frozenset({STOPPED, RESET})
-OUT_OF_CONTROL = (
-    "the charger was not seen to stop: cut its mains; nothing can be started or reset here before it has stood by for "
-    f"{LASTS_S:g} s"
-)
+OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 
-def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> str:
-    """Change the memory as the operator asks; "" when it was done, else why not.
+def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Cause | None:
+    """Change the memory as the operator asks; None when it was done, else why not.
 
     What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
     """
     if unkept and request in (Request.START, Request.RESET):
-        return f"not done: {unkept}"
+        return Cause.of("not_done", problem=unkept)
     return VERBS[request](memory, now_s)
 
 
-def _stop(memory: Memory, _now_s: float) -> str:
+def _stop(memory: Memory, _now_s: float) -> Cause | None:
     memory.hold = STOPPED
-    return ""
+    return None
 
 
-def _pause(memory: Memory, _now_s: float) -> str:
-    latched = [name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None]
+def _pause(memory: Memory, _now_s: float) -> Cause | None:
+    latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
     if latched:  # its reset leads to a start, which would end the pause
-        return f"not running: {', '.join(latched)} must be reset first"
+        return Cause.of("reset_first", faults=latched)
     if memory.hold:
-        return f"not running: {memory.hold}"
+        return Cause.of("not_running", what=memory.hold)
     memory.paused = True
-    return ""
+    return None
 
 
-def _start(memory: Memory, now_s: float) -> str:
+def _start(memory: Memory, now_s: float) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
         return OUT_OF_CONTROL
     before = memory.faults
-    memory.faults, reasons = latches.release(before, now_s, by_reset=False)
-    if reasons:
-        return "; ".join(reasons)
+    memory.faults, refusals = latches.release(before, now_s, by_reset=False)
+    if refusals:
+        return together(refusals)
     if not (memory.hold or memory.paused) and len(memory.faults) == len(before) and memory.state not in AT_WORK:
-        return f"nothing to start: {memory.state}: {memory.reason}"
-    memory.hold, memory.paused = "", False
-    return ""
+        return Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause)
+    memory.hold, memory.paused = None, False
+    return None
 
 
-def _reset(memory: Memory, now_s: float) -> str:
+def _reset(memory: Memory, now_s: float) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
         return OUT_OF_CONTROL
     before = memory.faults
-    faults, reasons = latches.release(before, now_s, by_reset=True)
+    faults, refusals = latches.release(before, now_s, by_reset=True)
     cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
     resets = tuple(reset for reset in memory.resets if now_s - reset[0] < RESETS_S)
-    reasons = reasons or [text for name in cleared if (text := _too_often(name, resets, now_s))]
-    if reasons:
-        return "; ".join(reasons)
+    refusals = refusals or [cause for name in cleared if (cause := _too_often(name, resets, now_s))]
+    if refusals:
+        return together(refusals)
     if len(faults) == len(before):
-        return f"nothing to reset: {memory.state}: {memory.reason}"
+        return Cause.of("nothing_to_reset", state=memory.state.value, what=memory.cause)
     memory.faults, memory.resets = faults, resets + tuple((now_s, name) for name in cleared)
     memory.hold = RESET  # in whatever state: the way on is a start, also while the stop is verified
-    return ""
+    return None
 
 
-def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> str:
+def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> Cause | None:
     """FAULTS P6: what comes again after every reset is not mended by resetting it."""
     times = [t_s for t_s, fault in resets if fault == name]
     if len(times) < MAX_RESETS:
-        return ""
-    minutes = (times[-MAX_RESETS] + RESETS_S - now_s) / 60
-    return (
-        f"{name} was reset {len(times)} times within an hour and came again each time: remove its cause; "
-        f"it can be reset again in {minutes:.0f} min"
-    )
+        return None
+    wait_min = (times[-MAX_RESETS] + RESETS_S - now_s) / 60
+    return Cause.of("reset_too_often", fault=name, times=len(times), wait_min=wait_min)
 
 
-VERBS: dict[Request, Callable[[Memory, float], str]] = {
+VERBS: dict[Request, Callable[[Memory, float], Cause | None]] = {
     Request.START: _start,
     Request.PAUSE: _pause,
     Request.STOP: _stop,

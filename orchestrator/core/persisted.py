@@ -10,13 +10,14 @@ from dataclasses import dataclass, field, replace
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory
-from orchestrator.model import ENERGISED, Session, State
+from orchestrator.model import ENERGISED, Cause, Session, State
+from orchestrator.model.cause import together
 
 #: In these a charger may be delivering current.
 RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
 #: Mere counters are written this often while nothing else changes.
 COUNTERS_S = 30.0
-UNFINISHED = "the last run of this service ended in mid-charge; its charger was stopped first when it began again"
+UNFINISHED = Cause("unfinished")
 
 Age = float  #: seconds, at the moment when it was written down
 
@@ -25,7 +26,7 @@ Age = float  #: seconds, at the moment when it was written down
 class PersistedFault:
     """One fault in force, or the strikes that are left of one."""
 
-    text: str = ""  #: the evidence; "" where only strikes are left
+    cause: Cause | None = None  #: the evidence; None where only strikes are left
     latched: bool = False
     raised: Age | None = None  #: None: it is not in force
     clean: Age | None = None  #: since when its cause has been gone; None: it was still there
@@ -37,7 +38,7 @@ class Persisted:
     """Of one bay."""
 
     running: bool = False  #: the charger may be running: it was told to, and was not verified to stand by since
-    hold: str = ""  #: why a person must start; as in the core's memory
+    hold: Cause | None = None  #: why a person must start; as in the core's memory
     paused: bool = False
     faults: Mapping[str, PersistedFault] = field(default_factory=dict)
     resets: tuple[tuple[Age, str], ...] = ()
@@ -51,7 +52,7 @@ class Persisted:
         """What to keep of a bay's memory."""
         faults = {
             name: PersistedFault(
-                text=fault.text if fault.raised_s is not None else "",
+                cause=fault.cause if fault.raised_s is not None else None,
                 latched=fault.latched,
                 raised=_age(fault.raised_s, now_s),
                 clean=_age(fault.clean_s, now_s),
@@ -123,11 +124,11 @@ class Persisted:
         """What the bay begins with."""
         faults = {name: _fault(fault, now_s) for name, fault in self.faults.items() if name in ROW}
         if self.running:
-            faults["found_running"] = FaultMemory(raised_s=now_s, text=UNFINISHED)
-        unknown = [one.text or name for name, one in self.faults.items() if name not in ROW]
+            faults["found_running"] = FaultMemory(raised_s=now_s, cause=UNFINISHED)
+        unknown = [one.cause or _unknown(name) for name, one in self.faults.items() if name not in ROW]
         session = self.session
         memory = Memory(
-            hold=self.hold or "; ".join(unknown),
+            hold=self.hold or (together(unknown) if unknown else None),
             paused=self.paused,
             faults=faults,
             resets=tuple((now_s - age_s, name) for age_s, name in self.resets),
@@ -141,6 +142,10 @@ class Persisted:
         return memory
 
 
+def _unknown(name: str) -> Cause:
+    return Cause.of("fault_of_another_version", fault=name)
+
+
 def _age(t_s: float | None, now_s: float) -> Age | None:
     return None if t_s is None else now_s - t_s
 
@@ -149,7 +154,7 @@ def _fault(fault: PersistedFault, now_s: float) -> FaultMemory:
     return FaultMemory(
         raised_s=None if fault.raised is None else now_s - fault.raised,
         clean_s=None if fault.clean is None else now_s - fault.clean,
-        text=fault.text,
+        cause=fault.cause,
         latched=fault.latched,
         strikes=tuple(now_s - age_s for age_s in fault.strikes),
     )
@@ -160,4 +165,6 @@ def from_first_format(name: str, text: str) -> PersistedFault:
     row = ROW.get(name)
     backoff = row is not None and row.clear is Clear.BACKOFF  # it would not have been kept with fewer strikes
     strikes = (0.0,) * (len(BACKOFF_S) + 1) if backoff else ()
-    return PersistedFault(text, row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes)
+    return PersistedFault(
+        Cause.of("said", text=text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes
+    )

@@ -1,6 +1,7 @@
 """What a bay is decided by: its station entry and its policy, with the stricter of both worked out once."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from orchestrator.config.amperes import (
     DIGITS,
@@ -15,7 +16,7 @@ from orchestrator.config.amperes import (
 from orchestrator.config.policy import Policy
 from orchestrator.config.station import Bay
 from orchestrator.keys import Range
-from orchestrator.model import ControlMode
+from orchestrator.model import Cause, ControlMode
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,17 +62,25 @@ class Rules:
             max_ah=max_ah(policy.pack, policy.finish),
         )
 
+    def by_policy(self, id_: str, key: str, /, **params: Any) -> Cause:  # noqa: ANN401 - as those of a cause
+        """The cause with this key of the policy, and the line where that stands."""
+        return Cause(id_, tuple(params.items()), key, self.policy.source.at(key))
+
+    def by_station(self, id_: str, key: str, /, **params: Any) -> Cause:  # noqa: ANN401 - as those of a cause
+        """The same for a key of the bay in the station file."""
+        return Cause(id_, tuple(params.items()), key, self.bay.source.at(key))
+
     @property
-    def hottest_at(self) -> str:
-        """`FILE:LINE` of what says how warm a pack may be: the policy, or the station if its limit is lower."""
+    def hottest_at(self) -> tuple[str, str]:
+        """Key and place of what says how warm a pack may be: the policy, or the station if its limit is lower."""
         return self._at(policy_is_stricter=self.policy.pack.temperature_c.high <= self.bay.limits.temperature_c.high)
 
     @property
-    def coldest_at(self) -> str:
+    def coldest_at(self) -> tuple[str, str]:
         """The same for how cold it may be."""
         return self._at(policy_is_stricter=self.policy.pack.temperature_c.low >= self.bay.limits.temperature_c.low)
 
-    def _at(self, *, policy_is_stricter: bool) -> str:
+    def _at(self, *, policy_is_stricter: bool) -> tuple[str, str]:
         if policy_is_stricter:
-            return self.policy.source.at("pack.temperature_c")
-        return self.bay.source.at("limits.temperature_c")
+            return "pack.temperature_c", self.policy.source.at("pack.temperature_c")
+        return "limits.temperature_c", self.bay.source.at("limits.temperature_c")

@@ -23,6 +23,7 @@ from orchestrator.model import (
     STANDBY,
     STOP,
     ActiveFault,
+    Cause,
     ChargeMode,
     Command,
     Decision,
@@ -41,6 +42,7 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
     State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
     State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
 }
+PRECHARGE = Cause("precharge_step", key="precharge")
 #: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
 #: not end it: its limits would begin anew with each of them.
 SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})
@@ -60,7 +62,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
         memory.since_s = now_s
     f = Facts(now_s, snapshot, memory, rules)
     follow(f, last_s)
-    answer = hear(memory, snapshot.request, now_s, snapshot.unkept) if snapshot.request is not None else ""
+    answer = hear(memory, snapshot.request, now_s, snapshot.unkept) if snapshot.request is not None else None
     memory.faults = latches.update(f)
     faults = latches.shown(memory.faults, now_s, at_rest=stands_by(f))
     ended = _move(f, faults)
@@ -69,7 +71,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     return (
         Decision(
             state=memory.state,
-            reason=memory.reason,
+            cause=memory.cause,
             command=_order(f, setpoint, faults),
             setpoint=setpoint,
             step=chosen,
@@ -86,18 +88,18 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> Session | None:
     """Let the state follow the facts; the session that has ended by it, if any."""
     memory, before = f.memory, f.memory.state
-    trigger, reason = course(f, faults)
-    memory.reason = reason
+    trigger, memory.cause = course(f, faults)
     memory.state = fire(before, trigger) if trigger is not None else before
     if memory.state is not before:
         follow_stop(f, before)
         follow_state(f, before)
         if memory.state is State.STOPPING:
-            memory.stop_reason = reason
+            memory.stop_cause = memory.cause
     if memory.session is None or not _is_over(f, before):
         return None
-    held = memory.hold if memory.state is State.HELD else ""  # the rest of that reason is what to do next
-    ended = replace(memory.session, result=memory.stop_reason if before is State.STOPPING else held or reason)
+    held = memory.hold if memory.state is State.HELD else None  # the rest of that cause is what to do next
+    result = (memory.stop_cause if before is State.STOPPING else held) or memory.cause
+    ended = replace(memory.session, result=result)
     memory.session = None
     return ended
 
@@ -122,7 +124,7 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Setpoint, Step
     if memory.state is State.CHARGING:
         chosen, memory.raise_s = limits.choose(f, faults[0] if faults else None)
     else:
-        chosen, memory.raise_s = Step(0, rules.steps_a[0], "precharge is always on the lowest step", "precharge"), None
+        chosen, memory.raise_s = Step(0, rules.steps_a[0], PRECHARGE), None
     if memory.step is not None and memory.session is not None and chosen.index != memory.step.index:
         memory.session = replace(memory.session, step_changes=memory.session.step_changes + 1)
         if chosen.index < memory.step.index:

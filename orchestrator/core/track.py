@@ -18,7 +18,7 @@ from orchestrator.core.rows import follow_rows
 from orchestrator.core.witnesses import followed
 from orchestrator.core.witnesses.measured import STILL_ABOVE_A
 from orchestrator.core.witnesses.standby import sees_current
-from orchestrator.model import ENERGISED, Action, ChargeMode, ChargerReading, Operation, Session, State
+from orchestrator.model import ENERGISED, Action, Cause, ChargeMode, ChargerReading, Operation, Session, State
 
 #: How far apart the kept temperatures are.
 WARMTH_EVERY_S = 10.0
@@ -146,11 +146,11 @@ def _follow_charge(f: Facts) -> None:
     if before_pct is None:
         return
     gap_s, step_pct = newest.t_s - before_s, abs(f.soc - before_pct)
-    text = f"the SOC went from {before_pct:.0f} to {f.soc:.0f} % in {gap_s:.0f} s"
+    step = Cause.of("soc_step", before_pct=before_pct, soc_pct=f.soc, passed_s=gap_s)
     if gap_s <= SLOW_STALE_S and step_pct > SOC_STEP_PCT + SOC_RATE_PCT_PER_S * gap_s:
-        memory.charge_step = (f.now_s, text)
+        memory.charge_step = (f.now_s, step)
     elif gap_s > SLOW_STALE_S and step_pct > SOC_OTHER_PCT + SOC_DRIFT_PCT_PER_S * gap_s:
-        memory.exchange = (f.now_s, text)
+        memory.exchange = (f.now_s, step)
 
 
 def _peak(f: Facts) -> tuple[float, float] | None:
@@ -228,7 +228,7 @@ def _follow_session(f: Facts, passed_s: float) -> None:
 def _followed_full(f: Facts, session: Session, passed_s: float) -> Session:
     """Once found full a pack stays so, over a pause too, until it is seen to have lost some of it."""
     if session.full and f.soc is not None and f.soc < (session.full_pct or 0.0) - FALLEN_PCT:
-        return replace(session, full="", full_pct=None, held_s=0.0)
+        return replace(session, full=None, full_pct=None, held_s=0.0)
     if f.memory.state is not State.CHARGING:
         return session
     if session.full:

@@ -5,6 +5,7 @@ computed from them is never too young. Unknown is `None`, never a number.
 """
 
 from orchestrator.model.battery import BatteryLink, BatteryReading, BatteryStatus, Measurement
+from orchestrator.model.cause import Cause
 from orchestrator.model.charger import (
     STOP,
     Action,
@@ -44,6 +45,7 @@ __all__ = [
     "BatteryLink",
     "BatteryReading",
     "BatteryStatus",
+    "Cause",
     "ChargeMode",
     "ChargerLink",
     "ChargerReading",

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
 from orchestrator.model.battery import BatteryLink, BatteryReading
+from orchestrator.model.cause import Cause
 from orchestrator.model.charger import ChargeMode, ChargerLink, ChargerReading, Command, Precharge
 
 
@@ -32,7 +33,9 @@ class Snapshot:
     ending: str = ""  #: why the service is about to end, "" while it is not
     connected: bool = True  #: nothing is between charger and battery, or a contactor that was closed for this reading
     contactor_problem: str = ""  #: why the contactor cannot be driven, for a person: chip, line, what to do
-    waits: str = ""  #: why no charge may begin here right now, though nothing is wrong: another bay begins one
+    waits: Cause | None = (
+        None  #: why no charge may begin here right now, though nothing is wrong: another bay begins one
+    )
     moves: str = ""  #: the bay whose BMU has seen the first amperes of this bay's charger, if it is another one
     running_kept: bool = True  #: it is on disk that this bay's charger may be running
 
@@ -84,7 +87,7 @@ class ActiveFault:
 
     id: str
     effect: Effect
-    text: str  #: what, with its evidence, for the operator
+    cause: Cause  #: what, with its evidence, and what to do
     since_s: float
 
 
@@ -107,9 +110,17 @@ class Step:
 
     index: int  #: as the charger's protocol counts them: 0 (lowest) … 4
     current_a: float
-    rule: str  #: "temperature 8.4 °C in 0 … 10 allows 2.0 A (0.05 C), policies/li-ion-48v.yaml:31"
-    key: str = ""  #: what bound it, the same however it is worded: "current.temperature_c.rows[0]"; "": nothing did
-    place: str = ""  #: where that stands, FILE:LINE
+    rule: Cause  #: what limits it, with the line that says so
+
+    @property
+    def key(self) -> str:
+        """What bound it, the same however it is worded: "current.temperature_c.rows[0]"; "": nothing did."""
+        return self.rule.key
+
+    @property
+    def place(self) -> str:
+        """Where that stands, FILE:LINE."""
+        return self.rule.place
 
     @property
     def number(self) -> int:
@@ -138,11 +149,11 @@ class Session:
     continuous_s: float = 0.0  #: … and in continuous precharge, pauses not counted
     rise_s: float = 0.0  #: spent in precharge since the pack's rise was last counted from the beginning …
     rise_v: float | None = None  #: … at this pack voltage; None: precharge has not begun
-    full: str = ""  #: by what the pack was found full; "" while it is not …
+    full: Cause | None = None  #: by what the pack was found full; None while it is not …
     full_pct: float | None = None  #: … at which SOC …
     held_s: float = 0.0  #: … and for how long it has stayed on since
     unseen_s: float = 0.0  #: for so long it may have gone on before a kill, uncounted: the limits count it as charged
-    result: str = ""  #: why it ended; "" while it goes on
+    result: Cause | None = None  #: why it ended; None while it goes on
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +161,7 @@ class Decision:
     """What one `step()` says. The service carries out `command` and shows the rest."""
 
     state: State
-    reason: str  #: why the bay is in this state, for the operator
+    cause: Cause  #: why the bay is in this state
     command: Command | None = None  #: standing order for the charger's port; None: only poll
     setpoint: Setpoint = STANDBY
     step: Step | None = None  #: while energised
@@ -158,4 +169,4 @@ class Decision:
     alarm: Alarm = Alarm.NONE
     closed: bool = False  #: the contactor between charger and battery is to be closed
     session: Session | None = None  #: running, or just ended (`result` set, in this one decision)
-    answer: str = ""  #: what became of the operator's request: "" is yes, else why not
+    answer: Cause | None = None  #: why the operator's request was refused; None: it was not

@@ -4,16 +4,16 @@ from collections.abc import Callable
 from itertools import takewhile
 from threading import Event, Lock
 
-from orchestrator.model import Request
+from orchestrator.model import Cause, Request
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 
 
 class Asked:
-    """`answer` is set when `done` is: "" is yes."""
+    """`answer` is set when `done` is: None is yes."""
 
     def __init__(self, request: Request) -> None:
         self.request = request
-        self.answer = ""
+        self.answer: Cause | None = None
         self.done = Event()
 
 
@@ -32,7 +32,7 @@ class Requests:
         with self._lock:
             if asked.request is Request.STOP:
                 for early in (one for one in self._asked if one.request is not Request.STOP):
-                    early.answer = "a stop came meanwhile: ask again if it is still wanted"
+                    early.answer = Cause("overtaken")
                     early.done.set()
                 self._asked = [one for one in self._asked if one.request is Request.STOP]
             self._asked.append(asked)
@@ -58,10 +58,10 @@ class Answers:
             tuple[Asked, int, float, bool]
         ] = []  #: with the revision that keeps it, until when to wait, and whether it changed something
 
-    def give(self, asked: Asked, answer: str, revision: int, now_s: float, *, changed: bool = True) -> None:
+    def give(self, asked: Asked, answer: Cause | None, revision: int, now_s: float, *, changed: bool = True) -> None:
         """Answer it: a refusal at once, what was done when the disk has it."""
         asked.answer = answer
-        if answer:
+        if answer is not None:
             asked.done.set()
         else:
             self.waiting.append((asked, revision, now_s + KEPT_WITHIN_S, changed))
@@ -75,11 +75,9 @@ class Answers:
                 left.append((asked, revision, until_s, changed))
                 continue
             if revision > kept:
-                why = self._store.unkept(now_s) or "the disk has not taken it"
-                asked.answer = f"done, but not kept: {why}"
-                if asked.request is Request.START:
-                    asked.answer = f"not done: {why}"
-                    if changed:
-                        self._withdraw()
+                starts, problem = asked.request is Request.START, self._store.unkept(now_s)
+                asked.answer = Cause.of("not_done" if starts else "not_kept", problem=problem or Cause("not_taken"))
+                if starts and changed:
+                    self._withdraw()
             asked.done.set()
         self.waiting = left

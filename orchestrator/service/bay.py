@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from time import monotonic, time
-from typing import Protocol
 
 from orchestrator.config.station import Bay
 from orchestrator.core.failed import carry_on
@@ -13,16 +12,12 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.interlock import Grant, grant
+from orchestrator.interlock import grant
 from orchestrator.model import (
     ENERGISED,
     STOP,
     Alarm,
-    BatteryLink,
-    BatteryReading,
-    ChargerLink,
-    ChargerReading,
-    Command,
+    Cause,
     Decision,
     Request,
     Snapshot,
@@ -30,12 +25,14 @@ from orchestrator.model import (
 )
 from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.contactor import Contactor
+from orchestrator.service.devices import Battery, Charger
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status
 from orchestrator.service.store import Store
+from orchestrator.text.catalogue import say
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
@@ -43,25 +40,6 @@ TICK_S = 0.2
 VERIFIED = frozenset(
     {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE}
 )
-
-
-class Charger(Protocol):
-    """What a bay needs of a charger's port (`devices.charger.ChargerPort`)."""
-
-    @property
-    def view(self) -> tuple[ChargerReading | None, ChargerLink]:
-        """The newest reading and how the line is doing."""
-
-    def order(self, command: Command | None, grant: Grant | None = None) -> None:
-        """Leave a standing order."""
-
-
-class Battery(Protocol):
-    """What a bay needs of a BMU (`devices.battery.BatteryNode`)."""
-
-    @property
-    def view(self) -> tuple[BatteryReading, BatteryLink]:
-        """The newest values and how the bus is doing."""
 
 
 class BayRunner:
@@ -79,24 +57,24 @@ class BayRunner:
         contactor: Contactor | None = None,
         starts: Starts | None = None,
         snapshots: bool = True,
+        language: str = "en",
     ) -> None:
         self.name, self.place = bay.name, Place.of(bay)
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
-        self._rules = Rules.of(bay)
+        self._rules, self._language = Rules.of(bay), language
         self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
         self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
         self._revision = 0  # the one that keeps this bay's memory
         self._ending = ""
-        self._waits = ""  # why the next run has to wait for an operator
+        self._waits: Cause | None = None  # why the next run has to wait for an operator
         self._offered: Bay | None = None  # with a policy that is not in force yet
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # nobody to wait for
         self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
-        self._snapshot = Snapshot()
-        self._recorder = SnapshotRecorder(bay) if snapshots else None
+        self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
         self._requests = Requests()
         self._internal = ""
 
@@ -125,9 +103,9 @@ class BayRunner:
 
         Unless it is not `orderly` and ends a charge: that one waits for an operator, as after any other failure (G3).
         """
-        self._ending = f"the service ends: {why}"
+        self._ending = why
         if not orderly and self.decision is not None and self.decision.state in ENERGISED:
-            self._waits = f"the last run ended in mid-charge: {why}"
+            self._waits = Cause.of("ended_in_charge", why=why)
 
     def offer(self, bay: Bay | None) -> str:
         """Take another policy over at the next standby; what will come of it. From any thread.
@@ -170,7 +148,7 @@ class BayRunner:
             self._failed(error, now_s, asked[0].request if asked else None)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         for one in asked:
-            answer, changed = self.decision.answer if self.decision else "", self._revision != before
+            answer, changed = self.decision.answer if self.decision else None, self._revision != before
             self._answers.give(one, answer, self._revision, now_s, changed=changed)
         self._answers.look(now_s)
 
@@ -187,7 +165,7 @@ class BayRunner:
             self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)
             self._keep(self._memory, now_s)
         except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
-            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP, alarm=Alarm.DANGER)
+            self.decision = Decision(State.STOPPING, Cause.of("failed", error=internal), STOP, alarm=Alarm.DANGER)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         self._take_over()
@@ -199,15 +177,15 @@ class BayRunner:
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
         self.decision, self._internal, self.last_s = decision, "", now_s
-        lines = list(decision_lines(before, decision)) if before is None or decision != before else []
+        lines = list(decision_lines(before, decision, self._language)) if before is None or decision != before else []
         if self._recorder is not None:
             recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
             lines += [recorded] if recorded is not None else []
         for line in lines:
             self._journal.put(self.name, line)
         if before is None or before.state is not decision.state:
-            came_from = f"{before.state} → " if before else ""
-            self._say(f"{self.name}: {came_from}{decision.state}: {decision.reason}")
+            states = f"{before.state} → {decision.state}" if before else decision.state
+            self._say(f"{self.name}: {states}: {say(decision.cause, self._language)}")
         self._keep(self._memory, now_s)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
@@ -266,10 +244,8 @@ class BayRunner:
 
     def status(self) -> dict[str, object]:
         """The bay's part of the status document."""
-        decision = self.decision
-        if decision is None:
-            decision = Decision(State.STARTING, "the service has just started")
-        status = bay_status(self.name, self._snapshot, decision, monotonic(), time())
+        decision = self.decision or Decision(State.STARTING, Memory().cause)
+        status = bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language)
         bay, offered, contactor = self._rules.bay, self._offered, self._contactor
         return {
             **status,

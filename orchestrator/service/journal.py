@@ -18,8 +18,8 @@ from typing import TypeVar
 from orchestrator.service.records import Line
 from orchestrator.service.rotating import RotatingFile
 
-#: Of these lines; the first had no `run`.
-VERSION = 2
+#: Of these lines; the first had no `run`, the second no causes but sentences.
+VERSION = 3
 #: Of the allowed space, what the events may take.
 EVENTS_SHARE = 0.25
 #: Lines that wait for a disk that does not take them; beyond it the oldest are dropped and counted.

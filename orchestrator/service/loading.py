@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.core.persisted import Persisted
+from orchestrator.model import Cause
 from orchestrator.service.disk import read_file
 from orchestrator.service.past import Entry, Place, past_of, settled
 from orchestrator.service.stateformat import Stamp, decode, decode_first
@@ -14,7 +15,6 @@ from orchestrator.service.stateformat import Stamp, decode, decode_first
 FILE, FIRST_FILE = "persisted.json", "kept.json"
 #: Far more than any station needs.
 MOST_BYTES = 16_000_000
-NOBODY_KNOWS = "nobody knows which faults were latched"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,20 +32,22 @@ def load(directory: Path, places: Sequence[Place], now: Stamp) -> Loaded:
     try:
         found = _read(directory, now)
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        return Loaded(held(places, f"{path} cannot be read ({reason})"), aside=(FILE, FIRST_FILE))
+        reason = str(error.strerror if isinstance(error, OSError) else error)
+        return Loaded(
+            held(places, Cause.of("state_unreadable", file=str(path), error=reason)), aside=(FILE, FIRST_FILE)
+        )
     if found is None:
         if any(name.startswith("events") for name in names(directory)):  # the file is there before the first of them
-            return Loaded(held(places, f"{path} is lost, though this service has run here before"))
+            return Loaded(held(places, Cause.of("state_lost", file=str(path))))
         return Loaded(tuple(Entry(place, Persisted(), 1) for place in places))
     run, entries = found
     pasts = {place: past_of(place, entries, str(path)) for place in places}
     return Loaded(tuple(settled(places, pasts, entries, run)), run)
 
 
-def held(places: Sequence[Place], why: str) -> tuple[Entry, ...]:
+def held(places: Sequence[Place], why: Cause) -> tuple[Entry, ...]:
     """Every bay where nobody knows anything."""
-    return tuple(Entry(place, Persisted(hold=f"{why}: {NOBODY_KNOWS}"), 1) for place in places)
+    return tuple(Entry(place, Persisted(hold=why), 1) for place in places)
 
 
 def _read(directory: Path, now: Stamp) -> tuple[int, list[Entry]] | None:

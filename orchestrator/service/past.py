@@ -11,7 +11,8 @@ from os.path import abspath, realpath
 
 from orchestrator.config.station import Bay, Rs485
 from orchestrator.core.persisted import Persisted, PersistedFault
-from orchestrator.model import ControlMode
+from orchestrator.model import Cause, ControlMode
+from orchestrator.model.cause import SEVERAL, together
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,23 +69,25 @@ def past_of(place: Place, entries: Sequence[Entry], file: str) -> Persisted:
     if own is None and [entry.place for entry in others] == [Place(place.bay)]:
         return others[0].persisted  # the first format knew names only
     if not others:
-        return own.persisted if own else Persisted(hold=f"{place} is not in {file}: nobody knows its past")
-    sentences = [f"{_moved(entry.place, place)}: see what is wired where" for entry in others]
-    return merged([*([own.persisted] if own else []), *(entry.persisted for entry in others)], sentences)
+        unknown = Cause.of("past_unknown", bay=place.bay, port=shown(place.port), file=file)
+        return own.persisted if own else Persisted(hold=unknown)
+    moves = [_moved(entry.place, place) for entry in others]
+    return merged([*([own.persisted] if own else []), *(entry.persisted for entry in others)], moves)
 
 
-def _moved(old: Place, new: Place) -> str:
+def _moved(old: Place, new: Place) -> Cause:
     if not old.port:
-        return f"an older version of this service has run {old.bay} in the meantime"
+        return Cause.of("older_version_ran", bay=old.bay)
     if old.bay != new.bay:
-        what = shown(new.port) if old.is_port_of(new) else f"the BMU on {new.can}, node 0x{new.node_id:02X},"
-        return f"{what} was {old.bay}'s when this service last ran, and is {new.bay}'s now"
+        if old.is_port_of(new):
+            return Cause.of("port_was_of", port=shown(new.port), old_bay=old.bay, bay=new.bay)
+        return Cause.of("bmu_was_of", can=new.can, node_id=new.node_id, old_bay=old.bay, bay=new.bay)
     if old.port != new.port:
-        return f"{new.bay} was on {shown(old.port)} when this service last ran, and is on {shown(new.port)} now"
-    return (
-        f"{new.bay} had the BMU on {old.can}, node 0x{old.node_id:02X}, when this service last ran, "
-        f"and has {new.can}, node 0x{new.node_id:02X}, now"
-    )
+        return Cause.of("bay_moved_port", bay=new.bay, old_port=shown(old.port), port=shown(new.port))
+    return Cause.of(
+        "bay_moved_bmu",
+        bay=new.bay, old_can=old.can, old_node_id=old.node_id, can=new.can, node_id=new.node_id,
+    )  # fmt: skip
 
 
 def shown(port: str) -> str:
@@ -92,9 +95,9 @@ def shown(port: str) -> str:
     return port.encode(errors="backslashreplace").decode()
 
 
-def merged(parts: Sequence[Persisted], sentences: Sequence[str]) -> Persisted:
-    """All of them together, as the strictest would have it, held for `sentences` and for whatever held one of them."""
-    holds = [*sentences, *(part.hold for part in parts if part.hold)]
+def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
+    """All of them together, as the strictest would have it, held for `moves` and for whatever held one of them."""
+    holds = dict.fromkeys([*moves, *(one for part in parts if part.hold is not None for one in _holds(part.hold))])
     faults: dict[str, PersistedFault] = {}
     for part in parts:
         for name, fault in part.faults.items():
@@ -103,7 +106,7 @@ def merged(parts: Sequence[Persisted], sentences: Sequence[str]) -> Persisted:
     fulls = [part.full_pct for part in parts if part.full_pct is not None]
     return Persisted(
         running=any(part.running for part in parts),
-        hold="; ".join(dict.fromkeys(holds)),
+        hold=together(list(holds)) if holds else None,
         paused=any(part.paused for part in parts),
         faults=faults,
         resets=tuple(sorted({reset for part in parts for reset in part.resets}, reverse=True)),
@@ -112,6 +115,12 @@ def merged(parts: Sequence[Persisted], sentences: Sequence[str]) -> Persisted:
         full=max((part.full for part in parts if part.full is not None), default=None),
         soc=min((part.soc for part in parts if part.soc is not None), default=None),
     )
+
+
+def _holds(hold: Cause) -> list[Cause]:
+    """What a bay was held for, each for itself."""
+    whats = hold.param("whats") if hold.id == SEVERAL else None
+    return [one for one in (whats or (hold,)) if isinstance(one, Cause)]
 
 
 def _worse(one: PersistedFault, other: PersistedFault) -> PersistedFault:

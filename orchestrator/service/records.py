@@ -1,14 +1,16 @@
 """What the journal says: one decision after another, turned into lines. Pure; the writing is the journal's."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 
 from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
 from orchestrator.model import (
+    ActiveFault,
     BatteryLink,
     BatteryReading,
+    Cause,
     ChargerReading,
     Command,
     Decision,
@@ -16,12 +18,17 @@ from orchestrator.model import (
     Session,
     Snapshot,
     State,
+    Step,
 )
+from orchestrator.model.cause import plain
+from orchestrator.text.catalogue import say
 
 Line = tuple[str, dict[str, object]]  #: kind, fields
 
 #: States in which every step is the same until something happens.
 QUIET = frozenset({State.IDLE, State.HELD, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
+#: What of a record is said for people, beside its cause.
+TEXTS = frozenset({"reason", "text", "rule", "result"})
 #: What of a snapshot is about this service and its contactor.
 OURS = (
     "internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem", "waits", "moves",
@@ -31,16 +38,17 @@ OURS = (
 WHOLE_EVERY = 250
 
 
-def decision_lines(before: Decision | None, now: Decision) -> Iterator[Line]:
-    """What has changed from one decision to the next, for people and programs."""
+def decision_lines(before: Decision | None, now: Decision, language: str = "en") -> Iterator[Line]:
+    """What has changed from one decision to the next, for programs and, in `language`, for people."""
+    cause = {"reason": say(now.cause, language), "cause": plain(now.cause)}
     if before is None or now.state is not before.state:
-        yield "transition", {"from": before.state if before else None, "to": now.state, "reason": now.reason}
+        yield "transition", {"from": before.state if before else None, "to": now.state, **cause}
     if before is None or now.command != before.command:
         yield "command", command_fields(now.command)
-    yield from _fault_lines(before, now)
-    yield from _session_lines(before, now)
+    yield from _fault_lines(before, now, language)
+    yield from _session_lines(before, now, language)
     if before is None or _gist(now) != _gist(before):
-        yield "decision", {"state": now.state, "reason": now.reason, "step": asdict(now.step) if now.step else None}
+        yield "decision", {"state": now.state, **cause, "step": _step_fields(now.step, language)}
 
 
 def command_fields(command: Command | None) -> dict[str, object]:
@@ -48,33 +56,51 @@ def command_fields(command: Command | None) -> dict[str, object]:
     return {"action": command.action, "value": command.value} if command else {"action": None}
 
 
+def without_texts(fields: Mapping[str, object]) -> dict[str, object]:
+    """What a record says without the sentences, which depend on language and version."""
+    kept = {name: value for name, value in fields.items() if name not in TEXTS}
+    return {name: without_texts(value) if name == "step" and value else value for name, value in kept.items()}  # type: ignore[arg-type]
+
+
+def _step_fields(step: Step | None, language: str) -> dict[str, object] | None:
+    if step is None:
+        return None
+    rule = {"rule": say(step.rule, language), "cause": plain(step.rule)}
+    return {"index": step.index, "current_a": step.current_a, **rule}
+
+
 def _gist(decision: Decision) -> tuple[object, ...]:
-    """A decision without the figures in its sentences, which change all the time."""
+    """A decision without the figures of its cause, which change all the time."""
     return decision.state, decision.step, decision.setpoint, decision.alarm
 
 
-def _fault_lines(before: Decision | None, now: Decision) -> Iterator[Line]:
+def _fault_fields(fault: ActiveFault, event: str, language: str) -> dict[str, object]:
+    said = {"text": say(fault.cause, language), "cause": plain(fault.cause)}
+    return {"id": fault.id, "event": event, "effect": fault.effect.name, **said}
+
+
+def _fault_lines(before: Decision | None, now: Decision, language: str) -> Iterator[Line]:
     old = {fault.id: fault for fault in before.faults} if before else {}
     new = {fault.id: fault for fault in now.faults}
     for name, fault in new.items():
         if name not in old or old[name].effect is not fault.effect:
-            yield "fault", {"id": name, "event": "raised", "effect": fault.effect.name, "text": fault.text}
+            yield "fault", _fault_fields(fault, "raised", language)
     for name, fault in old.items():
         if name not in new:
-            yield "fault", {"id": name, "event": "cleared", "effect": fault.effect.name, "text": fault.text}
+            yield "fault", _fault_fields(fault, "cleared", language)
 
 
-def _session_lines(before: Decision | None, now: Decision) -> Iterator[Line]:
+def _session_lines(before: Decision | None, now: Decision, language: str) -> Iterator[Line]:
     was = before.session if before and before.session and not before.session.result else None
     if now.session is None:
         return
     if was is None and not now.session.result:
-        yield "session", {"event": "begin", **session_fields(now.session)}
+        yield "session", {"event": "begin", **session_fields(now.session, language)}
     elif now.session.result:
-        yield "session", {"event": "end", **session_fields(now.session)}
+        yield "session", {"event": "end", **session_fields(now.session, language)}
 
 
-def session_fields(session: Session) -> dict[str, object]:
+def session_fields(session: Session, language: str = "en") -> dict[str, object]:
     """A session in figures that a person can read."""
     return {
         "elapsed_s": round(session.elapsed_s, 1),
@@ -84,7 +110,8 @@ def session_fields(session: Session) -> dict[str, object]:
         "soc_start_pct": session.soc_start_pct,
         "soc_pct": session.soc_pct,
         "step_changes": session.step_changes,
-        "result": session.result,
+        "result": say(session.result, language),
+        "cause": plain(session.result) if session.result else None,
     }
 
 
@@ -138,7 +165,8 @@ def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
         fields["request"] = new.request
     for name in OURS:
         if getattr(new, name) != getattr(old, name):
-            fields[name] = getattr(new, name)
+            value = getattr(new, name)
+            fields[name] = plain(value) if isinstance(value, Cause) else value
     return fields
 
 

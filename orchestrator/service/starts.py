@@ -13,7 +13,7 @@ from math import inf
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.witnesses.followed import FIRST_A, OWN_SHARE
-from orchestrator.model import ENERGISED, Snapshot, State
+from orchestrator.model import ENERGISED, Cause, Snapshot, State
 
 #: A turn takes no longer than this: the charger's sequence takes 2 s on a good line, and its first amperes follow.
 TURN_S = 20.0
@@ -47,16 +47,16 @@ class Starts:
         self._seen: dict[str, Amps] = {}
         self._moves = ""
 
-    def waits(self, name: str, now_s: float) -> str:
-        """Why this bay may not begin a charge now; "" if it may."""
+    def waits(self, name: str, now_s: float) -> Cause | None:
+        """Why this bay may not begin a charge now; None if it may."""
         if not self._stagger_s:
-            return ""
+            return None
         turn = self._turn
         if turn is not None and now_s - turn.since_s > TURN_S:
             turn = self._turn = None
         if turn is not None:
-            return "" if turn.name == name else f"waits for its turn: {turn.name} begins its charge"
-        return f"waits for its turn: charges of this station begin {self._stagger_s:g} s apart ({self._at})"
+            return None if turn.name == name else Cause.of("waits_for_turn", other=turn.name)
+        return Cause.of("waits_for_stagger", key="stagger_s", place=self._at, stagger_s=self._stagger_s)
 
     def moves(self, name: str) -> str:
         """The bay whose BMU has seen what this bay's charger began; "" if none has but its own."""

@@ -2,19 +2,20 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 from orchestrator.config.station import Rs485
 from orchestrator.core.persisted import COUNTERS_S, Persisted, from_first_format
-from orchestrator.model import ControlMode
+from orchestrator.model import Cause, ControlMode
 from orchestrator.service.past import Entry, Place
+from orchestrator.service.sentences import of_sentences, said
 from orchestrator.service.typed import MOST, structure
 
-FORMAT = 2
+FORMAT = 3
+#: The format before had sentences in the place of causes.
+SENTENCES = 2
 #: Before this moment (2024-01-01) no clock that was ever set can have been.
 NEVER_SET_S = 1_704_067_200.0
-#: Until there was the state HELD, a hold ended with what to do about it; the bay itself says that now.
-OLD_END = "; start to go on"
 #: What stands beside a bay's persisted state.
 PLACE = ("bay", "port", "can", "node_id", "control", "rs485", "run")
 TOO_DEEP = "it is nested deeper than anything that this service writes"
@@ -64,12 +65,12 @@ def decode(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
     """The newest run of the service and all entries, as old as they are `now`; ValueError for what is none of ours."""
     try:
         document = json.loads(data)
-        if not isinstance(document, dict) or document.get("format") != FORMAT:
+        if not isinstance(document, dict) or document.get("format") not in (FORMAT, SENTENCES):
             raise ValueError("it is not of a format that this version knows")
         figures = {name: structure(document.get(name), float) for name in ("written", "clock_s")}
         stamp = Stamp(figures["written"], figures["clock_s"], structure(document.get("boot"), str))
         run, age_s = structure(document.get("run"), int), stamp.age_s(now)
-        entries = list(_entries(document.get("entries"), age_s))
+        entries = list(_entries(document.get("entries"), age_s, sentences=document["format"] == SENTENCES))
     except RecursionError:
         raise ValueError(TOO_DEEP) from None
     except (ArithmeticError, LookupError) as error:
@@ -79,7 +80,7 @@ def decode(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
     return run, entries
 
 
-def _entries(values: object, age_s: float) -> Iterator[Entry]:
+def _entries(values: object, age_s: float, *, sentences: bool) -> Iterator[Entry]:
     if not isinstance(values, list):
         raise ValueError("it has no list of entries")
     for value in values:
@@ -95,8 +96,8 @@ def _entries(values: object, age_s: float) -> Iterator[Entry]:
         )
         if not value.keys() >= NEEDED:
             raise ValueError(f"{', '.join(sorted(NEEDED - value.keys()))} is missing")
-        persisted: Persisted = structure({key: one for key, one in value.items() if key not in PLACE}, Persisted)
-        persisted = replace(persisted, hold=persisted.hold.removesuffix(OLD_END))
+        plain = {key: one for key, one in value.items() if key not in PLACE}
+        persisted: Persisted = structure(of_sentences(plain) if sentences else plain, Persisted)
         unseen_s = age_s or COUNTERS_S  # an age that cannot be told is 0
         yield Entry(place, persisted.aged(age_s, unseen_s), structure(value.get("run"), int))
 
@@ -132,4 +133,5 @@ def _first(value: object) -> Persisted:
     plain = structure({key: one for key, one in value.items() if key != "faults"}, _First)
     faults = {structure(name, str): structure(text, str) for name, text in value["faults"].items()}
     kept = {name: from_first_format(name, text) for name, text in faults.items()}
-    return Persisted(running=plain.running, hold=plain.hold.removesuffix(OLD_END), paused=plain.paused, faults=kept)
+    hold = structure(said(plain.hold), Cause | None)
+    return Persisted(running=plain.running, hold=hold, paused=plain.paused, faults=kept)

@@ -8,8 +8,18 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.config.station import Station
 from orchestrator.core.facts import CHARGER_STALE_S, FAST_STALE_S, SLOW_STALE_S
-from orchestrator.model import Alarm, BatteryReading, ChargerReading, Decision, Measurement, Setpoint, Snapshot
+from orchestrator.model import (
+    ActiveFault,
+    Alarm,
+    BatteryReading,
+    ChargerReading,
+    Decision,
+    Measurement,
+    Setpoint,
+    Snapshot,
+)
 from orchestrator.service.records import command_fields, session_fields
+from orchestrator.text.catalogue import fields, say
 
 #: What of a charger's reading the status shows; `t_s` is when it was asked for, in monotonic seconds of this machine.
 SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
@@ -17,17 +27,25 @@ SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
 FAST = ("voltage_v", "current_a", "status", "temperature_c")
 
 
-def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, wall_s: float) -> dict[str, object]:
-    """One bay as it is now. Values are None where nothing valid is known; `since` is Unix time, as `wall_s`."""
+def bay_status(
+    name: str, snapshot: Snapshot, decision: Decision, now_s: float, wall_s: float, language: str = "en"
+) -> dict[str, object]:
+    """One bay as it is now. Values are None where nothing valid is known; `since` is Unix time, as `wall_s`.
+
+    Each cause stands there as data; `reason`, `text`, `step_rule` and `result` say it in `language`.
+    """
+    step, session = decision.step, decision.session
     return {
         "name": name,
         "state": decision.state,
-        "reason": decision.reason,
-        "step": decision.step.index if decision.step else None,
-        "step_current_a": decision.step.current_a if decision.step else None,
-        "step_rule": decision.step.rule if decision.step else "",
-        "step_key": decision.step.key if decision.step else "",
-        "step_place": decision.step.place if decision.step else "",
+        "reason": say(decision.cause, language),
+        "cause": fields(decision.cause, language),
+        "step": step.index if step else None,
+        "step_current_a": step.current_a if step else None,
+        "step_rule": say(step.rule, language) if step else "",
+        "step_cause": fields(step.rule, language) if step else None,
+        "step_key": step.key if step else "",
+        "step_place": step.place if step else "",
         "command": {**_setpoint(decision.setpoint), "order": command_fields(decision.command)},
         "charger": {
             "online": snapshot.charger_link.online,
@@ -39,17 +57,19 @@ def bay_status(name: str, snapshot: Snapshot, decision: Decision, now_s: float, 
             "problem": snapshot.battery_link.problem,
             **_battery(snapshot.battery, now_s),
         },
-        "faults": [
-            {
-                "id": fault.id,
-                "effect": fault.effect.name,
-                "text": fault.text,
-                "since": round(wall_s - (now_s - fault.since_s), 3),
-            }
-            for fault in decision.faults
-        ],
+        "faults": [_fault(fault, wall_s - (now_s - fault.since_s), language) for fault in decision.faults],
         "alarm": _level(decision.alarm),
-        "session": session_fields(decision.session) if decision.session else None,
+        "session": session_fields(session, language) if session else None,
+    }
+
+
+def _fault(fault: ActiveFault, since: float, language: str) -> dict[str, object]:
+    return {
+        "id": fault.id,
+        "effect": fault.effect.name,
+        "cause": fields(fault.cause, language),
+        "text": say(fault.cause, language),
+        "since": round(since, 3),
     }
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from orchestrator.core.persisted import COUNTERS_S, Persisted
 from orchestrator.errors import ServiceError
+from orchestrator.model import Cause
 from orchestrator.service.disk import lock_file, make_directory, replace_file
 from orchestrator.service.loading import FILE, FIRST_FILE, held, load, move_aside
 from orchestrator.service.past import Entry, Place
@@ -96,7 +97,7 @@ class Store:
         with self._lock:
             if not self._table:
                 self._blind = f"the disk of {self._directory} does not answer"
-                self._begin(held(self._places, self._blind))
+                self._begin(held(self._places, Cause.of("state_disk_silent", directory=str(self._directory))))
             return self._table[place].persisted
 
     def strays(self) -> list[Place]:

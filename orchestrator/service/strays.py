@@ -13,7 +13,7 @@ from threading import Thread
 
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
-from orchestrator.model import STOP, Alarm, ChargerReading, Operation
+from orchestrator.model import STOP, Alarm, Cause, ChargerReading, Operation
 from orchestrator.service.closing import close_all
 from orchestrator.service.past import Place, shown
 from orchestrator.service.store import Store
@@ -89,7 +89,7 @@ class Strays:
 
     def _remember(self, stray: _Stray, *, running: bool) -> int:
         persisted = self._store.past(stray.place)
-        why = f"the station file had no bay on {shown(stray.place.port)} while its charger was running"
+        why = Cause.of("stray_ran", port=shown(stray.place.port))
         return self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
 
     def drop(self, port: str) -> tuple[str, int]:

@@ -19,7 +19,8 @@ from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import ServiceError
 from orchestrator.link.can import CanBus, load
-from orchestrator.model import Request
+from orchestrator.model import Cause, Request
+from orchestrator.model.cause import plain
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
@@ -36,6 +37,7 @@ from orchestrator.service.status import station_status
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.service.strays import Strays
 from orchestrator.service.wiring import charger_port, open_contactor, stray_port
+from orchestrator.text.catalogue import say
 
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
@@ -57,7 +59,7 @@ class Supervisor:
     """The service for one station. `run` returns when the service was told to end."""
 
     def __init__(self, station: Station, guardian: GuardianLink) -> None:
-        self._station = station
+        self._station, self._language = station, station.language.value
         self._guardian = guardian
         self._beat_s = 0.0
         self._lost = ""  # why the guardian cannot be relied on any more
@@ -99,7 +101,7 @@ class Supervisor:
             contactor, snapshots = open_contactor(bay, self._guardian), self._station.journal.snapshots
             runner = BayRunner(
                 bay, port, node, self._journal, self._store, self._say,
-                contactor=contactor, starts=starts, snapshots=snapshots,
+                contactor=contactor, starts=starts, snapshots=snapshots, language=self._language,
             )  # fmt: skip
             self._bays.append(runner)
         self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
@@ -271,12 +273,16 @@ class Supervisor:
             bay.ask(asked[bay.name])
             self._wake.put(self._bays.index(bay))
         end_s = monotonic() + ANSWER_S
-        late = "the control loop has not answered: look at the service's log"
+        late = Cause("no_answer")
 
         def results() -> Answer | None:
             if not all(one.done.is_set() for one in asked.values()) and monotonic() < end_s:
                 return None
-            return {"results": {name: one.answer if one.done.is_set() else late for name, one in asked.items()}}
+            answers = {name: one.answer if one.done.is_set() else late for name, one in asked.items()}
+            return {
+                "results": {name: say(answer, self._language) for name, answer in answers.items()},
+                "causes": {name: plain(answer) for name, answer in answers.items() if answer is not None},
+            }
 
         return results
 

@@ -7,6 +7,9 @@ from math import isfinite
 from types import NoneType, UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
+from orchestrator.model import Cause
+from orchestrator.model.cause import from_plain
+
 #: No figure that is ever written down is larger; ages are in seconds.
 MOST = 1e12
 
@@ -23,6 +26,8 @@ def structure(value: object, kind: Any) -> Any:
         return _tuple(value, get_args(kind))
     if origin is Mapping:
         return {structure(key, str): structure(one, get_args(kind)[1]) for key, one in _object(value).items()}
+    if kind is Cause:
+        return from_plain(value)
     if is_dataclass(kind):
         return _record(value, kind)
     return _plain(value, kind)

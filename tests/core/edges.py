@@ -26,6 +26,7 @@ from orchestrator.model import (
     State,
 )
 from tests.core.bays import POLICY
+from tests.core.said import cause
 from tests.core.world import bay
 
 NOW_S = 100_000.0
@@ -96,4 +97,4 @@ def witnessed(**known: Any) -> dict[str, Any]:
 
 
 def raised(*names: str) -> dict[str, Any]:
-    return {"faults": {name: FaultMemory(raised_s=1.0, text=f"text of {name}") for name in names}}
+    return {"faults": {name: FaultMemory(raised_s=1.0, cause=cause(f"text of {name}")) for name in names}}

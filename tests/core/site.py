@@ -33,6 +33,7 @@ from orchestrator.model import (
 from orchestrator.sim.bay import Bay as Plant
 from orchestrator.sim.charger import Charger, Push
 from orchestrator.sim.pack import Pack
+from tests.core.said import reason_of
 from tests.core.world import bay
 
 TICK_S = 0.1
@@ -75,7 +76,7 @@ class Site:
         self.link = ChargerLink()
         self.values = BatteryReading()
         self.battery_link = BatteryLink()
-        self.decision = Decision(State.STARTING, "")
+        self.decision = Decision(State.STARTING, Memory().cause)
         self.moves: list[tuple[float, State, str]] = []
         self.raised: dict[str, int] = {}  #: how often each fault came
 
@@ -114,7 +115,7 @@ class Site:
         self.schedule.give(command)
         self.grant = grant(snapshot, self.now_s) if command else None
         if before.state is not self.decision.state:
-            self.moves.append((round(self.now_s, 1), self.decision.state, self.decision.reason))
+            self.moves.append((round(self.now_s, 1), self.decision.state, reason_of(self.decision)))
         known = {fault.id for fault in before.faults}
         for fault in self.decision.faults:
             if fault.id not in known:

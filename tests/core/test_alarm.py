@@ -6,10 +6,12 @@ from orchestrator.core.alarm import alarm
 from orchestrator.core.faults import FAULTS, Clear, Row
 from orchestrator.core.memory import Memory
 from orchestrator.core.operator import RESET, STOPPED
-from orchestrator.model import ActiveFault, Alarm, Request, State
+from orchestrator.model import ActiveFault, Alarm, Cause, Request, State
+from orchestrator.text.catalogue import advise
 from tests.core.bays import IN, held, idle, running_at_the_start, tripped
+from tests.core.said import reason_of
 
-ADVICE = [row.advice for row in FAULTS if row.clear is Clear.OPERATOR]
+ADVICE = [advise(row.id) for row in FAULTS if row.clear is Clear.OPERATOR]
 
 
 def test_the_worst_of_many_is_the_highest() -> None:
@@ -25,16 +27,16 @@ def test_every_state_has_its_level(state: State) -> None:
 
 @pytest.mark.parametrize(
     ("hold", "level"),
-    [(STOPPED, Alarm.NONE), (RESET, Alarm.NONE), ("nobody knows its past", Alarm.ATTENTION)],
+    [(STOPPED, Alarm.NONE), (RESET, Alarm.NONE), (Cause("past_unknown"), Alarm.ATTENTION)],
 )
-def test_who_holds_a_bay_knows_of_it(hold: str, level: Alarm) -> None:
+def test_who_holds_a_bay_knows_of_it(hold: Cause, level: Alarm) -> None:
     assert alarm(Memory(state=State.HELD, hold=hold), ()) is level
     assert alarm(Memory(state=State.STOPPING, hold=hold), ()) is Alarm.NONE
 
 
 @pytest.mark.parametrize("row", FAULTS, ids=[row.id for row in FAULTS])
 def test_a_fault_that_waits_for_a_start_wants_attention(row: Row) -> None:
-    level = alarm(Memory(state=State.HELD, hold=STOPPED), (ActiveFault(row.id, row.effect, "", 0.0),))
+    level = alarm(Memory(state=State.HELD, hold=STOPPED), (ActiveFault(row.id, row.effect, Cause(row.id), 0.0),))
     waits = Alarm.ATTENTION if row.clear is Clear.OPERATOR else Alarm.NONE
     assert level is (Alarm.DANGER if row.id == "port_locked" else waits)
 
@@ -43,7 +45,7 @@ def test_a_charger_that_was_found_running_wants_a_person() -> None:
     world = running_at_the_start()
     decision = world.until(State.HELD)
     assert decision.alarm is Alarm.ATTENTION
-    assert decision.reason.endswith("find out why it ran, then start: orchestrator start bay-1")
+    assert reason_of(decision).endswith("find out why it ran, then start: orchestrator start bay-1")
     world.ask(Request.STOP)
     world.run(1)
     assert world.decision.alarm is Alarm.ATTENTION  # whatever else holds it
@@ -57,8 +59,8 @@ def test_a_reset_ends_the_attention_and_leaves_the_start_to_a_person() -> None:
     assert world.ask(Request.RESET) == ""
     before = world.decision
     assert (before.state, before.alarm) == (State.HELD, Alarm.NONE)
-    assert before.reason == "reset by the operator; to go on: orchestrator start bay-1"
-    assert world.tick().reason == before.reason
+    assert reason_of(before) == "reset by the operator; to go on: orchestrator start bay-1"
+    assert reason_of(world.tick()) == reason_of(before)
 
 
 @pytest.mark.parametrize("advice", ADVICE)
@@ -73,7 +75,7 @@ def test_a_held_bay_without_a_battery_goes_to_idle_when_it_is_started() -> None:
     world.run(5)
     assert world.is_in(State.HELD)
     world.ask(Request.START)
-    assert (world.state, world.decision.reason) == (State.IDLE, "no battery")
+    assert (world.state, reason_of(world.decision)) == (State.IDLE, "no battery")
 
 
 def test_a_bay_with_nothing_to_do_can_be_held_too() -> None:

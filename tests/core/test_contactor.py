@@ -9,6 +9,7 @@ from orchestrator.core.contactor import closes
 from orchestrator.core.course import QUALIFY_S
 from orchestrator.model import ENERGISED, Action, Alarm, Request, State
 from tests.core.bays import charging
+from tests.core.said import reason_of
 from tests.core.world import TICK_S, World
 
 #: (closed until now, the charger shows standby) → closed; `x` for yes.
@@ -86,7 +87,7 @@ def test_a_bay_without_a_battery_comes_to_rest() -> None:
     wired = Wired(world)
     wired.run(10)
     assert wired.courses == [(State.STARTING, False), (State.OFFLINE, True), (State.IDLE, True)]
-    assert world.decision.reason == "no battery"
+    assert reason_of(world.decision) == "no battery"
     world.arrive()
     wired.until(State.CHARGING)
 
@@ -110,7 +111,7 @@ def test_a_trip_over_unlike_voltages_can_be_reset_behind_the_open_contactor() ->
     wired.until(State.TRIPPED)
     wired.run(2)
     wired.tick(Request.RESET)
-    assert (wired.world.decision.answer, wired.world.decision.closed) == ("", True)
+    assert (wired.world.decision.answer, wired.world.decision.closed) == (None, True)
     wired.tick(Request.START)
     wired.until(State.CHARGING)
 
@@ -145,7 +146,7 @@ def test_a_battery_that_leaves_in_a_charge_is_seen_to_leave() -> None:
     wired.run(5)
     wired.world.leave()
     wired.run(20)
-    assert (wired.world.decision.reason, wired.world.raised) == ("no battery", {})
+    assert (reason_of(wired.world.decision), wired.world.raised) == ("no battery", {})
     assert all(closed for state, closed in wired.courses if state is not State.STARTING)
 
 
@@ -168,7 +169,7 @@ def test_what_was_measured_behind_an_open_contactor_qualifies_nothing() -> None:
     for _ in range(round(20 / TICK_S)):
         world.tick()
     assert (world.state, world.decision.closed) == (State.QUALIFYING, True)
-    assert "waiting for the contactor" in world.decision.reason
+    assert "waiting for the contactor" in reason_of(world.decision)
     world.connected = True
     closed_s = world.now_s
     while world.state is State.QUALIFYING:

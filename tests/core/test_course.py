@@ -23,6 +23,7 @@ from orchestrator.model import (
     State,
 )
 from tests.core.bays import IN, POLICY, charging, continuous, full, idle, offline, pulse, suspended, tripped
+from tests.core.said import reason_of, say
 from tests.core.world import World, bay, with_full
 
 S = State
@@ -39,28 +40,31 @@ def sessions(world: World) -> list[Session]:
 
 def test_a_deeply_discharged_pack_goes_through_every_stage() -> None:
     world = World(voltage_v=33.0, soc_pct=0.0)
-    assert world.until(S.PRECHARGE_PULSE).reason.startswith("the pack has 33.00 V, below 39 V (")
+    assert reason_of(world.until(S.PRECHARGE_PULSE)).startswith("the pack has 33.00 V, below 39 V (")
     for volts in (33.5, 34.0, 34.6, 35.1):
         world.run(60)
         world.values["voltage_v"] = volts
     at = POLICY.source.at
-    assert world.until(S.PRECHARGE_CONTINUOUS, 5).reason == f"the pack reached 35.1 V ({at('precharge.pulse.until_v')})"
+    assert (
+        reason_of(world.until(S.PRECHARGE_CONTINUOUS, 5))
+        == f"the pack reached 35.1 V ({at('precharge.pulse.until_v')})"
+    )
     for volts in (36.0, 37.0, 38.0, 39.0):
         world.run(60)
         world.values["voltage_v"] = volts
-    assert world.until(S.CHARGING, 5).reason == f"the pack reached 39 V ({at('precharge.below_v')})"
+    assert reason_of(world.until(S.CHARGING, 5)) == f"the pack reached 39 V ({at('precharge.below_v')})"
     for soc in range(5, 100, 5):
         world.run(60, dt_s=1.0)
         world.values["soc_pct"] = float(soc)
     world.run(60)
     world.values["soc_pct"] = 100.0
-    assert world.tick().reason == f"full: SOC 100 % reached 100 % ({FULL_AT})"
+    assert reason_of(world.tick()) == f"full: SOC 100 % reached 100 % ({FULL_AT})"
     world.until(S.FULL, 2)
     assert world.states() == [S.STARTING, S.IDLE, S.QUALIFYING, S.PRECHARGE_PULSE, S.PRECHARGE_CONTINUOUS, S.CHARGING,
                               S.STOPPING, S.FULL]  # fmt: skip
     assert all(decision.faults == () for decision in world.decisions)
     (session,) = sessions(world)
-    assert session.result == f"full: SOC 100 % reached 100 % ({FULL_AT})"
+    assert say(session.result) == f"full: SOC 100 % reached 100 % ({FULL_AT})"
     assert (session.soc_start_pct, session.soc_pct) == (0.0, 100.0)
 
 
@@ -87,7 +91,7 @@ def test_pulses_end_after_their_time() -> None:
         world.tick(dt_s=1.0)
     assert world.is_in(S.PRECHARGE_CONTINUOUS)
     assert 600 <= world.now_s - begun_s < 601
-    assert world.decision.reason == f"10 min of pulses ({POLICY.source.at('precharge.pulse.max_min')})"
+    assert reason_of(world.decision) == f"10 min of pulses ({POLICY.source.at('precharge.pulse.max_min')})"
 
 
 def test_the_rise_is_looked_at_again_and_again() -> None:
@@ -104,7 +108,7 @@ def test_the_rise_is_looked_at_again_and_again() -> None:
 def test_precharge_says_why_it_goes_on() -> None:
     for begin, stage in ((pulse, "pulse"), (continuous, "continuous")):
         at = POLICY.source.at(f"precharge.{stage}")
-        assert begin().tick().reason == f"the pack is below 39 V: {stage} precharge ({at})"
+        assert reason_of(begin().tick()) == f"the pack is below 39 V: {stage} precharge ({at})"
 
 
 @pytest.mark.parametrize(("volts", "state"), [(38.99, S.PRECHARGE_PULSE), (39.0, S.CHARGING)])
@@ -122,7 +126,7 @@ def test_without_precharge_a_pack_is_charged_at_once_or_refused() -> None:
     world = World(bay(policy), voltage_v=33.0, status=2.0)
     world.run(20)
     assert world.is_in(S.SUSPENDED)
-    assert "no precharge" in world.decision.reason
+    assert "no precharge" in reason_of(world.decision)
 
 
 @pytest.mark.parametrize(
@@ -132,7 +136,7 @@ def test_a_pack_that_must_not_be_charged_is_refused_with_the_reason(values: dict
     world = World(**values)  # type: ignore[arg-type]  # the values of the battery, by name
     world.run(60)
     assert world.is_in(S.SUSPENDED)
-    assert words in world.decision.reason
+    assert words in reason_of(world.decision)
     assert not ENERGISED & set(world.states())
 
 
@@ -150,7 +154,7 @@ def test_full_by_taper() -> None:
     world.tick()  # another step, of which the taper is
     world.run(120)
     assert world.is_in(S.CHARGING)
-    reason = world.tick().reason
+    reason = reason_of(world.tick())
     assert reason == f"full: 0.99 A, tapered below 1 A for 120 s ({POLICY.source.at('finish.full.taper')})"
     world.until(S.FULL, 2)
 
@@ -195,7 +199,7 @@ def test_full_when_the_charger_says_so(soc_pct: float) -> None:
     charger_says_full(world)
     world.tick()
     at = POLICY.source.at("finish.full.charger")
-    assert world.decision.reason == f"full: the charger reports full (mode 5) ({at})"
+    assert reason_of(world.decision) == f"full: the charger reports full (mode 5) ({at})"
     world.until(S.FULL, 2)
     assert world.memory.full_pct == soc_pct
 
@@ -218,7 +222,7 @@ def test_a_standby_that_somebody_orders_is_not_named_full() -> None:
     charger_says_full(world)
     world.run(2)
     assert set(world.raised) == {"stopped_by_itself"}
-    assert "not taken for full" in world.decision.reason
+    assert "not taken for full" in reason_of(world.decision)
     assert world.is_in(S.HELD)
 
 
@@ -274,7 +278,7 @@ def test_a_full_battery_is_charged_again_when_it_has_lost_enough(
     world.values["soc_pct"] = not_below_pct
     world.run(30)
     assert world.is_in(S.FULL)
-    assert world.decision.reason.startswith(f"SOC {not_below_pct:.0f} % is not below {not_below_pct:g} % (")
+    assert reason_of(world.decision).startswith(f"SOC {not_below_pct:.0f} % is not below {not_below_pct:g} % (")
     world.values["soc_pct"] = below_pct
     world.until(S.CHARGING, 5)
 
@@ -295,7 +299,7 @@ def test_an_arriving_battery_is_charged_below_the_start_threshold(soc_pct: float
     world.run(10)
     assert world.is_in(state)
     if state is S.IDLE:
-        assert world.decision.reason == f"SOC 98 % is not below 98 % ({START_AT})"
+        assert reason_of(world.decision) == f"SOC 98 % is not below 98 % ({START_AT})"
 
 
 def test_another_battery_is_not_judged_by_the_last_one() -> None:
@@ -306,7 +310,7 @@ def test_another_battery_is_not_judged_by_the_last_one() -> None:
     world.leave()
     world.run(5)
     assert world.is_in(S.IDLE)
-    assert world.decision.reason == "no battery"
+    assert reason_of(world.decision) == "no battery"
     world.arrive(soc_pct=96.0)
     world.until(S.CHARGING, 10)
 
@@ -338,7 +342,7 @@ def test_heat_pauses_and_cooling_goes_on_in_the_same_session() -> None:
     begun_s = world.memory.session.started_s if world.memory.session else 0.0
     world.values["temperature_c"] = 45.0
     world.until(S.SUSPENDED, 2)
-    assert "45.0 °C" in world.decision.reason
+    assert "45.0 °C" in reason_of(world.decision)
     world.values["temperature_c"] = 42.0
     world.run(60)
     assert world.is_in(S.SUSPENDED)  # not before it is well below
@@ -468,8 +472,8 @@ def test_a_stop_holds_until_a_start() -> None:
         world.values["soc_pct"] = 40.0
         world.run(100)
         assert world.is_in(S.HELD)
-        assert world.decision.reason == f"{STOPPED}; to go on: orchestrator start bay-1"
-        assert world.ask(Request.PAUSE) == f"not running: {STOPPED}"
+        assert reason_of(world.decision) == f"{say(STOPPED)}; to go on: orchestrator start bay-1"
+        assert world.ask(Request.PAUSE) == f"not running: {say(STOPPED)}"
         world.leave()
         world.run(5)
         world.arrive()
@@ -484,7 +488,7 @@ def test_a_pause_goes_on_in_the_same_session() -> None:
     world.ask(Request.PAUSE)
     world.run(3600, dt_s=1.0)
     assert world.is_in(S.SUSPENDED)
-    assert world.decision.reason == "paused by the operator; start to go on"
+    assert reason_of(world.decision) == "paused by the operator; start to go on"
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
     assert sessions(world) == []
@@ -514,16 +518,16 @@ def test_a_charger_that_comes_back_running_is_stopped_and_waits_for_a_person() -
     world.deaf.clear()
     world.run(20)
     assert world.is_in(S.HELD)
-    assert "found running" in world.decision.reason
+    assert "found running" in reason_of(world.decision)
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
 
 
 def test_offline_and_back() -> None:
     world = offline()
-    assert world.decision.reason == "48.0 V at the charger, but the BMU (node 0x10) does not answer"
+    assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 0x10) does not answer"
     world.battery_link = replace(world.battery_link, problem="BMU 0x10 on can0 does not answer: no frame of it came")
-    assert world.tick().reason == "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came"
+    assert reason_of(world.tick()) == "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came"
     world.battery_answers = True
     world.until(S.CHARGING, 10)
 
@@ -532,15 +536,15 @@ def test_a_charger_without_a_reason_is_named_by_its_port() -> None:
     world = idle()
     world.charger_link = replace(world.charger_link, online=False)
     assert world.tick().state is S.OFFLINE
-    assert world.decision.reason == "the charger on /dev/ttyX does not answer"
+    assert reason_of(world.decision) == "the charger on /dev/ttyX does not answer"
 
 
 def test_a_line_that_dies_in_mid_charge_and_comes_back() -> None:
     world = charging()
     world.charger_answers = False
-    assert world.until(S.STOPPING, 2).reason.startswith("/dev/ttyX: no answer; check")
+    assert reason_of(world.until(S.STOPPING, 2)).startswith("/dev/ttyX: no answer; check")
     world.until(S.UNCONTROLLABLE, 4)
-    assert world.decision.reason == (
+    assert reason_of(world.decision) == (
         "CUT THE MAINS of this charger (/dev/ttyX) now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: "
         "no answer; 14.00 A, last heard 4 s ago; the BMU sees 0.0 A"
     )
@@ -557,16 +561,15 @@ def test_a_port_that_says_what_is_wrong_is_quoted() -> None:
     world = charging()
     world.charger_link = replace(world.charger_link, online=False, problem="/dev/ttyX: no such port")
     world.charger_answers = False
-    assert (
-        "now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: no such port; "
-        in world.until(S.UNCONTROLLABLE, 5).reason
+    assert "now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: no such port; " in reason_of(
+        world.until(S.UNCONTROLLABLE, 5)
     )
 
 
 def test_a_bmu_that_boots_in_mid_charge_is_qualified_anew() -> None:
     world = charging()
     world.boot()
-    reason = world.tick().reason
+    reason = reason_of(world.tick())
     assert world.is_in(S.STOPPING)
     assert reason.startswith("the BMU has booted while charging")  # not that it is silent, though it says nothing yet
     assert set(world.raised) == {"bmu_rebooted"}
@@ -604,7 +607,7 @@ def test_a_tripped_charger_that_runs_again_is_stopped_again() -> None:
         world.charger.resting, world.charger.run = False, True
         assert world.tick().state is S.STOPPING
         world.until(S.TRIPPED, 2)
-    assert "the charger runs though it was not commanded to" in {decision.reason for decision in world.decisions}
+    assert "the charger runs though it was not commanded to" in {reason_of(decision) for decision in world.decisions}
 
 
 def test_a_precharge_that_lost_its_rule_stops() -> None:
@@ -612,12 +615,12 @@ def test_a_precharge_that_lost_its_rule_stops() -> None:
     world.rules = Rules.of(bay(replace(POLICY, precharge=None)))
     decision = world.tick()
     assert decision.command == STOP
-    assert decision.reason == "precharge without a rule for it, or without the pack's voltage"
+    assert reason_of(decision) == "precharge without a rule for it, or without the pack's voltage"
 
 
 def test_our_own_exception_trips_with_its_words() -> None:
     world = tripped()
-    assert world.decision.reason == (
+    assert reason_of(world.decision) == (
         "this is a defect of the software: report it with the journal, then reset – ZeroDivisionError() in step, line 1"
     )
     assert world.decision.faults[0].effect is Effect.TRIP
@@ -634,7 +637,7 @@ def test_a_session_counts_time_and_charge() -> None:
     assert session.charged_ah == pytest.approx(7.0, rel=0.01)
     assert session.charged_wh == pytest.approx(7.0 * 48, rel=0.01)
     assert session.elapsed_s == session.energised_s == world.now_s - session.started_s
-    assert session.result == ""
+    assert session.result is None
 
 
 def test_a_gap_in_the_readings_counts_no_more_than_a_reading_may_be_old() -> None:
@@ -673,7 +676,7 @@ def test_nothing_is_counted_in_standby() -> None:
 
 
 ENDS: tuple[tuple[Callable[[World], object], State, str], ...] = (
-    (lambda world: world.ask(Request.STOP), S.HELD, STOPPED),
+    (lambda world: world.ask(Request.STOP), S.HELD, say(STOPPED)),
     (lambda world: world.values.update(soc_pct=100.0), S.FULL, "full: SOC 100 %"),
     (lambda world: setattr(world, "internal", "KeyError()"), S.TRIPPED, "this is a defect of the software"),
     (lambda world: world.leave(), S.IDLE, "the BMU (node 0x10) has stopped answering"),
@@ -685,7 +688,7 @@ def test_a_session_ends_once_with_its_reason(end: Callable[[World], object], sta
     world = charging()
     end(world)
     world.until(state, 10)
-    assert [session.result.startswith(result) for session in sessions(world)] == [True]
+    assert [say(session.result).startswith(result) for session in sessions(world)] == [True]
     world.run(5)
     assert world.decision.session is None
     assert len(sessions(world)) == 1
@@ -721,7 +724,7 @@ def test_a_node_that_falls_silent_is_not_said_to_withhold_a_temperature() -> Non
     world = charging()
     world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=world.now_s - 0.75)
     world.frozen.update(("temperature_c", "status"))
-    reason = world.until(S.STOPPING, 3).reason
+    reason = reason_of(world.until(S.STOPPING, 3))
     assert {"heartbeat_lost", "stale_reading"} == set(world.raised)
     assert reason.startswith("no heartbeat of the BMU for 2.5 s")
 

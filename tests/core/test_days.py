@@ -7,6 +7,7 @@ import pytest
 from orchestrator.model import ENERGISED, ControlMode, Request, State
 from orchestrator.sim.pack import Pack
 from orchestrator.sim.presets import demo
+from tests.core.said import reason_of
 from tests.core.site import Site
 from tests.core.world import bay
 
@@ -68,7 +69,7 @@ def test_a_bad_line_costs_time_and_nothing_else() -> None:
 def leaves_and_comes(site: Site) -> None:
     site.plant.connected = False
     site.run(20)
-    assert site.decision.reason == "no battery"
+    assert reason_of(site.decision) == "no battery"
     site.plant.connected = True
 
 

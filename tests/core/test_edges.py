@@ -31,6 +31,7 @@ from orchestrator.model import (
 )
 from tests.core.bays import POLICY
 from tests.core.edges import AT, CONTINUOUS, NO_PRECHARGE, PULSE, Edge, ago, marked, raised, session, witnessed
+from tests.core.said import cause, said
 from tests.core.world import with_full
 
 LIMIT_3 = Command(Action.SET_LIMIT, 3)
@@ -88,7 +89,7 @@ CHARGE = (
 def trail(*samples: tuple[float, float, float, float]) -> dict[str, Any]:
     """Seconds ago, the pack's volts and amps, the charger's amps; oldest first."""
     seen = tuple(Sample(ago(age_s), pack_v, pack_a, pack_v, amps) for age_s, pack_v, pack_a, amps in samples)
-    return {**witnessed(trail=seen), "step": Step(4, 14.0, "")}
+    return {**witnessed(trail=seen), "step": Step(4, 14.0, cause(""))}
 
 
 TAPERED = trail((5.0, 53.0, 6.9, 6.9), (0.0, 53.0, 6.9, 6.9))
@@ -115,9 +116,9 @@ FINISH = (
     Edge(finished, None, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
     Edge(finished, None, TAPERED, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL},
          policy=with_full(charger=False)),
-    Edge(known_full, "", {"taper_s": ago(119.9)}),
+    Edge(known_full, None, {"taper_s": ago(119.9)}),
     Edge(known_full, f"10.00 A, tapered below 1 A for 120 s ({AT('finish.full.taper')})", {"taper_s": ago(120)}),
-    Edge(known_full, "", {"taper_s": ago(120)},
+    Edge(known_full, None, {"taper_s": ago(120)},
          policy=with_full(taper=None)),
     Edge(tapers, True, charger={"current_a": 0.99}, bmu={"voltage_v": 53.61}),
     Edge(tapers, False, charger={"current_a": 1.0}, bmu={"voltage_v": 53.61}),
@@ -338,10 +339,10 @@ PAIR = (
     Edge(measured.volts_disagree, None, bmu={"voltage_v": None}),
     Edge(measured.amps_disagree, None, bmu={"current_a": 9.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.00 A; the charger is likelier wrong, by the "
-         "step that was set (8 A)", {"step": Step(2, 8.0, "")}, bmu={"current_a": 8.0}),
+         "step that was set (8 A)", {"step": Step(2, 8.0, cause(""))}, bmu={"current_a": 8.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A; the BMU is likelier wrong, by the step "
-         "that was set (10 A)", {"step": Step(2, 10.0, "")}, bmu={"current_a": 14.0}),
-    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A", {"step": Step(2, 2.0, "")},
+         "that was set (10 A)", {"step": Step(2, 10.0, cause(""))}, bmu={"current_a": 14.0}),
+    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A", {"step": Step(2, 2.0, cause(""))},
          bmu={"current_a": 14.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.99 A", bmu={"current_a": 8.99}),
     Edge(measured.amps_disagree, None, charger={"current_a": 14.0}, bmu={"current_a": 12.61}),
@@ -420,7 +421,7 @@ EDGES = (*CHARGE, *FINISH, *BATTERY, *OBEDIENCE, *SOC, *PAIR, *REPORTS)
 
 @pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge.rule.__name__}-{edge.says}")
 def test_a_rule_at_its_edge(edge: Edge) -> None:
-    assert edge.rule(edge.facts) == edge.says
+    assert said(edge.rule(edge.facts)) == edge.says
 
 
 def test_every_rule_with_a_number_has_its_edges() -> None:

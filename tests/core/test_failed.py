@@ -23,6 +23,7 @@ from orchestrator.model import (
     Alarm,
     BatteryReading,
     BatteryStatus,
+    Cause,
     ChargeMode,
     Connection,
     ControlMode,
@@ -36,6 +37,7 @@ from orchestrator.model import (
 )
 from tests.core import world as worlds
 from tests.core.bays import IN, charging, idle
+from tests.core.said import reason_of, say
 from tests.core.world import TICK_S, World
 
 every_state = pytest.mark.parametrize("state", State)
@@ -69,8 +71,10 @@ def test_a_bay_that_cannot_be_judged_is_stopped_and_given_up_in_three_seconds(ra
     world.run(3.5)
     assert world.is_in(State.UNCONTROLLABLE)
     assert world.decision.alarm is Alarm.DANGER
-    assert world.decision.reason.startswith("CUT THE MAINS of this charger: this software has failed to judge the bay")
-    assert BROKEN in world.decision.reason
+    assert reason_of(world.decision).startswith(
+        "CUT THE MAINS of this charger: this software has failed to judge the bay"
+    )
+    assert BROKEN in reason_of(world.decision)
     for decision in world.decisions[before:]:
         assert decision.command == STOP
         assert decision.state in (State.STOPPING, State.STARTING, State.UNCONTROLLABLE)
@@ -151,8 +155,8 @@ def test_what_was_known_of_the_bay_is_kept(raises: Switch) -> None:
 # --- one rule of the table --------------------------------------------------------------------------------------------
 
 
-def broken(row: Row) -> Callable[[Facts], str | None]:
-    def check(_f: Facts) -> str | None:
+def broken(row: Row) -> Callable[[Facts], Cause | None]:
+    def check(_f: Facts) -> Cause | None:
         raise ZeroDivisionError(row.id)
 
     return check
@@ -235,7 +239,7 @@ def test_no_reading_makes_a_step_raise(
         assert charger is not None
         snapshot = replace(snapshot, battery=battery, charger=replace(charger, **shows))  # type: ignore[arg-type]  # its fields by name
         decision, world.memory = step(world.now_s, snapshot, world.memory, world.rules)
-        assert "internal" not in {fault.id for fault in decision.faults if "cannot be judged" in fault.text}
+        assert "internal" not in {fault.id for fault in decision.faults if "cannot be judged" in say(fault.cause)}
         assert decision.state in ENERGISED or decision.command in (None, STOP)
         assert decision.command is None or decision.command.action in Action
         Persisted.of(world.memory, world.now_s).aged(1.0).memory(5.0)

@@ -12,8 +12,10 @@ from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.core.witnesses import measured, pack, paired, standby
 from orchestrator.keys import Range, Source
 from orchestrator.model import ENERGISED, STOP, Effect, Request, State
+from orchestrator.text.catalogue import advise
 from tests.core.bays import IN, running_at_the_start
 from tests.core.fault_scenes import SCENES, Scene
+from tests.core.said import reason_of, say
 from tests.core.world import TICK_S, World, bay
 
 # --- the table itself -------------------------------------------------------------------------------------------------
@@ -41,9 +43,10 @@ def test_a_row_makes_sense(row: Row) -> None:
     assert (row.clean_s > 0) >= (row.clear is Clear.AUTO)
     assert row.clean_s == 0 or row.clear in (Clear.AUTO, Clear.RESET)
     assert row.effect is Effect.STOP or not row.departs  # a latch does not leave with the battery
-    assert len(row.advice) > 10
-    assert row.advice[0].islower()
-    assert row.advice[-1] != "."
+    advice = advise(row.id)
+    assert len(advice) > 10
+    assert advice[0].islower()
+    assert advice[-1] != "."
 
 
 def test_the_rows_are_one_each() -> None:
@@ -107,8 +110,8 @@ def test_it_is_raised_in_time_with_its_evidence(scene: Scene) -> None:
     text = world.raised[scene.fault]
     for evidence in scene.evidence:
         assert evidence in text
-    row = ROW[scene.fault]
-    assert text.startswith(f"{row.advice} – ") if row.effect is Effect.TRIP else text.endswith(f"; {row.advice}")
+    advice, trips = advise(scene.fault), ROW[scene.fault].effect is Effect.TRIP
+    assert text.startswith(f"{advice} – ") if trips else text.endswith(f"; {advice}")
 
 
 @every_scene
@@ -121,7 +124,7 @@ def test_a_stop_is_ordered_in_the_very_same_step(scene: Scene) -> None:
     assert world.state not in ENERGISED
     if scene.begin is not running_at_the_start and world.states()[-2] in ENERGISED:
         assert world.is_in(State.STOPPING)
-        assert world.decision.reason == world.decision.faults[0].text
+        assert reason_of(world.decision) == say(world.decision.faults[0].cause)
 
 
 def effect_of(scene: Scene) -> Effect:
@@ -138,7 +141,7 @@ def test_it_leads_where_its_effect_says(scene: Scene) -> None:
         lowest = scene.then is not State.CHARGING or effect_of(scene) >= Effect.LIMIT
         assert (world.decision.step is not None and world.decision.step.index == 0) is lowest
     elif effect_of(scene) >= Effect.NO_START and scene.then not in (State.UNCONTROLLABLE, State.OFFLINE):
-        assert world.raised[scene.fault] in world.decision.reason or world.decision.faults[0].id != scene.fault
+        assert world.raised[scene.fault] in reason_of(world.decision) or world.decision.faults[0].id != scene.fault
 
 
 DEBOUNCED = [scene for scene in SCENES if scene.lapse and scene.after_s > TICK_S]
@@ -195,7 +198,7 @@ def test_it_waits_for_a_start(scene: Scene) -> None:
     world = healed(scene)
     world.run(30)
     assert world.is_in(State.HELD)
-    assert world.decision.reason == f"{world.raised[scene.fault]}: orchestrator start bay-1"
+    assert reason_of(world.decision) == f"{world.raised[scene.fault]}: orchestrator start bay-1"
     assert world.ask(Request.START) == ""
     assert not world.raised
     world.until(State.CHARGING)
@@ -216,7 +219,7 @@ def test_it_waits_for_a_reset_and_then_for_a_start(scene: Scene) -> None:
     assert not world.raised
     world.run(30)
     assert world.is_in(State.HELD)
-    assert world.decision.reason == "reset by the operator; to go on: orchestrator start bay-1"
+    assert reason_of(world.decision) == "reset by the operator; to go on: orchestrator start bay-1"
     world.values["soc_pct"] = 50.0
     assert world.ask(Request.START) == ""
     while world.tick().state not in ENERGISED:
@@ -276,4 +279,4 @@ def test_a_pause_for_the_temperature_names_the_line_of_the_stricter_limit(
     the_bay = replace(bay(), limits=replace(bay().limits, temperature_c=limits), source=source)
     world = World(the_bay, temperature_c=celsius)
     world.until(State.SUSPENDED)
-    assert f"({place})" in world.decision.reason
+    assert f"({place})" in reason_of(world.decision)

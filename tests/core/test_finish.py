@@ -10,6 +10,7 @@ from orchestrator.config.policy import Needs, Policy, Taper
 from orchestrator.core.finish import DAY_S
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import ChargeMode, Operation, Request, State
+from tests.core.said import reason_of
 from tests.core.world import POLICY, TICK_S, World, bay, with_full
 
 S = State
@@ -73,7 +74,7 @@ def test_all_that_is_needed_must_be_there() -> None:
     world.run(130)
     assert world.is_in(S.CHARGING), "97 % is not 100 %"
     world.values["soc_pct"] = 100.0
-    assert world.tick().reason.startswith("step")
+    assert reason_of(world.tick()).startswith("step")
     assert POLICY.finish.full.charger
     world.shows.update(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED)
     world.until(S.FULL, 3)
@@ -87,7 +88,7 @@ def test_what_does_not_stand_there_is_not_needed() -> None:
     world.run(130)
     assert world.is_in(S.CHARGING)
     world.values["soc_pct"] = 100.0
-    reason = world.tick().reason
+    reason = reason_of(world.tick())
     assert reason.startswith("full: SOC 100 % reached 100 %")
     assert " and 0.90 A, tapered below 1 A for 120 s" in reason
 
@@ -107,12 +108,14 @@ def held() -> World:
 def test_a_full_pack_stays_on_to_balance() -> None:
     world = held()
     assert world.is_in(S.CHARGING)
-    assert world.decision.reason.endswith(f"held at the top for another 30 min ({POLICY.source.at('finish.hold_min')})")
+    assert reason_of(world.decision).endswith(
+        f"held at the top for another 30 min ({POLICY.source.at('finish.hold_min')})"
+    )
     world.amps = 1.5  # a balancer takes more for a while: it stays full
     world.run(30 * 60 - 10)
     assert world.is_in(S.CHARGING)
     world.until(S.FULL, 10)
-    assert ", held for 30 min (" in next(d.reason for d in reversed(world.decisions) if d.state is S.STOPPING)
+    assert ", held for 30 min (" in next(reason_of(d) for d in reversed(world.decisions) if d.state is S.STOPPING)
 
 
 def test_a_pause_does_not_begin_the_hold_anew() -> None:

@@ -7,8 +7,9 @@ import pytest
 from orchestrator.core.latches import release
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import hear
-from orchestrator.model import Action, Connection, ControlMode, Effect, Request, State
+from orchestrator.model import Action, Cause, Connection, ControlMode, Effect, Request, State
 from tests.core.bays import charging, idle, stopping
+from tests.core.said import cause, reason_of, said, say
 from tests.core.world import TICK_S, World
 
 
@@ -107,7 +108,7 @@ def test_backoffs_grow_and_the_fourth_strike_within_an_hour_latches() -> None:
     strike(world)
     world.until(State.TRIPPED, 5)
     assert world.decision.faults[0].effect is Effect.TRIP
-    assert "; it came 4 times within an hour: reset by a person – SOC 140 %" in world.decision.reason
+    assert "; it came 4 times within an hour: reset by a person – SOC 140 %" in reason_of(world.decision)
     world.run(2000, dt_s=1.0)
     assert world.is_in(State.TRIPPED)
     assert "latched and needs a reset" in world.ask(Request.START)
@@ -164,17 +165,17 @@ def test_a_backoff_says_when_it_goes_on_and_a_latch_what_to_type() -> None:
         implausible(world)
         world.run(2)
         told = f"goes on by itself {wait_s} s after its cause is gone ({which} of 3 within an hour)"
-        assert world.decision.reason.endswith(f"; {told}")
+        assert reason_of(world.decision).endswith(f"; {told}")
         implausible(world, seen=False)
         world.run(TICK_S + 6)
         left = f"its cause is gone, goes on by itself in {wait_s - 6} s ({which} of 3 within an hour)"
-        assert world.decision.reason.endswith(f"; {left}")
-        assert all(told not in fault.text and left not in fault.text for fault in world.decision.faults)
+        assert reason_of(world.decision).endswith(f"; {left}")
+        assert all(told not in say(fault.cause) and left not in say(fault.cause) for fault in world.decision.faults)
         world.until(State.CHARGING, 400)
         world.charging()
     strike(world)
     world.run(1)
-    assert world.decision.reason.endswith(
+    assert reason_of(world.decision).endswith(
         "; its cause is gone: orchestrator reset bay-1, then orchestrator start bay-1"
     )
 
@@ -191,9 +192,9 @@ def test_a_trip_whose_charger_stands_by_asks_nobody_to_cut_its_mains() -> None:
     world.deaf.clear()
     said = "the charger stands by now: have the cause repaired, then reset – before, it did not obey the stop for 8 s"
     world.until(State.TRIPPED, 15)
-    assert world.decision.reason == said
+    assert reason_of(world.decision) == said
     world.run(600, dt_s=1.0)
-    assert world.decision.reason == said
+    assert reason_of(world.decision) == said
 
 
 def test_a_jump_of_the_soc_is_told_with_how_long_ago() -> None:
@@ -225,7 +226,7 @@ def test_a_battery_that_leaves_in_mid_charge_is_no_strike() -> None:
     for _ in range(6):
         world.leave()
         world.until(State.IDLE, 10)
-        assert world.decision.reason == "no battery"
+        assert reason_of(world.decision) == "no battery"
         assert not world.raised
         world.run(60)
         world.arrive()
@@ -317,13 +318,13 @@ def test_each_that_keeps_a_reset_from_its_effect_is_named() -> None:
 
 def test_a_fault_is_gone_long_enough_at_the_very_moment() -> None:
     gone = {"reverse_polarity": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
-    assert release(gone, 6.75, by_reset=True) == (gone, ["reverse_polarity must be gone for 5 s first"])
+    assert release(gone, 6.75, by_reset=True) == (gone, [Cause.of("gone_first", fault="reverse_polarity", clean_s=5)])
     assert release(gone, 7.0, by_reset=True) == ({}, [])
 
 
 def test_a_start_clears_only_what_waits_for_one() -> None:
     before = {
-        "system_stop": FaultMemory(raised_s=1.0, clean_s=2.0, text="mode 7"),
+        "system_stop": FaultMemory(raised_s=1.0, clean_s=2.0, cause=cause("mode 7")),
         "implausible": FaultMemory(raised_s=1.0, clean_s=2.0, strikes=(1.0,)),
         "illegal_value": FaultMemory(present=True, seen_s=1.0, polls=1),
         "volts_disagree": FaultMemory(present=True, seen_s=1.0),
@@ -334,7 +335,7 @@ def test_a_start_clears_only_what_waits_for_one() -> None:
     left, reasons = release(
         {**before, "system_stop": replace(before["system_stop"], clean_s=None)}, 3.0, by_reset=False
     )
-    assert reasons == ["system_stop is still there: mode 7"]
+    assert said(reasons) == ["system_stop is still there: mode 7"]
     assert set(left) == set(before)
 
 
@@ -345,7 +346,7 @@ def test_a_reset_clears_what_waits_for_a_start_too_but_starts_nothing() -> None:
     assert "stopped_by_itself" in world.raised
     assert world.ask(Request.RESET) == ""
     world.run(10)
-    assert world.decision.reason == "reset by the operator; to go on: orchestrator start bay-1"
+    assert reason_of(world.decision) == "reset by the operator; to go on: orchestrator start bay-1"
     assert world.is_in(State.HELD)
 
 
@@ -359,7 +360,7 @@ def test_a_reset_while_the_stop_is_being_verified_is_no_start() -> None:
     world.deaf.clear()
     world.run(30)
     assert world.is_in(State.HELD)
-    assert world.decision.reason == "reset by the operator; to go on: orchestrator start bay-1"
+    assert reason_of(world.decision) == "reset by the operator; to go on: orchestrator start bay-1"
 
 
 def test_a_reset_of_nothing_changes_nothing() -> None:
@@ -457,9 +458,9 @@ def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:
 def test_an_hour_after_the_first_of_three_there_may_be_a_fourth() -> None:
     latched = {"internal": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
     memory = Memory(faults=latched, resets=tuple((1000.0 + t_s, "internal") for t_s in (0.0, 10.0, 20.0)))
-    assert "reset again in 59 min" in hear(memory, Request.RESET, 1060.0)
-    assert "reset again in 0 min" in hear(memory, Request.RESET, 4599.75)
-    assert hear(memory, Request.RESET, 4600.0) == ""
+    assert "reset again in 59 min" in say(hear(memory, Request.RESET, 1060.0))
+    assert "reset again in 0 min" in say(hear(memory, Request.RESET, 4599.75))
+    assert hear(memory, Request.RESET, 4600.0) is None
     assert [t_s for t_s, _ in memory.resets] == [1010.0, 1020.0, 4600.0]
 
 

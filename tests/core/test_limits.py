@@ -9,9 +9,11 @@ from orchestrator.config.policy import Band, Policy, Table, Where
 from orchestrator.core.facts import Facts
 from orchestrator.core.limits import choose
 from orchestrator.core.rules import Rules
+from orchestrator.core.step import PRECHARGE
 from orchestrator.keys import Range, Source
 from orchestrator.model import BatteryStatus, ChargeMode, Precharge, Request, Setpoint, Snapshot, State, Step
 from tests.core.bays import POLICY, charging
+from tests.core.said import reason_of, say
 from tests.core.world import STEPS_A, TICK_S, World, bay
 
 VOLTAGE = Table(
@@ -71,12 +73,12 @@ def test_the_lowest_wins_and_has_a_name(values: dict[str, float], index: int, ke
     place = the_policy.source.at("current." + key) if key else ""
     assert (step.index, step.current_a) == (index, STEPS_A[index])
     assert (step.key, step.place) == (f"current.{key}" if key else "", place)
-    assert step.rule.startswith(words)
-    assert step.rule.endswith(f", {place}") or not key
+    assert say(step.rule).startswith(words)
+    assert say(step.rule).endswith(f", {place}") or not key
     assert world.charger.limit == index
     assert world.decision.setpoint == Setpoint(True, index, ChargeMode.CHARGE, Precharge.OFF)
-    assert world.decision.answer == ""
-    assert world.decision.reason == f"step {index + 1} ({STEPS_A[index]:.1f} A): {step.rule}"
+    assert world.decision.answer is None
+    assert reason_of(world.decision) == f"step {index + 1} ({STEPS_A[index]:.1f} A): {say(step.rule)}"
 
 
 def test_amperes_are_what_flows_into_the_pack() -> None:
@@ -90,7 +92,7 @@ def test_amperes_are_what_flows_into_the_pack() -> None:
     world = World(tolerant).charging()
     assert world.decision.step is not None
     assert world.decision.step.label == "step 4 (11.0 A)"
-    assert world.decision.step.rule == f"the pack bears 14.0 A, {POLICY.source.at('pack.current_a')}"
+    assert say(world.decision.step.rule) == f"the pack bears 14.0 A, {POLICY.source.at('pack.current_a')}"
 
 
 def test_the_share_that_a_row_names_is_said() -> None:
@@ -98,7 +100,7 @@ def test_the_share_that_a_row_names_is_said() -> None:
     rows = (Band(from_=0, to=45, max_c=0.3),)
     world = World(bay(replace(with_current(temperature_c=Table(rows=rows)), pack=pack))).charging()
     assert world.decision.step is not None
-    assert world.decision.step.rule.startswith("temperature 20.0 °C in 0 … 45 allows 6.0 A (0.3 C), ")
+    assert say(world.decision.step.rule).startswith("temperature 20.0 °C in 0 … 45 allows 6.0 A (0.3 C), ")
 
 
 def test_a_table_that_is_not_there_hides_no_other() -> None:
@@ -120,14 +122,14 @@ def test_two_tables_on_one_line_are_told_apart() -> None:
     one_line = replace(with_current(temperature_c=table, soc_pct=other), source=Source("p.yaml", line))
     world = World(bay(one_line)).charging()
     assert world.decision.step is not None
-    assert world.decision.step.rule == "temperature 20.0 °C in 0 … 45 allows 8.0 A, p.yaml:7"
+    assert say(world.decision.step.rule) == "temperature 20.0 °C in 0 … 45 allows 8.0 A, p.yaml:7"
     less = Table(rows=(Band(from_=0, to=100, max_a=8.0),))
     more = Table(rows=(Band(from_=0, to=45, max_a=9.0),))
     swapped = replace(one_line, current=replace(one_line.current, temperature_c=more, soc_pct=less))
     world.rules = Rules.of(bay(swapped))
     world.tick()
     assert (world.decision.step.key, world.decision.step.place) == ("current.soc_pct.rows[0]", "p.yaml:7")
-    assert world.decision.step.rule == "SOC 50 % in 0 … 100 allows 8.0 A, p.yaml:7"
+    assert say(world.decision.step.rule) == "SOC 50 % in 0 … 100 allows 8.0 A, p.yaml:7"
 
 
 @pytest.mark.parametrize(("current_a", "index"), [(15.0, 4), (14.0, 4), (13.99, 3), (11.0, 3), (2.0, 0)])
@@ -137,7 +139,7 @@ def test_no_step_is_above_the_stations_limit(current_a: float, index: int) -> No
     assert world.decision.step is not None
     assert world.decision.step.index == index
     if index < 4:
-        assert world.decision.step.rule == "the station's current limit, depot.yaml:12"
+        assert say(world.decision.step.rule) == "the station's current limit, depot.yaml:12"
 
 
 def test_what_no_row_covers_gets_the_lowest_step() -> None:
@@ -149,7 +151,7 @@ def test_what_no_row_covers_gets_the_lowest_step() -> None:
         step = world.decision.step
         assert step is not None
         at = wide.source.at("current.temperature_c")
-        assert (step.index, step.rule) == (0, f"temperature {celsius:.1f} °C outside of its table, {at}")
+        assert (step.index, say(step.rule)) == (0, f"temperature {celsius:.1f} °C outside of its table, {at}")
     world = World(the_bay, temperature_c=45.0).charging()
     assert index(world) == 4  # the last row's end is included
 
@@ -173,11 +175,11 @@ def test_down_in_the_same_step_up_after_the_hold() -> None:
     world.run(60)
     assert index(world) == 1
     at = POLICY.source.at("current.raise_after_s")
-    assert world.decision.reason.endswith(f"; a higher step is allowed, and taken after 60 s ({at})")
+    assert reason_of(world.decision).endswith(f"; a higher step is allowed, and taken after 60 s ({at})")
     world.tick()
     assert index(world) == 4
     world.tick()
-    assert "a higher step is allowed" not in world.decision.reason
+    assert "a higher step is allowed" not in reason_of(world.decision)
     assert world.decision.session is not None
     assert world.decision.session.step_changes == 2
 
@@ -227,7 +229,7 @@ def test_a_row_that_holds_on_is_said_as_such() -> None:
     world.ask(Request.START)
     world.charging()
     assert world.decision.step is not None
-    assert world.decision.step.rule.startswith("temperature 15.4 °C not yet 1 beyond 10 … 15 allows 6.0 A")
+    assert say(world.decision.step.rule).startswith("temperature 15.4 °C not yet 1 beyond 10 … 15 allows 6.0 A")
 
 
 def test_another_battery_begins_without_the_rows_of_the_last() -> None:
@@ -289,8 +291,8 @@ def test_a_charger_that_cannot_give_so_little_begins_no_charge() -> None:
     world = World(bay(with_current(temperature_c=Table(rows=rows))))
     world.until(State.SUSPENDED)
     assert "no_step_allowed" in world.raised
-    assert world.decision.reason.startswith("temperature 20.0 °C in 0 … 45 allows 1.9 A")
-    assert "the lowest step of this charger is 2 A" in world.decision.reason
+    assert reason_of(world.decision).startswith("temperature 20.0 °C in 0 … 45 allows 1.9 A")
+    assert "the lowest step of this charger is 2 A" in reason_of(world.decision)
     world.run(300)
     assert State.CHARGING not in world.states()
 
@@ -331,7 +333,7 @@ def test_the_sentence_changes_with_the_line() -> None:
     world.values["temperature_c"] = 6.0
     world.tick()
     assert world.decision.step is not None
-    assert world.decision.step.rule.startswith("temperature 6.0 °C in 5 … 10")
+    assert say(world.decision.step.rule).startswith("temperature 6.0 °C in 5 … 10")
 
 
 def test_a_new_charge_needs_no_hold() -> None:
@@ -351,7 +353,7 @@ def test_what_is_not_known_is_the_lowest_step() -> None:
     world = charging()
     step, raise_s = choose(Facts(world.now_s, Snapshot(), world.memory, world.rules), None)
     at = POLICY.source.at("current.temperature_c")
-    assert (step.index, step.rule, raise_s) == (0, f"temperature unknown, {at}", None)
+    assert (step.index, say(step.rule), raise_s) == (0, f"temperature unknown, {at}", None)
 
 
 # --- faults that limit ------------------------------------------------------------------------------------------------
@@ -363,10 +365,10 @@ def test_a_fault_that_limits_means_the_lowest_step_and_is_named() -> None:
     world.tick()
     assert world.decision.step is not None
     assert world.decision.step.index == 0
-    assert world.decision.step.rule == "the fault status_limit"
+    assert say(world.decision.step.rule) == "the fault status_limit"
     assert (world.decision.step.key, world.decision.step.place) == ("fault status_limit", "")
     world.tick()
-    assert world.decision.reason == f"step 1 (2.0 A): the fault status_limit; {world.raised['status_limit']}"
+    assert reason_of(world.decision) == f"step 1 (2.0 A): the fault status_limit; {world.raised['status_limit']}"
     world.values["status"] = 0.0
     world.run(10 + 60)
     assert index(world) == 0
@@ -380,7 +382,7 @@ def test_a_warning_does_not_limit() -> None:
     world.run(1)
     assert set(world.raised) == {"noisy_line"}
     assert index(world) == 4
-    assert "noisy" not in world.decision.reason
+    assert "noisy" not in reason_of(world.decision)
 
 
 def test_precharge_is_always_on_the_lowest_step() -> None:
@@ -388,7 +390,7 @@ def test_precharge_is_always_on_the_lowest_step() -> None:
         world = World(voltage_v=volts).charging(state)
         assert index(world) == 0
         assert world.charger.limit == 0
-        assert world.decision.step == Step(0, STEPS_A[0], "precharge is always on the lowest step", "precharge")
+        assert world.decision.step == Step(0, STEPS_A[0], PRECHARGE)
 
 
 # --- what comes back all the same -------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from orchestrator.core.step import step
 from orchestrator.core.track import Warmth, follow, follow_state, thinned
 from orchestrator.model import (
     STOP,
+    Cause,
     ChargeMode,
     Command,
     ControlMode,
@@ -33,6 +34,7 @@ from orchestrator.model import (
     Step,
 )
 from tests.core.edges import AT, BMU, CONTINUOUS, NO_PRECHARGE, NOW_S, PULSE, Edge, ago, marked, raised, session
+from tests.core.said import cause, said
 from tests.core.world import bay
 
 
@@ -41,7 +43,7 @@ def goes(f: Facts) -> Course:
 
 
 def holding(**changes: Any) -> dict[str, Any]:
-    return {"step": Step(2, 8.0, "because"), **changes}
+    return {"step": Step(2, 8.0, cause("because")), **changes}
 
 
 def reached(seconds: float) -> dict[str, Any]:
@@ -76,9 +78,9 @@ GOES = (
     Edge(goes, (None, "step 3 (8.0 A): because; text of status_limit; charging goes on, on the lowest step"),
          holding(**raised("status_limit"))),
     Edge(goes, (None, "the charger charges by itself (automatic mode)"), control=ControlMode.AUTOMATIC),
-    Edge(goes, (None, "as before"), {"reason": "as before"}),
+    Edge(goes, (None, "as before"), {"cause": cause("as before")}),
     Edge(goes, (Trigger.STOP, "paused by the operator"), holding(paused=True)),
-    Edge(goes, (Trigger.STOP, "held"), holding(paused=True, hold="held")),
+    Edge(goes, (Trigger.STOP, "held"), holding(paused=True, hold=cause("held"))),
     Edge(goes, (Trigger.STOP, f"full: SOC 100 % reached 100 % ({AT('finish.full.soc_pct')})"), bmu={"soc_pct": 100.0}),
     Edge(goes, (None, f"the pack is below 39 V: pulse precharge ({AT('precharge.pulse')})"), reached(1.9), PULSE,
          bmu={"voltage_v": 35.1}),
@@ -97,7 +99,7 @@ GOES = (
          bmu={"voltage_v": 39.0}),
     *(Edge(goes, (Trigger.STOP, NO_RULE), precharged(0), PULSE, **how)
       for how in ({"policy": NO_PRECHARGE}, {"bmu": {"voltage_v": None}})),
-    Edge(goes, (None, "stopped for it"), {"reason": "stopped for it"}, STOPPING, 2.9),
+    Edge(goes, (None, "stopped for it"), {"cause": cause("stopped for it")}, STOPPING, 2.9),
     Edge(goes, (Trigger.GIVE_UP, RUNS_ON.format("it delivers 10.00 A")), state=STOPPING, state_s=3),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 0 s ago")), state=STOPPING,
          state_s=3, charger_link={"online": False}),
@@ -109,15 +111,15 @@ GOES = (
          state_s=3, charger={"operation": None, "current_a": 0.0}),
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, STARTING, 3,
          charger={"t_s": ago(9)}, charger_link={"online": False}),
-    Edge(goes, (None, "still looking"), {"reason": "still looking"}, STARTING, 2.9, charger={"t_s": ago(9)},
+    Edge(goes, (None, "still looking"), {"cause": cause("still looking")}, STARTING, 2.9, charger={"t_s": ago(9)},
          charger_link={"online": False}),
     Edge(goes, (Trigger.STOP, "the charger runs though it was not commanded to"), state=IDLE),
     Edge(goes, (None, "the charger is being stopped before anything else"), state=OFFLINE, charger=STANDS_BY),
     *(Edge(goes, (None, "the charger on /dev/ttyX does not answer"), {}, OFFLINE, **how) for how in (
         {"charger": {**STANDS_BY, "t_s": ago(9)}}, {"charger": STANDS_BY, "charger_link": {"online": False}})),
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, IDLE, charger={"t_s": ago(9)}),
-    Edge(goes, (Trigger.HOLD, "held; to go on: orchestrator start bay-1"), {"hold": "held"}, FULL, **AT_REST),
-    Edge(goes, (None, "held; to go on: orchestrator start bay-1"), {"hold": "held"}, HELD, **AT_REST),
+    Edge(goes, (Trigger.HOLD, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, FULL, **AT_REST),
+    Edge(goes, (None, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, HELD, **AT_REST),
     Edge(goes, (Trigger.SUSPEND, "paused by the operator; start to go on"), {"paused": True}, IDLE, **AT_REST),
     Edge(goes, (Trigger.RESET, "reset by the operator; to go on: orchestrator start bay-1"), {}, TRIPPED, **AT_REST),
     Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer"), {}, IDLE,
@@ -319,6 +321,7 @@ implausible, soh_low, emergency = map(faults_after, ("implausible", "soh_low", "
 charger_silent, bmu_silent = map(faults_after, ("charger_silent", "bmu_silent"))
 UNPLUGGED: dict[str, Any] = {"charger_link": {"online": False, "problem": "unplugged"}}
 DEPARTED: dict[str, Any] = {**SILENT_BMU, "charger": {**STANDS_BY, "voltage_v": 0.0}, "charger_link": STOP_SENT}
+SILENT = Cause.of("charger_problem", problem="unplugged")
 DEBOUNCED = FaultMemory(present=True, seen_s=9, polls=9, poll_t_s=ago(1))
 
 
@@ -337,7 +340,7 @@ LATCHES = (
          faults(soh_low=replace(DEBOUNCED, raised_s=ago(9), clean_s=ago(4.9)))),
     Edge(soh_low, FaultMemory(raised_s=ago(9), clean_s=NOW_S, poll_t_s=ago(1)),
          faults(soh_low=replace(DEBOUNCED, raised_s=ago(9)))),
-    Edge(charger_silent, replace(DEBOUNCED, raised_s=NOW_S, text="unplugged", strikes=(NOW_S,), polls=10,
+    Edge(charger_silent, replace(DEBOUNCED, raised_s=NOW_S, cause=SILENT, strikes=(NOW_S,), polls=10,
                                  poll_t_s=NOW_S), faults(charger_silent=DEBOUNCED), **UNPLUGGED),
     Edge(charger_silent, None, faults(charger_silent=DEBOUNCED), STOPPING, **UNPLUGGED),
     Edge(charger_silent, None, {}, STOPPING, **UNPLUGGED),
@@ -395,17 +398,17 @@ def test_from_stage_to_stage_the_charge_goes_on() -> None:
 
 
 def test_a_charge_that_ends_at_rest_says_why_it_ends_there() -> None:
-    memory = {"session": BEGUN, "hold": "held", "stop_reason": "of before"}
+    memory = {"session": BEGUN, "hold": cause("held"), "stop_cause": cause("of before")}
     decision, after = whole(Edge(goes, None, memory, SUSPENDED, **AT_REST))
     assert decision.state is HELD
     assert decision.session is not None
-    assert decision.session.result == "held"
+    assert decision.session.result == cause("held")
     assert after.session is None
 
 
 @pytest.mark.parametrize(("index", "changes"), [(2, 2), (4, 1)])
 def test_a_change_of_the_step_is_counted(index: int, changes: int) -> None:
-    memory = {"session": BEGUN, "step": Step(index, 0.0, ""), "raise_s": ago(60), "last_s": ago(0.25)}
+    memory = {"session": BEGUN, "step": Step(index, 0.0, cause("")), "raise_s": ago(60), "last_s": ago(0.25)}
     decision, _ = whole(Edge(goes, None, memory))
     assert decision.session is not None
     assert decision.session.step_changes == changes
@@ -429,4 +432,4 @@ EDGES = (
 
 @pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge.rule.__name__}-{edge.says}")
 def test_one_step(edge: Edge) -> None:
-    assert edge.rule(edge.facts) == edge.says
+    assert said(edge.rule(edge.facts)) == said(edge.says)

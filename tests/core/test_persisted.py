@@ -17,6 +17,7 @@ from orchestrator.core.persisted import COUNTERS_S, RUNNING, UNFINISHED, Persist
 from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle
 from tests.core.fault_scenes import SCENES
+from tests.core.said import cause, reason_of, say
 from tests.core.world import World, bay
 
 every_state = pytest.mark.parametrize("state", State)
@@ -62,7 +63,7 @@ def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None
     assert world.decision.alarm is not Alarm.DANGER
     if ran:
         assert not any(decision.state in ENERGISED for decision in world.decisions)
-        assert UNFINISHED in world.raised["found_running"]
+        assert say(UNFINISHED) in world.raised["found_running"]
         assert world.ask(Request.START if "will_not_stop" not in world.raised else Request.RESET) == ""
     elif state is State.TRIPPED:
         assert world.is_in(State.TRIPPED)
@@ -95,7 +96,7 @@ def test_a_persons_word_outlives_the_service(request_: Request) -> None:
         restarted(world)
         world.run(60)
         assert not any(decision.state in ENERGISED for decision in world.decisions)
-    assert world.memory.hold == (STOPPED if request_ is Request.STOP else "")
+    assert world.memory.hold == (STOPPED if request_ is Request.STOP else None)
     assert world.memory.paused is (request_ is Request.PAUSE)
     assert world.ask(Request.START) == ""
     world.until(State.CHARGING, 10)
@@ -268,7 +269,7 @@ def test_a_battery_that_was_changed_meanwhile_begins_anew() -> None:
     world.battery_answers, world.volts = False, 0.0
     world.run(5)
     assert world.is_in(State.IDLE)
-    assert world.decision.reason == "no battery"
+    assert reason_of(world.decision) == "no battery"
     assert world.memory.session is None
     assert len([one for one in world.decisions if one.session is not None and one.session.result]) == 1
 
@@ -293,7 +294,7 @@ def test_a_start_ends_no_charge_that_a_restart_has_left_open() -> None:
     world.frozen.add("soc_pct")
     world.run(5)
     assert world.ask(Request.START) == ""
-    assert (world.state, world.decision.reason) == (State.IDLE, "a battery is there; its SOC is not known yet")
+    assert (world.state, reason_of(world.decision)) == (State.IDLE, "a battery is there; its SOC is not known yet")
     world.ask(Request.STOP)
     assert world.is_in(State.HELD)
     session = world.memory.session
@@ -393,7 +394,7 @@ def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, 
             continue
         kept = after.faults[name]
         assert kept.latched is fault.latched
-        assert kept.text == (fault.text if fault.raised_s is not None else "")
+        assert kept.cause == (fault.cause if fault.raised_s is not None else None)
         for then, now in ((fault.raised_s, kept.raised_s), (fault.clean_s, kept.clean_s)):
             assert (then is None) is (now is None)
             if then is not None and now is not None:
@@ -438,10 +439,10 @@ def test_the_gist_changes_with_what_must_be_on_disk_and_not_with_time() -> None:
 
 
 def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
-    kept = Persisted(faults={"of_tomorrow": PersistedFault("something", latched=True, raised=1.0)})
+    kept = Persisted(faults={"of_tomorrow": PersistedFault(cause("something"), latched=True, raised=1.0)})
     memory = kept.memory(100.0)
     assert memory.faults == {}
-    assert memory.hold == "something"
+    assert memory.hold == cause("something")
 
 
 @pytest.mark.parametrize(
@@ -449,7 +450,7 @@ def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
 )
 def test_the_first_format_is_read(name: str, latched: bool, strikes: int) -> None:
     fault = from_first_format(name, "text")
-    assert (fault.text, fault.latched, len(fault.strikes)) == ("text", latched, strikes)
+    assert (fault.cause, fault.latched, len(fault.strikes)) == (cause("text"), latched, strikes)
     memory = Persisted(faults={name: fault}).memory(100.0)
     assert memory.faults[name].latched is latched
     assert memory.faults[name].raised_s == 100.0

@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.model import ENERGISED, STOP, Action, Alarm, Operation, Request, State
 from tests.core.bays import IN, charging, full, idle, qualifying, running_at_the_start, starting, stopping, suspended
+from tests.core.said import reason_of
 from tests.core.world import TICK_S, World
 
 #: Where a bay may rest with a charger that was verified.
@@ -151,7 +152,7 @@ def test_the_evidence_says_why_the_stop_is_not_confirmed() -> None:
         world = charging()
         spoil(world)
         world.ask(Request.STOP)
-        reason = world.until(State.UNCONTROLLABLE).reason
+        reason = reason_of(world.until(State.UNCONTROLLABLE))
         assert reason == (f"CUT THE MAINS of this charger (/dev/ttyX) now: {words}")
 
 
@@ -188,14 +189,14 @@ def test_nothing_begins_before_the_line_is_back_and_a_stop_is_verified_on_it() -
     world = qualifying()
     world.charger_answers = world.writes = False
     world.until(State.OFFLINE)
-    assert "/dev/ttyX: no answer" in world.decision.reason
+    assert "/dev/ttyX: no answer" in reason_of(world.decision)
     world.values["temperature_c"] = 60.0  # a latch, meanwhile, does not leave OFFLINE: nothing is verified
     world.run(10)
     assert world.is_in(State.OFFLINE)
     world.charger_answers = True
     world.run(10)
     assert world.is_in(State.OFFLINE)
-    assert world.decision.reason == "the charger is being stopped before anything else"
+    assert reason_of(world.decision) == "the charger is being stopped before anything else"
     world.writes = True
     world.until(State.TRIPPED, 1.0)
 
@@ -232,7 +233,7 @@ def test_a_charger_that_is_not_there_is_no_alarm() -> None:
     assert world.is_in(State.STARTING)
     world.tick()
     assert world.is_in(State.OFFLINE)
-    assert world.decision.reason == "/dev/ttyX: no answer"
+    assert reason_of(world.decision) == "/dev/ttyX: no answer"
 
 
 def test_a_charger_that_is_found_late_has_its_time_to_stop() -> None:

@@ -26,6 +26,7 @@ from orchestrator.model import (
 from orchestrator.sim.pack import Pack
 from tests.core.bays import charging, pulse
 from tests.core.fault_scenes import SCENES, Scene
+from tests.core.said import reason_of
 from tests.core.site import Site
 from tests.core.world import World, bay
 
@@ -254,7 +255,7 @@ def test_automatic_mode_needs_a_resume_and_nothing_else() -> None:
     assert world.charger.running
     assert world.decision.setpoint == Setpoint(run=True)
     assert world.decision.step is None
-    assert world.decision.reason == "the charger charges by itself (automatic mode)"
+    assert reason_of(world.decision) == "the charger charges by itself (automatic mode)"
 
 
 def test_automatic_mode_leaves_precharge_to_the_charger() -> None:

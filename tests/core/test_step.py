@@ -40,6 +40,7 @@ from orchestrator.model import (
 )
 from tests.core.bays import IN, charging
 from tests.core.fault_scenes import SCENES
+from tests.core.said import reason_of
 from tests.core.world import World, bay
 
 NEEDED = ("voltage_v", "current_a", "status", "temperature_c", "soc_pct", "soh_pct")
@@ -178,7 +179,7 @@ def fresh(snapshot: Snapshot, now_s: float) -> bool:
 def check(before: Memory, now_s: float, snapshot: Snapshot, decision: Decision, rules: Rules) -> None:
     state, command, shown = decision.state, decision.command, snapshot.charger
     assert (decision.alarm is Alarm.DANGER) is (state is State.UNCONTROLLABLE)
-    assert decision.reason
+    assert reason_of(decision)
     effects = [fault.effect for fault in decision.faults]
     assert effects == sorted(effects, reverse=True)
     if state not in ENERGISED:

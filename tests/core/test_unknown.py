@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.model import ENERGISED, STOP, BatteryReading, Measurement, Request, Snapshot, State
 from tests.core.bays import charging, idle, qualifying
+from tests.core.said import reason_of
 from tests.core.world import TICK_S, World
 
 NEEDED = ("voltage_v", "current_a", "status", "temperature_c", "soc_pct", "soh_pct")
@@ -133,7 +134,7 @@ def test_a_start_takes_two_seconds_of_everything() -> None:
     world.run(1)
     world.values["soh_pct"] = None
     world.tick()
-    assert world.decision.reason == "waiting for fresh values: SOH"
+    assert reason_of(world.decision) == "waiting for fresh values: SOH"
     world.values["soh_pct"] = 100.0
     world.run(2)
     assert world.is_in(State.QUALIFYING)
@@ -144,7 +145,7 @@ def test_a_start_takes_two_seconds_of_everything() -> None:
 def test_what_is_waited_for_is_named() -> None:
     world = qualifying()
     world.port_hangs = True
-    reasons = {world.tick().reason for _ in range(5)}
+    reasons = {reason_of(world.tick()) for _ in range(5)}
     assert reasons == {"checking charger and battery before a charge"}
 
 
@@ -154,7 +155,7 @@ def test_the_soc_is_waited_for(unknown: float | None) -> None:
     world.values["soc_pct"] = unknown
     world.run(5)
     assert world.is_in(State.IDLE)
-    assert world.decision.reason == "a battery is there; its SOC is not known yet"
+    assert reason_of(world.decision) == "a battery is there; its SOC is not known yet"
 
 
 # --- a BMU that has just booted ---------------------------------------------------------------------------------------
@@ -198,7 +199,7 @@ def test_nobody_charges_by_what_was_said_before_the_boot() -> None:
     world.boot()
     world.tick()
     assert world.is_in(State.OFFLINE)
-    assert world.decision.reason == "48.0 V at the charger, but the BMU (node 0x10) has just booted"
+    assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 0x10) has just booted"
     world.run(1)
     assert not ENERGISED & {decision.state for decision in world.decisions}
     world.until(State.CHARGING, 10)

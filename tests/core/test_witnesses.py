@@ -15,6 +15,7 @@ from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargeMode, Measu
 from orchestrator.sim import chemistry
 from tests.core.bays import IN, POLICY, charging, idle, stopping
 from tests.core.edges import Edge
+from tests.core.said import reason_of, say
 from tests.core.world import TICK_S, World, bay, fitting_v
 
 AT_REST = {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING}
@@ -46,7 +47,7 @@ def test_a_charger_that_says_now_this_and_now_that_is_out_of_control(pattern: st
     # A single reply among others may be a stray measurement; the second of its kind is none.
     most_s = 4.0 if "11" in pattern + pattern[0] or len(pattern) < 3 else 4.0 + 2 * len(pattern) * TICK_S
     assert 3.0 <= world.now_s - stopped_s <= most_s
-    assert world.decision.reason.startswith("CUT THE MAINS of this charger (/dev/ttyX)")
+    assert reason_of(world.decision).startswith("CUT THE MAINS of this charger (/dev/ttyX)")
     for shown in cycle(pattern):  # and it stays so, as long as the charger does
         world.shows["operation"] = Operation(int(shown))
         world.tick()
@@ -92,7 +93,7 @@ def test_out_of_control_is_left_only_by_a_standby_of_ten_seconds_without_a_break
     world.deaf.clear()
     world.run(LASTS_S)
     assert world.is_in(State.UNCONTROLLABLE)
-    assert "unless it stays off: it has stood by for" in world.decision.reason
+    assert "unless it stays off: it has stood by for" in reason_of(world.decision)
     world.shows["operation"] = Operation.RUNNING  # one reply
     world.tick()
     world.shows.clear()
@@ -126,7 +127,7 @@ def test_a_charger_that_denies_what_the_bmu_sees_is_out_of_control(state: State)
     assert {decision.state for decision in world.decisions[before:]} == {State.UNCONTROLLABLE}
     assert {decision.command for decision in world.decisions[before:]} == {STOP}
     assert not any(decision.closed for decision in world.decisions[before:])
-    assert world.decision.reason == (
+    assert reason_of(world.decision) == (
         "CUT THE MAINS of this charger (/dev/ttyX): it says 0.00 A, the BMU still sees 14.0 A; one of them is wrong. "
         "If the BMU shows it with the mains off too, restart the BMU"
     )
@@ -236,7 +237,7 @@ def test_the_first_amperes_must_show_on_the_bays_own_bmu(moves: str) -> None:
     world.ours = {"moves": moves}
     world.until(State.CHARGING)
     world.until(State.STOPPING, 8.0)
-    reason = world.decision.reason
+    reason = reason_of(world.decision)
     if moves:
         assert reason.startswith("the charger of bay-1 moves the BMU of bay-2: it has begun with 14.00 A")
     assert "sees 0.00 A of it" in reason
@@ -273,9 +274,9 @@ def test_a_load_in_the_vehicle_does_not_hide_the_first_amperes() -> None:
 
 
 def said(policy: Policy, volts: float, soc_pct: float, state: State = State.IDLE) -> str | None:
-    return packs.another_pack(
-        Edge(packs.another_pack, None, state=state, policy=policy, bmu={"voltage_v": volts, "soc_pct": soc_pct}).facts
-    )
+    bmu: dict[str, float | None] = {"voltage_v": volts, "soc_pct": soc_pct}
+    cause = packs.another_pack(Edge(packs.another_pack, None, state=state, policy=policy, bmu=bmu).facts)
+    return say(cause) if cause is not None else None
 
 
 OTHERS: tuple[tuple[str, str, float, float, str], ...] = (
@@ -348,7 +349,7 @@ def test_a_pack_that_is_refused_is_charged_neither_before_nor_after_somebody_say
         world.run(60)
         assert world.ask(Request.START).startswith("nothing to start: SUSPENDED: the pack has 36.00 V at SOC 90 %")
     assert not any(decision.state in ENERGISED for decision in world.decisions)
-    assert "36.00 V at SOC 90 %: with 13 NMC/NCA cells" in world.decision.reason
+    assert "36.00 V at SOC 90 %: with 13 NMC/NCA cells" in reason_of(world.decision)
 
 
 def test_a_soc_that_is_corrected_in_mid_charge_ends_it_without_a_latch() -> None:
@@ -469,15 +470,15 @@ def test_a_bmu_that_stands_still_is_found_by_what_goes_in() -> None:
     world = charging()
     world.counts = False
     world.until(State.STOPPING, 300.0)
-    assert "the BMU has said the same in every word for" in world.decision.reason
-    assert "Ah went in" in world.decision.reason
+    assert "the BMU has said the same in every word for" in reason_of(world.decision)
+    assert "Ah went in" in reason_of(world.decision)
 
 
 def test_a_frozen_bmu_is_no_witness_of_the_current_that_it_goes_on_telling() -> None:
     world = charging()
     world.counts, world.pack_amps = False, 14.0
     world.until(State.STOPPING, 300.0)
-    assert "every word" in world.decision.reason
+    assert "every word" in reason_of(world.decision)
     world.run(60)
     assert world.is_in(State.SUSPENDED), "the charger stands by, and nobody else can tell"
     assert "bmu_frozen" in world.raised, "for as long as its words stand still"

@@ -35,6 +35,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.protocol.objects import ObjectMap
+from tests.core.said import say
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 #: A binary fraction, so that a limit can be hit exactly.
@@ -180,7 +181,7 @@ class World:
     @property
     def raised(self) -> dict[str, str]:
         """The faults in force: id and text."""
-        return {fault.id: fault.text for fault in self.decision.faults}
+        return {fault.id: say(fault.cause) for fault in self.decision.faults}
 
     @property
     def orders(self) -> list[Command | None]:
@@ -217,7 +218,7 @@ class World:
 
     def ask(self, request: Request) -> str:
         """What becomes of the request; "" is yes."""
-        return self.tick(request=request).answer
+        return say(self.tick(request=request).answer)
 
     def charging(self, state: State = State.CHARGING) -> "World":
         """Until the charger does all that it was told in `state`."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from orchestrator.core.faults import FAULTS, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.model import Effect
+from orchestrator.text.catalogue import advise
 from tests.docs.catalogue import CATALOGUE
 
 HEAD = """\
@@ -85,7 +86,8 @@ def rows_of(number: str) -> list[Row]:
 
 
 def _advice(row: Row) -> str:
-    return f"{row.advice}; once it has stopped: {row.at_rest}" if row.at_rest else row.advice
+    do = advise(row.id)
+    return f"{do}; once it has stopped: {advise(row.at_rest)}" if row.at_rest else do
 
 
 def _end(row: Row) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from orchestrator.config.shipped import shipped_names
 from orchestrator.core.faults import FAULTS
 from orchestrator.workbench.draw.diagram import diagram, mermaid
+from tests.docs import cause_page
 from tests.docs.catalogue import CATALOGUE
 from tests.docs.fault_page import page, rows_of
 
@@ -16,6 +17,11 @@ DOCS = ROOT / "docs"
 def test_the_page_of_faults_is_the_table() -> None:
     written = (DOCS / "faults.md").read_text(encoding="utf-8")
     assert written == page(), "python -m tests.docs.fault_page > docs/faults.md"
+
+
+def test_the_page_of_causes_is_the_catalogue() -> None:
+    written = (DOCS / "causes.md").read_text(encoding="utf-8")
+    assert written == cause_page.page(), "python -m tests.docs.cause_page > docs/causes.md"
 
 
 def test_the_picture_in_the_readme_is_the_machine() -> None:

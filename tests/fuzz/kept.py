@@ -5,10 +5,12 @@ import json
 from orchestrator.core.faults import ROW
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted, PersistedFault
+from orchestrator.model import Cause
 from orchestrator.service import reception
 from orchestrator.service.loading import FILE, FIRST_FILE, load
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.stateformat import Stamp, decode, encode
+from orchestrator.text.catalogue import say
 from tests.fuzz.control import TOKEN
 from tests.fuzz.target import Target, kind_of_word, scratch
 
@@ -29,14 +31,14 @@ def one(data: bytes) -> None:
         for place in PLACES:
             memory = found[place].memory(NOW_S)
             _is_no_free_start(found[place], memory)
-            shown = {"reason": memory.hold, "faults": [fault.text for fault in memory.faults.values()]}
+            shown = {"reason": say(memory.hold), "faults": [say(fault.cause) for fault in memory.faults.values()]}
             assert json.loads(reception.encode(shown)) == shown
         assert decode(encode(NOW, loaded.run, loaded.entries), NOW) == (loaded.run, list(loaded.entries))
 
 
 def _is_no_free_start(persisted: Persisted, memory: Memory) -> None:
     """What was latched or held is so again."""
-    assert type(memory.paused) is bool and isinstance(memory.hold, str)
+    assert type(memory.paused) is bool and isinstance(memory.hold, Cause | None)
     for name in persisted.faults:
         assert name in memory.faults if name in ROW else memory.hold
     assert not persisted.running or "found_running" in memory.faults
@@ -47,8 +49,14 @@ _FIRST = {
     "bay-2": {"running": False, "hold": "stopped", "paused": True, "faults": {}},
 }
 _ENTRIES = [
-    Entry(PLACES[0], Persisted(running=True, faults={"bmu_silent": PersistedFault("seen", raised=3.0)}), 3),
-    Entry(Place("bay-2", "/dev/ttyS9", "can0", 17), Persisted(hold="stopped", soc=(1.0, 50.0)), 4),
+    Entry(
+        PLACES[0],
+        Persisted(running=True, faults={"bmu_silent": PersistedFault(Cause.of("said", text="seen"), raised=3.0)}),
+        3,
+    ),
+    Entry(
+        Place("bay-2", "/dev/ttyS9", "can0", 17), Persisted(hold=Cause.of("said", text="stopped"), soc=(1.0, 50.0)), 4
+    ),
 ]
 _SECOND = encode(Stamp(1_790_000_000.0, 7.0, "that"), 4, _ENTRIES)
 

@@ -1,12 +1,12 @@
 """What a status must say, or must not: held against the plant, which the service knows by its witnesses only."""
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from orchestrator.show import CUT_THE_MAINS
 from orchestrator.sim.charger_frames import Kind
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.recording import read
@@ -21,7 +21,7 @@ UNHEARD_S = 6.0
 #: Who stands by with less than this is not full; with more than that it is not deeply discharged.
 FULL_SOC, DEEP_SOC = 0.86, 0.3
 #: What no status may say of a charger that has stood by for so long, and has said so.
-DISOBEYS, STOOD_S = re.compile("not obeyed|does not obey|still delivers"), 1.5
+DISOBEYS, STOOD_S = frozenset({"uncontrollable", "will_not_stop"}), 1.5
 LINE_FAULTS = frozenset({"line_taken_over", "line_changed"})
 #: The charges of a station begin this far apart.
 APART_S = 1.0
@@ -44,11 +44,12 @@ class Told:
 def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterator[Finding]:
     """What is wrong with what the status says of a bay."""
     now_s, told, shown = judge.time.now_s, charger.told, f"{bay['state']}: {bay['reason']}"
-    if bay["state"] == "UNCONTROLLABLE" and not bay["reason"].startswith("CUT THE MAINS"):
+    ids = set(_ids(bay["cause"]))
+    if bay["state"] == "UNCONTROLLABLE" and bay["cause"]["id"] not in CUT_THE_MAINS:
         yield "what to do", f"out of control is not told with what to do first: {bay['reason']!r}"
     if bay["state"] == "FULL" and charger.rig.bay.pack.soc < FULL_SOC and _honest(charger):
         yield "full", f"the pack has {charger.rig.bay.pack.soc:.0%}, and the status says {shown}"
-    if "deeply discharged" in shown and charger.rig.bay.pack.soc > DEEP_SOC and _honest(charger):
+    if "under_voltage" in ids and charger.rig.bay.pack.soc > DEEP_SOC and _honest(charger):
         yield "what it is", f"the pack has {charger.rig.bay.pack.soc:.0%}, and the status says {shown}"
     if judge.booted_s is None:
         return
@@ -71,10 +72,19 @@ def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterat
         yield "not told", f"another program has its port, nobody is alarmed, and the status says {shown}"
     if _runs_on(judge, charger) and now_s - judge.booted_s > UNHEARD_S and bay["alarm"] != "danger":
         yield "nobody is told", f"it runs since the last life, nobody is alarmed, and the status says {shown}"
-    if DISOBEYS.search(shown) and _stands(charger, now_s) and _says(charger):
+    if DISOBEYS & ids and _stands(charger, now_s) and _says(charger):
         yield "false words", f"it stands since {now_s - charger.stood_s:.1f} s and says so, and the status says {shown}"
     if any(fault["id"] == "internal" for fault in bay["faults"]):
         yield "exception", shown
+
+
+def _ids(cause: Any) -> Iterator[str]:
+    """The ids of a cause in the status and of those in it."""
+    if isinstance(cause, list):
+        yield from (id_ for one in cause for id_ in _ids(one))
+    elif isinstance(cause, dict):
+        yield cause["id"]
+        yield from (id_ for one in cause["params"].values() for id_ in _ids(one))
 
 
 def starts(judge: "Judge", charger: "Charger") -> Iterator[Finding]:

@@ -16,12 +16,13 @@ from unittest.mock import patch
 from orchestrator.config.load import load_policy
 from orchestrator.core import latches, safestop
 from orchestrator.core.faults import FAULTS, Row
-from orchestrator.model import STOP, Action, Alarm, ControlMode, Effect, Request, State
+from orchestrator.model import STOP, Action, Alarm, Cause, ControlMode, Effect, Request, State
 from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
 from orchestrator.service.bay import VERIFIED
 from orchestrator.sim.faults import FAULTS as INJECTIONS
 from orchestrator.sim.pack import Pack
 from orchestrator.sim.presets import PACKS
+from tests.core.said import reason_of
 from tests.proof.play import POLICIES
 from tests.proof.virtual_rig import ANSWER_S, Nature
 from tests.proof.virtual_service import World, station, world
@@ -166,8 +167,8 @@ class Run:
         """The fault table, with the cell's row under control."""
         row, check = self.cell.row, self.cell.row.check
 
-        def forced(f: Any) -> str | None:
-            return self.forced or check(f)
+        def forced(f: Any) -> Cause | None:
+            return Cause.of("said", text=self.forced) if self.forced else check(f)
 
         return tuple(replace(row, check=forced) if other.id == row.id else other for other in FAULTS)
 
@@ -263,7 +264,7 @@ class Run:
             )
             self.ended.word = "out of control, and said so" if uncontrolled else "stopped, verified"
             if not (uncontrolled or (decision.state in VERIFIED and not self.rig.bay.charger.running)):
-                self.wrong.append(f"{decision.state}: {decision.reason}")
+                self.wrong.append(f"{decision.state}: {reason_of(decision)}")
         if raised and cell.row.effect >= Effect.STOP:
             self._judge_stop()
         self.rig.inject(lambda rig: INJECTIONS["heal"].happen(rig, None))

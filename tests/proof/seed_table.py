@@ -694,9 +694,9 @@ WORDS: tuple[Seed, ...] = (
         "UNCONTROLLABLE does not begin with what to do",
         ("says standby", "cut off, then killed"),
         (
-            f"{CORE}course.py",
-            '    so_long = f"{f.now_s - since_s:.0f} s"\n',
-            "    return _why(f)\n",
+            f"{CORE}outofcontrol.py",
+            '    id_ = "uncontrollable" if _heard(f) and f.runs else "uncontrollable_unproved"\n',
+            "    return _witnesses(f)\n",
         ),
     ),
     scene(

@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core import course, faults, latches, persisted, step
+from orchestrator.core import course, faults, latches, outofcontrol, persisted, step
+from orchestrator.core.facts import Facts
 from orchestrator.lastresort import lastline
+from orchestrator.model import Cause
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.environment import play, smallest
 from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
@@ -85,7 +87,10 @@ def lets_others_run(patch: Patch) -> None:
 
 
 def blames(patch: Patch) -> None:
-    patch.setattr(course, "_out_of_control", lambda f: f"CUT THE MAINS: it has not obeyed the stop: {course._why(f)}")
+    def disobeys(f: Facts) -> Cause:
+        return Cause.of("uncontrollable", port="", since_s=3.0, why=outofcontrol._witnesses(f))
+
+    patch.setattr(course, "out_of_control", disobeys)
 
 
 #: The invariant → a bug that breaks it, and a variant that shows it, in which nothing is found without.

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import STOPPED
-from orchestrator.model import ControlMode, State
+from orchestrator.model import Cause, ControlMode, State
 from orchestrator.workbench.prove.explore import Place, Walk
 from orchestrator.workbench.prove.gist import Gist, gist, outline
 from orchestrator.workbench.prove.inputs import AT_WORK, StationInputs
@@ -31,7 +31,7 @@ def pause_behind_a_hold(memory: Memory) -> Memory | None:
 
 
 def hold_behind_a_latch(memory: Memory) -> Memory | None:
-    return replace(memory, hold="" if memory.hold else STOPPED) if latched(memory) else None
+    return replace(memory, hold=None if memory.hold else STOPPED) if latched(memory) else None
 
 
 def pause_behind_a_latch(memory: Memory) -> Memory | None:
@@ -52,7 +52,7 @@ def warning_at_rest(memory: Memory) -> Memory | None:
     """One that no input has anything to do with. A charge that begins with it is told apart again."""
     if memory.state in AT_WORK or "noisy_line" in memory.faults:
         return None
-    noisy = FaultMemory(raised_s=memory.last_s, clean_s=memory.last_s, text="changed")
+    noisy = FaultMemory(raised_s=memory.last_s, clean_s=memory.last_s, cause=Cause("noisy_line"))
     return replace(memory, faults={**memory.faults, "noisy_line": noisy})
 
 

@@ -17,7 +17,7 @@ from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
-from orchestrator.model import ChargeMode, Effect, Precharge, Request, State
+from orchestrator.model import Cause, ChargeMode, Effect, Precharge, Request, State
 from orchestrator.workbench.prove.endings import ENDINGS, reaches, settles
 from orchestrator.workbench.prove.exhaustive import here
 from orchestrator.workbench.prove.explore import Explorer
@@ -66,12 +66,12 @@ def trip_is_no_latch(patch: Patch) -> None:
 
 def stop_is_not_heard(patch: Patch) -> None:
     hear = operator.hear
-    patch.setattr(step_module, "hear", lambda m, asked, *more: "" if asked is Request.STOP else hear(m, asked, *more))
+    patch.setattr(step_module, "hear", lambda m, asked, *more: None if asked is Request.STOP else hear(m, asked, *more))
 
 
 def reset_starts(patch: Patch) -> None:
-    def reset(memory: Memory, now_s: float) -> str:
-        memory.hold = ""
+    def reset(memory: Memory, now_s: float) -> Cause | None:
+        memory.hold = None
         return operator._start(memory, now_s)
 
     hear = operator.hear
@@ -126,7 +126,7 @@ def absent_battery_is_waited_for(patch: Patch) -> None:
     stopping = course_module._stopping
     patch.setattr(
         course_module, "_stopping",
-        lambda f, faults: (None, f.memory.reason) if f.departed and f.state_s < 60 else stopping(f, faults),
+        lambda f, faults: (None, f.memory.cause) if f.departed and f.state_s < 60 else stopping(f, faults),
     )  # fmt: skip
 
 
@@ -153,8 +153,8 @@ def never_sure(patch: Patch) -> None:
 
 
 def no_tolerance(patch: Patch) -> None:
-    def differ(f: Facts) -> str | None:
-        return "not the same" if f.volts != f.pack_v else None
+    def differ(f: Facts) -> Cause | None:
+        return Cause("volts_disagree") if f.volts != f.pack_v else None
 
     rows = tuple(replace(row, check=differ) if row.id == "volts_disagree" else row for row in FAULTS)
     patch.setattr(latches, "FAULTS", rows)

@@ -34,6 +34,7 @@ from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.store import Store
+from orchestrator.text.catalogue import say
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 STEP_S = 0.2
@@ -180,4 +181,4 @@ class Bench:
         assert not asked.done.is_set()
         self.step()
         assert asked.done.is_set()
-        return asked.answer
+        return say(asked.answer)

@@ -12,8 +12,10 @@ from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.model import STOP, Decision, Request, Snapshot, State
+from orchestrator.model.cause import from_plain
 from orchestrator.service import bay as bay_module
 from orchestrator.service.asked import Asked
+from orchestrator.text.catalogue import say
 from tests.service.bench import STEP_S, Bench
 
 HELD = "stopped by the operator"
@@ -57,7 +59,7 @@ def test_requests_are_answered_one_a_step_in_their_order(bench: Bench) -> None:
     bench.step()
     assert (stop.done.is_set(), pause.done.is_set()) == (True, False)
     bench.step()
-    assert (stop.answer, pause.answer) == ("", f"not running: {HELD}")
+    assert (say(stop.answer), say(pause.answer)) == ("", f"not running: {HELD}")
 
 
 def test_a_stop_waits_for_nothing_and_what_it_overtook_is_refused(bench: Bench) -> None:
@@ -69,10 +71,10 @@ def test_a_stop_waits_for_nothing_and_what_it_overtook_is_refused(bench: Bench) 
         bench.bay.ask(one)
     bench.step()
     assert [one.done.is_set() for one in (*early, *stops, late)] == [True] * 8 + [False]
-    assert {one.answer for one in early} == {"a stop came meanwhile: ask again if it is still wanted"}
-    assert {one.answer for one in stops} == {""}
+    assert {say(one.answer) for one in early} == {"a stop came meanwhile: ask again if it is still wanted"}
+    assert {one.answer for one in stops} == {None}
     bench.step()
-    assert late.answer == "not running: stopped by the operator"
+    assert say(late.answer) == "not running: stopped by the operator"
 
 
 def test_every_change_of_state_is_said_once(bench: Bench) -> None:
@@ -117,7 +119,7 @@ def test_an_exception_of_our_own_stops_the_bay_latches_and_is_told(
 def kept(bench: Bench) -> tuple[bool, str, bool]:
     """What the disk has of the bay: running, hold, paused."""
     (entry,) = json.loads(bench.store.path.read_text(encoding="utf-8"))["entries"]
-    return entry["running"], entry["hold"], entry["paused"]
+    return entry["running"], say(from_plain(entry["hold"])) if entry["hold"] else "", entry["paused"]
 
 
 def test_what_must_outlive_it_is_kept_whenever_it_changes(bench: Bench) -> None:
@@ -142,7 +144,7 @@ def test_a_request_is_answered_when_its_effect_is_on_the_disk(bench: Bench) -> N
     bench.store.turn()
     bench.disk = True
     bench.step()
-    assert (stop.done.is_set(), stop.answer) == (True, "")
+    assert (stop.done.is_set(), stop.answer) == (True, None)
     assert kept(bench)[1] == HELD
 
 
@@ -153,7 +155,7 @@ def test_a_request_that_no_disk_takes_is_answered_with_that(bench: Bench) -> Non
     bench.bay.ask(stop)
     bench.step(12)
     assert stop.done.is_set()
-    assert stop.answer.startswith("done, but not kept: a restart would forget what changes: ")
+    assert say(stop.answer).startswith("done, but not kept: a restart would forget what changes: ")
     assert bench.charger.reading.current_a == 0
 
 
@@ -165,11 +167,11 @@ def test_a_start_that_no_disk_takes_is_answered_no_and_starts_nothing_later(benc
     bench.bay.ask(start)
     bench.step(12)
     assert start.done.is_set()
-    assert start.answer.startswith("not done: a restart would forget what changes: ")
+    assert say(start.answer).startswith("not done: a restart would forget what changes: ")
     again = Asked(Request.START)
     bench.bay.ask(again)
     bench.step()
-    assert again.answer.startswith("not done: a restart would forget what changes: ")
+    assert say(again.answer).startswith("not done: a restart would forget what changes: ")
     bench.disk = True
     assert bench.step(100) is State.HELD, "the disk is well again, and nobody has started it since"
     assert kept(bench)[1] == HELD
@@ -183,7 +185,7 @@ def test_a_refusal_waits_for_no_disk(bench: Bench) -> None:
     pause = Asked(Request.PAUSE)
     bench.bay.ask(pause)
     bench.step()
-    assert (pause.done.is_set(), pause.answer) == (True, f"not running: {HELD}")
+    assert (pause.done.is_set(), say(pause.answer)) == (True, f"not running: {HELD}")
 
 
 def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 """What a bay makes of what was written down: its own past, another's, none."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,17 +10,20 @@ from hypothesis import strategies as st
 
 from orchestrator.config.station import Rs485
 from orchestrator.core.faults import FAULTS, Clear, Row
+from orchestrator.core.operator import STOPPED
 from orchestrator.core.persisted import Persisted, PersistedFault
-from orchestrator.model import ControlMode, Session
+from orchestrator.model import Cause, ControlMode, Session
 from orchestrator.service.past import Entry, Place, past_of, settled
 from orchestrator.service.stateformat import NEVER_SET_S, Stamp, decode, encode
+from orchestrator.text.catalogue import say
+from tests.core.said import cause
 from tests.service.bench import the_bay
 
 A = Place("bay-1", "/dev/a", "can0", 16)
 B = Place("bay-2", "/dev/b", "can0", 17)
-TRIPPED = Persisted(faults={"emergency": PersistedFault("EMCY 0x5000", latched=True, raised=60.0)})
+TRIPPED = Persisted(faults={"emergency": PersistedFault(cause("EMCY 0x5000"), latched=True, raised=60.0)})
 RUNNING = Persisted(running=True)
-HELD = Persisted(hold="stopped by the operator")
+HELD = Persisted(hold=STOPPED)
 FILE = "persisted.json"
 
 
@@ -38,7 +42,7 @@ def test_its_own_past_is_taken_as_it_is() -> None:
 
 def test_a_bay_that_nobody_knows_is_held() -> None:
     past = past_of(Place("bay-3", "/dev/c", "can0", 18), [Entry(A, TRIPPED, 3)], FILE)
-    assert past == Persisted(hold=f"bay-3 on /dev/c is not in {FILE}: nobody knows its past")
+    assert past == Persisted(hold=Cause.of("past_unknown", bay="bay-3", port="/dev/c", file=FILE))
 
 
 LAST = "when this service last ran, and"
@@ -64,7 +68,7 @@ MOVED = {
 def test_who_was_moved_is_held_with_all_that_was(name: str) -> None:
     place, said = MOVED[name]
     past = past_of(place, [Entry(A, replace(TRIPPED, running=True, paused=True), 3), Entry(B, HELD, 3)], FILE)
-    assert past.hold == f"{said}: see what is wired where"
+    assert say(past.hold) == f"{said}: see what is wired where"
     assert (past.running, past.paused, past.faults) == (True, True, TRIPPED.faults)
 
 
@@ -74,8 +78,8 @@ def test_two_bays_that_changed_places_have_the_pasts_of_both() -> None:
         past = past_of(place, entries, FILE)
         assert past.faults == TRIPPED.faults
         assert past.running
-        assert "was on /dev/" in past.hold
-        assert "stopped by the operator" in past.hold
+        assert "was on /dev/" in say(past.hold)
+        assert "stopped by the operator" in say(past.hold)
 
 
 def test_a_port_under_another_name_is_the_same_port(tmp_path: Path) -> None:
@@ -93,7 +97,7 @@ def run(entries: list[Entry], number: int, *places: Place) -> list[Entry]:
     """One run of the service, in which nothing happens; a person lets everything go on."""
     pasts = {place: past_of(place, entries, FILE) for place in places}
     return [
-        replace(entry, persisted=replace(entry.persisted, hold="")) if entry.place in pasts else entry
+        replace(entry, persisted=replace(entry.persisted, hold=None)) if entry.place in pasts else entry
         for entry in settled(places, pasts, entries, number)
     ]
 
@@ -109,8 +113,8 @@ def test_a_bay_that_was_absent_for_some_runs_is_as_it_was() -> None:
 def test_who_was_moved_is_asked_for_once() -> None:
     moved = replace(A, port="/dev/c")
     entries = run([Entry(A, Persisted(), 1)], 2, moved)
-    assert past_of(moved, entries, FILE).hold == ""
-    assert past_of(A, entries, FILE).hold != "", "and once more on its way back"
+    assert past_of(moved, entries, FILE).hold is None
+    assert past_of(A, entries, FILE).hold is not None, "and once more on its way back"
 
 
 def test_a_port_that_comes_back_elsewhere_brings_its_faults() -> None:
@@ -137,26 +141,26 @@ def test_the_first_format_knew_names_only() -> None:
     first = Entry(Place("bay-1"), TRIPPED, 1)
     assert past_of(A, [first], FILE) == TRIPPED
     assert [entry.place for entry in run([first], 2, A)] == [A]
-    assert past_of(B, [first], FILE).hold != ""
+    assert past_of(B, [first], FILE).hold is not None
 
 
 def test_an_older_version_that_ran_in_between_makes_a_person_look() -> None:
     past = past_of(A, [Entry(A, HELD, 4), Entry(Place("bay-1"), TRIPPED, 5)], FILE)
     assert past.faults == TRIPPED.faults
-    assert past.hold.startswith("an older version of this service has run bay-1 in the meantime: ")
+    assert say(past.hold).startswith("an older version of this service has run bay-1 in the meantime: ")
 
 
 def test_of_two_pasts_the_stricter_counts() -> None:
-    seen = PersistedFault("once", raised=9.0, clean=5.0, strikes=(9.0,))
+    seen = PersistedFault(cause("once"), raised=9.0, clean=5.0, strikes=(9.0,))
     one = Persisted(
         faults={"bmu_silent": seen}, session=Session(3.0, charged_ah=2.0), resets=((5.0, "a"),), full_pct=99.0
     )
     other = Persisted(
-        faults={"bmu_silent": replace(seen, text="often", latched=True, clean=None, strikes=(9.0, 5.0))},
+        faults={"bmu_silent": replace(seen, cause=cause("often"), latched=True, clean=None, strikes=(9.0, 5.0))},
         session=Session(3.0, charged_ah=5.0), resets=((5.0, "a"), (7.0, "b")), full_pct=90.0, soc=(4.0, 50.0),
     )  # fmt: skip
     past = past_of(replace(A, bay="bay-2", port="/dev/b"), [Entry(A, one, 1), Entry(B, other, 1)], FILE)
-    assert past.faults == {"bmu_silent": PersistedFault("often", latched=True, raised=9.0, strikes=(9.0, 5.0))}
+    assert past.faults == {"bmu_silent": PersistedFault(cause("often"), latched=True, raised=9.0, strikes=(9.0, 5.0))}
     assert past.session == other.session
     assert past.resets == ((7.0, "b"), (5.0, "a"))
     assert (past.full_pct, past.soc) == (90.0, (4.0, 50.0))
@@ -164,17 +168,38 @@ def test_of_two_pasts_the_stricter_counts() -> None:
 
 # --- the file ---------------------------------------------------------------------------------------------------------
 
+
+def _values(params: tuple[tuple[str, object], ...]) -> tuple[object, ...]:
+    return tuple(value for _, value in params)
+
+
 figure = st.floats(-1e6, 1e6)
+value = st.none() | st.booleans() | st.integers(-9, 9) | figure | st.text(max_size=8)
+causes = st.none() | st.builds(
+    Cause,
+    st.text(min_size=1, max_size=8),
+    st.recursive(
+        st.lists(st.tuples(st.text(max_size=8), value), max_size=3).map(tuple),
+        lambda params: st.lists(
+            st.tuples(st.text(max_size=8), value | st.builds(Cause, st.just("inner"), params) | params.map(_values)),
+            max_size=2,
+        ).map(tuple),
+        max_leaves=3,
+    ),
+    st.text(max_size=8),
+    st.text(max_size=8),
+    st.text(max_size=8),
+)
 past = st.builds(
     Persisted,
     running=st.booleans(),
-    hold=st.text(max_size=8),
+    hold=causes,
     paused=st.booleans(),
     faults=st.dictionaries(
         st.text(max_size=8),
         st.builds(
             PersistedFault,
-            text=st.text(max_size=8),
+            cause=causes,
             latched=st.booleans(),
             raised=st.none() | figure,
             clean=st.none() | figure,
@@ -184,7 +209,7 @@ past = st.builds(
     ),
     resets=st.lists(st.tuples(figure, st.text(max_size=8)), max_size=3).map(tuple),
     session=st.none()
-    | st.builds(Session, figure, figure, charged_ah=figure, soc_pct=st.none() | figure, result=st.text()),
+    | st.builds(Session, figure, figure, charged_ah=figure, soc_pct=st.none() | figure, result=causes),
     full_pct=st.none() | figure,
     soc=st.none() | st.tuples(figure, figure),
 )
@@ -242,6 +267,27 @@ def test_a_clock_that_tells_nonsense_is_not_asked(wall_s: float) -> None:
 @pytest.mark.parametrize("row", [row for row in FAULTS if row.clear is Clear.RESET], ids=lambda row: row.id)
 def test_what_has_latched_stays_so(row: Row) -> None:
     name = row.id
-    entries = [Entry(A, Persisted(faults={name: PersistedFault("seen", latched=True, raised=1.0)}), 1)]
+    entries = [Entry(A, Persisted(faults={name: PersistedFault(cause("seen"), latched=True, raised=1.0)}), 1)]
     (entry,) = decode(encode(NOW, 1, entries), NOW)[1]
     assert entry.persisted.memory(900.0).faults[name].latched
+
+
+def test_the_second_format_is_read_and_its_sentences_are_kept() -> None:
+    entry = {
+        "bay": "bay-1", "port": "/dev/a", "can": "can0", "node_id": 16, "control": "manual", "rs485": "off", "run": 3,
+        "running": False, "hold": "stopped by the operator; start to go on", "paused": False,
+        "faults": {"emergency": {"text": "EMCY 0x5000", "latched": True, "raised": 60.0, "clean": None, "strikes": []},
+                   "late": {"text": "", "latched": False, "raised": None, "clean": None, "strikes": [1.0]}},
+        "resets": [], "session": {"started_s": 1.0, "result": ""}, "full_pct": None, "soc": None,
+    }  # fmt: skip
+    document = {"format": 2, "written": NEVER_SET_S, "clock_s": 1.0, "boot": "", "run": 3, "entries": [entry]}
+    run, (read,) = decode(json.dumps(document).encode(), Stamp(NEVER_SET_S, 1.0, ""))
+    assert (run, read.place) == (3, A)
+    assert read.persisted.hold == STOPPED
+    assert read.persisted.faults["emergency"] == TRIPPED.faults["emergency"]
+    assert read.persisted.faults["late"] == PersistedFault(strikes=(1.0,))
+    assert read.persisted.session == Session(1.0)
+    for wrong in ({"hold": None}, {"faults": {"late": {"text": 1}}}, {"session": {"started_s": 1.0, "result": 2}}):
+        document["entries"] = [{**entry, **wrong}]
+        with pytest.raises(ValueError, match="is no sentence"):
+            decode(json.dumps(document).encode(), Stamp(NEVER_SET_S, 1.0, ""))

@@ -35,11 +35,19 @@ from orchestrator.model import (
 )
 from orchestrator.service.records import QUIET, WHOLE_EVERY, SnapshotRecorder, decision_lines
 from tests.core.bays import charging
+from tests.core.said import cause, reason_of
 from tests.service.bench import Bench, the_bay
 
 BAY = the_bay()
-IDLE = Decision(State.IDLE, "no battery")
-HOT = ActiveFault("hot_trip", Effect.TRIP, "the pack has 56.0 °C", 3.0)
+NO_BATTERY = cause("no battery")
+IDLE = Decision(State.IDLE, NO_BATTERY)
+HOT = ActiveFault("hot_trip", Effect.TRIP, cause("the pack has 56.0 °C"), 3.0)
+
+
+def both(text: str, name: str = "reason") -> dict[str, object]:
+    """The sentence and the cause of it."""
+    said = {"id": "said", "params": {"text": text}, "key": "", "place": "", "advice": ""}
+    return {name: text, "cause": said}
 
 
 def kinds(before: Decision | None, now: Decision) -> dict[str, Any]:
@@ -48,51 +56,41 @@ def kinds(before: Decision | None, now: Decision) -> dict[str, Any]:
 
 def test_the_first_decision_says_where_the_bay_begins() -> None:
     assert kinds(None, IDLE) == {
-        "transition": {"from": None, "to": "IDLE", "reason": "no battery"},
+        "transition": {"from": None, "to": "IDLE", **both("no battery")},
         "command": {"action": None},
-        "decision": {"state": "IDLE", "reason": "no battery", "step": None},
+        "decision": {"state": "IDLE", **both("no battery"), "step": None},
     }
 
 
 def test_nothing_new_says_nothing() -> None:
-    charging = Decision(State.CHARGING, "step 4", step=Step(4, 14.0, "rule"), session=Session(1.0))
-    longer = replace(charging, reason="step 4, a second later", session=Session(1.0, elapsed_s=1.0))
+    charging = Decision(State.CHARGING, cause("step 4"), step=Step(4, 14.0, cause("rule")), session=Session(1.0))
+    longer = replace(charging, cause=cause("step 4, a second later"), session=Session(1.0, elapsed_s=1.0))
     assert kinds(charging, longer) == {}
 
 
 def test_a_change_of_state_of_order_and_of_step() -> None:
-    stopping = Decision(State.STOPPING, "hot", STOP)
+    stopping = Decision(State.STOPPING, cause("hot"), STOP)
     assert kinds(IDLE, stopping) == {
-        "transition": {"from": "IDLE", "to": "STOPPING", "reason": "hot"},
+        "transition": {"from": "IDLE", "to": "STOPPING", **both("hot")},
         "command": {"action": "stop", "value": 0},
-        "decision": {"state": "STOPPING", "reason": "hot", "step": None},
+        "decision": {"state": "STOPPING", **both("hot"), "step": None},
     }
-    four = Decision(State.CHARGING, "a", Command(Action.SET_LIMIT, 4), step=Step(4, 14.0, "rule of four"))
-    three = replace(
-        four,
-        command=Command(Action.SET_LIMIT, 3),
-        step=Step(3, 11.0, "rule of three", "current.soc_pct.rows[1]", "p.yaml:7"),
-    )
+    four = Decision(State.CHARGING, cause("a"), Command(Action.SET_LIMIT, 4), step=Step(4, 14.0, cause("rule of four")))
+    three = replace(four, command=Command(Action.SET_LIMIT, 3), step=Step(3, 11.0, cause("rule of three")))
     assert kinds(four, three) == {
         "command": {"action": "set_limit", "value": 3},
         "decision": {
             "state": "CHARGING",
-            "reason": "a",
-            "step": {
-                "index": 3,
-                "current_a": 11.0,
-                "rule": "rule of three",
-                "key": "current.soc_pct.rows[1]",
-                "place": "p.yaml:7",
-            },
+            **both("a"),
+            "step": {"index": 3, "current_a": 11.0, **both("rule of three", "rule")},
         },
     }
 
 
 def test_a_fault_comes_gets_worse_and_goes() -> None:
-    warm = replace(HOT, effect=Effect.PAUSE, text="the pack has 46 °C")
-    hotter = replace(warm, text="the pack has 47 °C")
-    fields = {"id": "hot_trip", "event": "raised", "effect": "PAUSE", "text": "the pack has 46 °C"}
+    warm = replace(HOT, effect=Effect.PAUSE, cause=cause("the pack has 46 °C"))
+    hotter = replace(warm, cause=cause("the pack has 47 °C"))
+    fields = {"id": "hot_trip", "event": "raised", "effect": "PAUSE", **both("the pack has 46 °C", "text")}
     assert kinds(IDLE, replace(IDLE, faults=(warm,))) == {"fault": fields}
     assert kinds(replace(IDLE, faults=(warm,)), replace(IDLE, faults=(hotter,))) == {}
     assert kinds(replace(IDLE, faults=(warm,)), replace(IDLE, faults=(HOT,)))["fault"]["effect"] == "TRIP"
@@ -104,7 +102,7 @@ def test_a_session_begins_and_ends_once() -> None:
     assert kinds(IDLE, begun)["session"]["event"] == "begin"
     going = replace(IDLE, session=Session(1.0, elapsed_s=9.0))
     assert kinds(begun, going) == {}
-    ended = replace(IDLE, session=Session(1.0, elapsed_s=9.06, charged_ah=1.23456789, result="full"))
+    ended = replace(IDLE, session=Session(1.0, elapsed_s=9.06, charged_ah=1.23456789, result=cause("full")))
     assert kinds(going, ended)["session"] == {
         "event": "end",
         "elapsed_s": 9.1,
@@ -114,7 +112,7 @@ def test_a_session_begins_and_ends_once() -> None:
         "soc_start_pct": None,
         "soc_pct": None,
         "step_changes": 0,
-        "result": "full",
+        **both("full", "result"),
     }
     assert kinds(ended, IDLE) == {}
     assert kinds(ended, begun)["session"]["event"] == "begin"
@@ -234,7 +232,7 @@ def test_a_countdown_is_no_news() -> None:
     reasons = set()
     for _ in range(8):
         before = world.decision
-        reasons.add(world.run(1).reason)
+        reasons.add(reason_of(world.run(1)))
         assert list(decision_lines(before, world.decision)) == []
     assert len(reasons) == 8
     assert all("goes on by itself in" in reason for reason in reasons)

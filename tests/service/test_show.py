@@ -5,7 +5,9 @@ from typing import cast
 
 import pytest
 
+from orchestrator.model import Cause
 from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
+from orchestrator.text.catalogue import fields
 
 
 def bay(**changes: object) -> dict[str, object]:
@@ -46,12 +48,15 @@ def test_no_bays_is_only_the_head() -> None:
     assert table([]) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"
 
 
-def fault(text: str) -> Mapping[str, object]:
-    return {"id": "x", "effect": "WARN", "text": text, "since": 0.0}
+def fault(id_: str, text: str) -> Mapping[str, object]:
+    cause = {"id": id_, "key": "", "advice": id_, "params": {"what": None}}
+    return {"id": id_, "effect": "WARN", "text": text, "cause": cause, "since": 0.0}
 
 
 def test_a_fault_that_is_not_the_reason_stands_below() -> None:
-    told = bay(reason="stopped: too hot", faults=[fault("too hot"), fault("a noisy line")])
+    hot, noisy = fault("hot_trip", "too hot"), fault("noisy_line", "a noisy line")
+    cause = {"id": "several", "key": "", "advice": "", "params": {"whats": [hot["cause"]]}}
+    told = bay(reason="stopped: too hot", cause=cause, faults=[hot, noisy])
     assert table([told]).splitlines()[2:] == ["  WARN: a noisy line"]
 
 
@@ -113,10 +118,11 @@ def test_what_needs_a_person_comes_first() -> None:
 
 def test_what_needs_a_person_is_said_once() -> None:
     faults = [
-        {**fault("cut the charger's mains now – it still delivers 14.00 A"), "id": "will_not_stop", "effect": "TRIP"},
-        fault("a noisy line"),
+        {**fault("will_not_stop", "cut the charger's mains now – it still delivers 14.00 A"), "effect": "TRIP"},
+        fault("noisy_line", "a noisy line"),
     ]
-    text = table([bay(state="UNCONTROLLABLE", reason="CUT THE MAINS of this charger (/dev/x): it runs", faults=faults)])
+    reason = "CUT THE MAINS of this charger (/dev/x): it runs"
+    text = table([bay(state="UNCONTROLLABLE", reason=reason, cause={"id": "uncontrollable"}, faults=faults)])
     assert text.lower().count("mains") == 1
     assert text.splitlines()[2].endswith("  see ALARM")
     assert text.splitlines()[3:] == ["  WARN: a noisy line"]
@@ -189,7 +195,8 @@ def test_what_to_do_is_said_before_why(change: dict[str, object], first: str) ->
 
 
 def test_advice_that_the_reason_begins_with_is_not_said_twice() -> None:
-    told = bay(state="UNCONTROLLABLE", reason="CUT THE MAINS of this charger (/dev/x): it runs on")
+    reason = "CUT THE MAINS of this charger (/dev/x): it runs on"
+    told = bay(state="UNCONTROLLABLE", reason=reason, cause={"id": "uncontrollable"})
     assert what_to_do(told) == "bay-1: CUT THE MAINS of this charger (/dev/x): it runs on"
 
 
@@ -210,3 +217,17 @@ def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_w
     ]
     assert strays({}) == []
     assert page({"bays": [], "journal": {"problem": ""}}) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"
+
+
+def test_the_page_is_in_the_readers_language() -> None:
+    cause = fields(Cause.of("stopped_first"))
+    told = bay(state="OFFLINE", alarm="danger", cause=cause, reason="the charger is being stopped", port="/dev/x")
+    document = {"bays": [told], "strays": [{"bay": "bay-7", "port": "/dev/old", "problem": "", "state": "STOPPING",
+                                            "verified": False}]}  # fmt: skip
+    lines = page(document, "ko").splitlines()
+    assert lines[0].startswith("ALARM: bay-7의 것이었던 /dev/old의 충전기의 주전원을 차단하십시오")
+    assert lines[1] == (
+        "ALARM: bay-1의 충전기(/dev/x)의 주전원을 차단하십시오: OFFLINE: 다른 무엇보다 먼저 충전기를 정지하고 있습니다"
+    )
+    assert "the charger is being stopped" in page(document)
+    assert "the charger is being stopped before anything else" in page(document, "en")

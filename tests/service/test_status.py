@@ -9,11 +9,13 @@ import pytest
 from orchestrator.config.load import load_station
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S
+from orchestrator.core.memory import Memory
 from orchestrator.model import (
     ActiveFault,
     Alarm,
     BatteryLink,
     BatteryReading,
+    Cause,
     ChargeMode,
     ChargerLink,
     ChargerReading,
@@ -31,16 +33,24 @@ from orchestrator.model import (
     Step,
 )
 from orchestrator.service.status import bay_status, station_status
+from tests.core.said import cause
 
 READING = ChargerReading(
     1.0, 50.11, 13.9, ControlMode.MANUAL, Operation.RUNNING, 4, ChargeMode.CHARGE, Precharge.OFF, Connection.NORMAL
 )
 CHARGING = Decision(
     State.CHARGING,
-    "step 4",
+    cause("step 4"),
     setpoint=Setpoint(True, 4, ChargeMode.CHARGE, Precharge.OFF),
-    step=Step(4, 14.0, "limits.current_a"),
-    faults=(ActiveFault("noisy_line", Effect.WARN, "an error frame", since_s=90.0),),
+    step=Step(4, 14.0, cause("limits.current_a")),
+    faults=(
+        ActiveFault(
+            "noisy_line",
+            Effect.WARN,
+            Cause.of("noisy_line", bad_pct=9.4, limit_pct=5.0).with_("noisy_line", effect="WARN"),
+            since_s=90.0,
+        ),
+    ),
     session=Session(10.0, elapsed_s=90.0, charged_ah=0.5),
 )
 KNOWN = Snapshot(
@@ -58,7 +68,7 @@ def document(snapshot: Snapshot, decision: Decision) -> dict[str, Any]:
 
 
 def test_the_fixed_names_are_there_whatever_is_known() -> None:
-    for status in (document(Snapshot(), Decision(State.STARTING, "")), document(KNOWN, CHARGING)):
+    for status in (document(Snapshot(), Decision(State.STARTING, Memory().cause)), document(KNOWN, CHARGING)):
         assert {"name", "state", "reason", "step", "command", "charger", "battery", "faults", "session"} <= set(status)
         assert set(status["charger"]) >= {
             "online",
@@ -83,7 +93,7 @@ def test_the_fixed_names_are_there_whatever_is_known() -> None:
 
 
 def test_nothing_known_is_null() -> None:
-    status = document(Snapshot(), Decision(State.STARTING, "the service has just started"))
+    status = document(Snapshot(), Decision(State.STARTING, Memory().cause))
     for part, old in (("charger", False), ("battery", [])):
         known = {key: value for key, value in status[part].items() if key not in ("online", "problem")}
         assert known.pop("old") == old
@@ -134,7 +144,27 @@ def test_each_value_says_how_old_it_is_and_whether_it_still_counts(
 
 def test_since_is_the_wall_clock() -> None:
     (fault,) = document(KNOWN, CHARGING)["faults"]
-    assert fault == {"id": "noisy_line", "effect": "WARN", "text": "an error frame", "since": 990.0}
+    assert fault["since"] == 990.0
+
+
+def test_a_cause_is_data_and_a_sentence_in_the_stations_language() -> None:
+    (fault,) = document(KNOWN, CHARGING)["faults"]
+    text = "9 % of the last minute's exchanges with the charger went wrong, more than 5 %; check the cable, its shield "
+    text += "and its ground"
+    cause = {
+        "id": "noisy_line",
+        "params": {"bad_pct": 9.4, "limit_pct": 5.0, "effect": "WARN"},
+        "key": "",
+        "place": "",
+        "advice": "noisy_line",
+        "text": text,
+    }
+    assert fault == {"id": "noisy_line", "effect": "WARN", "cause": cause, "text": text, "since": 990.0}
+    status = document(KNOWN, CHARGING)
+    assert (status["reason"], status["cause"]["text"], status["cause"]["id"]) == ("step 4", "step 4", "said")
+    korean: dict[str, Any] = bay_status("bay-1", KNOWN, CHARGING, 100.0, 1000.0, "ko")
+    assert korean["faults"][0]["text"] != text
+    assert korean["faults"][0]["cause"]["params"] == cause["params"]
 
 
 def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:

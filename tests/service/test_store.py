@@ -7,25 +7,27 @@ import sys
 import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
 from orchestrator.core.faults import FAULTS, Clear
-from orchestrator.core.operator import OWN
+from orchestrator.core.operator import OWN, STOPPED
 from orchestrator.core.persisted import COUNTERS_S, Persisted, PersistedFault
 from orchestrator.errors import ServiceError
-from orchestrator.model import Session
+from orchestrator.model import Cause, Session
 from orchestrator.service.loading import FILE, FIRST_FILE
 from orchestrator.service.past import Place
 from orchestrator.service.store import KEPT_WITHIN_S, Store
+from orchestrator.text.catalogue import say
+from tests.core.said import cause
 from tests.service.disks import FULL, WornDisk
 from tests.waiting import wait_until
 
 A, B, C = (Place(f"bay-{number}", f"/dev/{number}", "can0", 15 + number) for number in (1, 2, 3))
-HELD = Persisted(hold="stopped by the operator")
-TRIPPED = Persisted(faults={"emergency": PersistedFault("EMCY 0x5000", latched=True, raised=1.0)})
+HELD = Persisted(hold=STOPPED)
+TRIPPED = Persisted(faults={"emergency": PersistedFault(cause("EMCY 0x5000"), latched=True, raised=1.0)})
 CALLS = ("open", "write", "fsync", "replace", "close")
 
 
@@ -55,6 +57,10 @@ def kept(store: Store, revision: int) -> None:
     wait_until(lambda: store.kept_revision >= revision, what="what is kept")
 
 
+def as_written(cause: Cause) -> object:
+    return json.loads(json.dumps(asdict(cause)))
+
+
 def entries(directory: Path) -> dict[str, dict[str, object]]:
     document = json.loads((directory / FILE).read_text(encoding="utf-8"))
     return {entry["bay"]: entry for entry in document["entries"]}
@@ -81,8 +87,8 @@ def test_at_first_there_is_nothing_and_it_is_written_at_once(tmp_path: Path) -> 
 def test_a_change_is_on_the_disk_when_its_revision_is_kept(tmp_path: Path) -> None:
     with running(tmp_path) as store:
         for number in range(20):
-            kept(store, store.put(A, Persisted(running=number % 2 == 0, hold=str(number))))
-            assert entries(tmp_path)["bay-1"]["hold"] == str(number)
+            kept(store, store.put(A, Persisted(running=number % 2 == 0, hold=cause(str(number)))))
+            assert entries(tmp_path)["bay-1"]["hold"] == as_written(cause(str(number)))
             on_disk = store.on_disk(A)
             assert on_disk is not None
             assert on_disk.running is (number % 2 == 0)
@@ -250,7 +256,7 @@ def test_a_directory_that_was_removed_is_made_and_owned_anew(tmp_path: Path) -> 
             path.unlink()
         directory.rmdir()
         kept(store, store.put(A, HELD))
-        assert entries(directory)["bay-1"]["hold"] == HELD.hold
+        assert entries(directory)["bay-1"]["hold"] == as_written(STOPPED)
         assert (directory / "lock").exists()
 
 
@@ -273,7 +279,7 @@ def test_no_bay_is_lost_before_all_have_made_their_first_step(tmp_path: Path) ->
     with running(tmp_path, A, B) as store:
         kept(store, store.put(A, Persisted()))
     found = entries(tmp_path)
-    assert found["bay-2"]["hold"] == HELD.hold
+    assert found["bay-2"]["hold"] == as_written(STOPPED)
     assert set(found["bay-3"]["faults"]) == {"emergency"}  # type: ignore[call-overload]  # a JSON document
 
 
@@ -282,14 +288,14 @@ def test_a_bay_that_was_away_for_a_day_is_as_it_was(tmp_path: Path) -> None:
     left(tmp_path, bay_2=Persisted())
     with running(tmp_path, A, B) as store:
         assert set(store.past(A).faults) == {"emergency"}
-        assert store.past(A).hold == ""
+        assert store.past(A).hold is None
 
 
 def test_a_bay_without_an_entry_is_held(tmp_path: Path) -> None:
     left(tmp_path, bay_1=Persisted())
     with running(tmp_path, A, B) as store:
-        assert store.past(A).hold == ""
-        assert store.past(B).hold.startswith(f"bay-2 on /dev/2 is not in {tmp_path / FILE}: ")
+        assert store.past(A).hold is None
+        assert say(store.past(B).hold).startswith(f"bay-2 on /dev/2 is not in {tmp_path / FILE}: ")
 
 
 def test_a_charger_on_a_port_that_nobody_has_is_in_hand_until_it_is_verified(tmp_path: Path) -> None:
@@ -308,26 +314,28 @@ def test_the_first_format_is_read_once_and_moved_away(tmp_path: Path) -> None:
     (tmp_path / FIRST_FILE).write_text(json.dumps({"bay-1": first}))
     with running(tmp_path, A, B) as store:
         past = store.past(A)
-        assert (past.paused, set(past.faults), past.hold) == (True, {latching, "overrun"}, "")
+        assert (past.paused, set(past.faults), past.hold) == (True, {latching, "overrun"}, None)
         assert past.faults[latching].latched
-        assert "nobody knows its past" in store.past(B).hold
+        assert "nobody knows its past" in say(store.past(B).hold)
         kept(store, 1)
         wait_until(lambda: not (tmp_path / FIRST_FILE).exists(), what="the old file goes")
     assert json.loads((tmp_path / f"{FIRST_FILE}.old-1").read_text()) == {"bay-1": first}
     with running(tmp_path, A, B) as store:
-        assert store.past(A).hold == ""
+        assert store.past(A).hold is None
 
 
 def test_a_hold_of_a_version_before_held_loses_the_end_that_said_what_to_do(tmp_path: Path) -> None:
     """The bay says it now; the rest is what the operator did, and no alarm."""
     with running(tmp_path, A) as store:
         kept(store, store.put(A, HELD))
-    path = tmp_path / FILE
-    path.write_text(path.read_text().replace(HELD.hold, f"{HELD.hold}; start to go on"))
+    path, said = tmp_path / FILE, "stopped by the operator; start to go on"
+    document = json.loads(path.read_text())
+    document["format"], document["entries"][0]["hold"] = 2, said
+    path.write_text(json.dumps(document))
     with running(tmp_path, A) as store:
         assert store.past(A).hold == HELD.hold in OWN
     path.unlink()
-    first = {"running": False, "hold": f"{HELD.hold}; start to go on", "paused": False, "faults": {}}
+    first = {"running": False, "hold": said, "paused": False, "faults": {}}
     (tmp_path / FIRST_FILE).write_text(json.dumps({"bay-1": first}))
     with running(tmp_path, A) as store:
         assert store.past(A).hold == HELD.hold
@@ -336,7 +344,7 @@ def test_a_hold_of_a_version_before_held_loses_the_end_that_said_what_to_do(tmp_
 def test_what_is_lost_is_no_first_start(tmp_path: Path) -> None:
     (tmp_path / "events.jsonl").write_text("{}\n")
     with running(tmp_path) as store:
-        assert store.past(A).hold == (
+        assert say(store.past(A).hold) == (
             f"{tmp_path / FILE} is lost, though this service has run here before: "
             "nobody knows which faults were latched"
         )
@@ -349,7 +357,7 @@ BROKEN = [
     '{"format": 2, "written": 1, "clock_s": 0, "boot": "", "run": 1, "entries": {}}',
 ]  # fmt: skip
 SPOILT = {
-    "running": 1, "hold": None, "paused": "no", "faults": [], "strange": 1, "resets": [[1]], "full_pct": "x",
+    "running": 1, "hold": "stopped", "paused": "no", "faults": [], "strange": 1, "resets": [[1]], "full_pct": "x",
     "soc": [1.0], "session": {"charged_ah": 1.0}, "node_id": True, "port": None, "control": "remote", "run": 1.5,
     "rs485": {}, "bay": "\ud800",
 }  # fmt: skip
@@ -360,12 +368,14 @@ def test_what_cannot_be_read_holds_every_bay_and_is_moved_aside(tmp_path: Path, 
     (tmp_path / FILE).write_bytes(text.encode(errors="surrogateescape"))
     with running(tmp_path) as store:
         for place in (A, B):
-            assert store.past(place).hold.startswith(f"{tmp_path / FILE} cannot be read (")
-            assert store.past(place).hold.encode(), "it can be shown and written"
+            assert say(store.past(place).hold).startswith(f"{tmp_path / FILE} cannot be read (")
+            assert say(store.past(place).hold).encode(), "it can be shown and written"
         kept(store, 1)
     assert (tmp_path / f"{FILE}.unread-1").read_bytes() == text.encode(errors="surrogateescape")
     with running(tmp_path) as store:
-        assert store.past(A).hold.startswith(f"{tmp_path / FILE} cannot be read ("), "for as long as nobody has started"
+        assert say(store.past(A).hold).startswith(f"{tmp_path / FILE} cannot be read ("), (
+            "for as long as nobody has started"
+        )
 
 
 @pytest.mark.parametrize("name", SPOILT)
@@ -375,14 +385,14 @@ def test_one_value_that_is_none_of_ours_spoils_the_file(tmp_path: Path, name: st
     document["entries"][0][name] = SPOILT[name]
     (tmp_path / FILE).write_text(json.dumps(document))
     with running(tmp_path, A) as store:
-        assert " cannot be read (" in store.past(A).hold
+        assert " cannot be read (" in say(store.past(A).hold)
 
 
 def test_one_that_is_nested_beyond_all_bounds_is_told_in_words(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text("[" * 100_000)
     with running(tmp_path, A) as store:
         said = f"{tmp_path / FILE} cannot be read (it is nested deeper than anything that this service writes): "
-        assert store.past(A).hold.startswith(said)
+        assert say(store.past(A).hold).startswith(said)
         kept(store, 1)
     assert (tmp_path / f"{FILE}.unread-1").exists()
 
@@ -392,7 +402,7 @@ def test_one_place_twice_is_no_file_of_ours(tmp_path: Path) -> None:
     document = json.loads((tmp_path / FILE).read_text())
     (tmp_path / FILE).write_text(json.dumps({**document, "entries": document["entries"] * 2}))
     with running(tmp_path, A) as store:
-        assert "one place is in it twice" in store.past(A).hold
+        assert "one place is in it twice" in say(store.past(A).hold)
 
 
 def test_what_is_no_file_holds_every_bay(tmp_path: Path) -> None:
@@ -401,7 +411,7 @@ def test_what_is_no_file_holds_every_bay(tmp_path: Path) -> None:
         directory.mkdir()
         make(directory / FILE)  # type: ignore[operator]  # each takes a path
         with running(directory) as store:
-            assert " cannot be read (" in store.past(A).hold
+            assert " cannot be read (" in say(store.past(A).hold)
             kept(store, 1)
             assert (directory / FILE).is_file()
 
@@ -416,7 +426,7 @@ def test_a_disk_that_does_not_tell_the_past_holds_every_bay_and_is_left_alone(
     store = Store(tmp_path, [A, B], time.monotonic, time.time)
     store.start()
     assert not store.wait(0.1)
-    assert store.past(A).hold.startswith(f"the disk of {tmp_path} does not answer: nobody knows")
+    assert say(store.past(A).hold).startswith(f"the disk of {tmp_path} does not answer: nobody knows")
     store.put(B, Persisted(running=True))
     assert "restart the service once it does" in store.unkept(time.monotonic())
     worn.heal()
@@ -431,6 +441,7 @@ import sys, time
 from pathlib import Path
 from orchestrator.service.past import Place
 from orchestrator.service.store import Store
+from tests.core.said import cause
 store = Store(Path(sys.argv[1]), [Place("bay-1", "/dev/1", "can0", 16)], time.monotonic, time.time)
 store.start()
 try:

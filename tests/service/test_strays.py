@@ -15,6 +15,7 @@ from orchestrator.model import STOP, ChargerLink, ChargerReading, Command, Contr
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.store import Store
 from orchestrator.service.strays import WATCHED_S, Strays
+from orchestrator.text.catalogue import say
 from tests.waiting import wait_until
 
 LOST = Place("bay-1", "/dev/lost", "can0", 16)
@@ -93,7 +94,7 @@ def test_two_replies_after_a_stop_verify_it_and_its_bay_stays_held(case: Case) -
     assert case.running
     assert case.sees(stopped_s=stop_s)
     assert not case.running
-    assert case.store.past(LOST).hold == ("the station file had no bay on /dev/lost while its charger was running")
+    assert say(case.store.past(LOST).hold) == ("the station file had no bay on /dev/lost while its charger was running")
 
 
 def test_the_same_reply_twice_is_one(case: Case) -> None:
@@ -140,7 +141,7 @@ def test_one_that_is_gone_for_good_is_dropped_when_a_person_says_so(case: Case) 
     what, revision = case.strays.drop("/dev/lost")
     assert what == "bay-1 on /dev/lost"
     assert (case.strays.unverified, case.strays.status(), case.running) == ([], [], False)
-    assert case.store.past(LOST).hold.startswith("the station file had no bay on /dev/lost")
+    assert say(case.store.past(LOST).hold).startswith("the station file had no bay on /dev/lost")
     assert revision == case.store._revision
     wait_until(lambda: case.port.closed, what="the port")
 

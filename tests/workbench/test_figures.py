@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Visit
-from orchestrator.model import State
+from orchestrator.model import Cause, State
 from orchestrator.workbench.simulate.compare import differences
 from orchestrator.workbench.simulate.figures import aligned, clock, clock_s, figures, table
 from orchestrator.workbench.simulate.simulation import Run, simulate
@@ -21,7 +21,7 @@ def moment(hours: float, state: State = State.CHARGING, volts: float = 50.0, cel
 
 
 def span(from_h: float, to_h: float, state: State, step: int | None = None, *faults: str) -> Span:
-    return Span(from_h * 3600, to_h * 3600, state, step, None, f"{state} for a reason", faults)
+    return Span(from_h * 3600, to_h * 3600, state, step, None, Cause(f"{state}"), faults)
 
 
 def run(moments: list[Moment], spans: list[Span], hours: float = 4.0, **changes: object) -> Run:
@@ -92,11 +92,13 @@ def test_clocks() -> None:
 
 
 def test_rules_are_gathered_whatever_was_measured() -> None:
-    def because(from_h: float, why: str, step: int) -> Span:
-        return Span(from_h * 3600, from_h * 3600 + 60, State.CHARGING, step, 5.0, why)
+    def because(from_h: float, cause: Cause, step: int) -> Span:
+        return Span(from_h * 3600, from_h * 3600 + 60, State.CHARGING, step, 5.0, cause)
 
-    cool, warm = "temperature {} °C in 15 … 35, p.yaml:37", "temperature {} °C in 35 … 40, p.yaml:38"
-    spans = [because(0, cool.format(34.9), 3), because(1, warm.format(35.0), 1), because(2, cool.format(34.8), 3)]
+    def by(row: int, pack_c: float) -> Cause:
+        return Cause.of("limit", key=f"current.temperature_c[{row}]", pack_c=pack_c)
+
+    spans = [because(0, by(3, 34.9), 3), because(1, by(4, 35.0), 1), because(2, by(3, 34.8), 3)]
     found = bounds(spans)
     assert [(one.number, len(one.spans), one.total_s) for one in found] == [(1, 2, 120.0), (2, 1, 60.0)]
 

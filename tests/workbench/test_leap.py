@@ -111,12 +111,14 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
     assert [t_s for t_s, _ in leapt.warmth] == [t_s for t_s, _ in ticked.warmth]
     assert [c for _, c in leapt.warmth] == pytest.approx([c for _, c in ticked.warmth], abs=0.1)
     assert (leapt.sample, leapt.counted_t_s, leapt.last_s) == (ticked.sample, ticked.counted_t_s, ticked.last_s)
-    assert outline(Decision(State.CHARGING, ""), leapt) == outline(Decision(State.CHARGING, ""), ticked)
+    assert outline(Decision(State.CHARGING, Memory().cause), leapt) == outline(
+        Decision(State.CHARGING, Memory().cause), ticked
+    )
 
 
 def test_an_outline_has_all_of_the_memory_that_is_no_measurement() -> None:
     """A field that is new in the memory must be told here or there."""
     told = {*EVENTFUL, *SUMS, *outline.__code__.co_names} & set(vars(Memory()))
-    measured = {"state", "reason", "faults", "session", "counted_t_s", "last_s", "resume_s", "order_s", "tries", "step",
+    measured = {"state", "cause", "faults", "session", "counted_t_s", "last_s", "resume_s", "order_s", "tries", "step",
                 "sample", "sample_before", "warmth", "limit_s", "charge", "peak", "still", "looked_s"}  # fmt: skip
     assert told | measured == set(vars(Memory()))

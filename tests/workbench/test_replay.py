@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +18,7 @@ from orchestrator.service.records import WHOLE_EVERY
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import Difference, compare, told
 from orchestrator.workbench.replay.recording import read
+from tests.core.said import reason_of
 from tests.service.bench import STEP_S, Bench
 
 
@@ -111,7 +113,7 @@ def test_a_policy_that_ends_earlier_parts_from_the_record(journal: Path, tmp_pat
     found = [one for one in differences(journal, earlier) if one.was.state is State.CHARGING and one.parted]
     (one,) = found
     assert one.now.state is State.STOPPING
-    assert "SOC 91 % reached 90 %" in one.now.reason
+    assert "SOC 91 % reached 90 %" in reason_of(one.now)
     assert one.ended_s - one.began_s > 10
     assert "would not have been charged" in list(told(one))[-1]
 
@@ -123,7 +125,7 @@ def test_a_policy_that_stops_for_cold_earlier_is_compared_anew_from_the_next_res
                             ("- {from: 0, to: 10, max_c: 0.05} ", "- {from: 9, to: 10, max_c: 0.05} "))  # fmt: skip
     found = differences(journal, colder)
     assert (found[0].was.state, found[0].now.state) == (State.CHARGING, State.STOPPING)
-    assert "the limit is 10 °C" in found[0].now.reason
+    assert "the limit is 10 °C" in reason_of(found[0].now)
     assert (found[1].was.state, found[1].now.state) == (State.QUALIFYING, State.SUSPENDED)
 
 
@@ -291,3 +293,23 @@ def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: py
     assert (
         "pipe.jsonl:1:1: error: cannot be read: this is a pipe (FIFO); expected is a journal" in capsys.readouterr().err
     )
+
+
+def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(journal: Path, tmp_path: Path) -> None:
+    (tmp_path / "journal").mkdir()
+    for path in journal.glob("*.jsonl"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        old = [json.dumps(_with_sentences(json.loads(line))) for line in lines]
+        (tmp_path / "journal" / path.name).write_text("\n".join(old) + "\n", encoding="utf-8")
+    record = read([tmp_path / "journal"])
+    assert record.bays == {}
+    assert {finding.text for finding in record.broken} == {
+        "an older version of this service has recorded this step: only that version can decide it again"
+    }
+
+
+def _with_sentences(line: dict[str, Any]) -> dict[str, Any]:
+    if line.get("whole"):
+        del line["memory"]["cause"]
+        line["memory"]["reason"] = "no battery"
+    return line

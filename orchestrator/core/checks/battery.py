@@ -2,7 +2,7 @@
 
 from orchestrator.core.facts import Facts
 from orchestrator.core.witnesses.pack import another_pack
-from orchestrator.model import BatteryStatus
+from orchestrator.model import BatteryStatus, Cause
 
 #: Hysteresis of the pauses for heat and for cold.
 HEAT_HYSTERESIS_K = 5.0
@@ -19,7 +19,7 @@ REFUSALS = frozenset({0x0601, 0x0602, 0x0604, 0x0606, 0x0607, 0x0609})
 NEWS_S = 10.0
 #: NMT states as a heartbeat tells them (CiA 301).
 OPERATIONAL = 0x05
-NMT_NAMES = {0x00: "boot-up", 0x04: "stopped", 0x7F: "pre-operational"}
+NMT_NAMES = {0x00: "boot_up", 0x04: "stopped", 0x7F: "pre_operational"}
 #: Bits that end a charge, and bits that make it gentle. Low voltage is what a deeply discharged pack reports.
 STATUS_TRIPS = (
     BatteryStatus.OVER_VOLTAGE,
@@ -30,31 +30,39 @@ STATUS_TRIPS = (
 STATUS_LIMITS = (BatteryStatus.LOW_TEMPERATURE, BatteryStatus.DISCHARGE_OVER_CURRENT)
 
 
-def bmu_silent(f: Facts) -> str | None:
+def bmu_silent(f: Facts) -> Cause | None:
     """FAULTS B1, B5, B19, B21: no values, or a line or a node of which the values cannot be trusted."""
     if (f.battery.online and not f.silent) or f.just_booted:
         return None
-    return f.battery.problem or f"the BMU (node 0x{f.rules.bay.battery.node_id:02X}) has stopped answering"
+    if f.battery.problem:
+        return Cause.of("bmu_problem", problem=f.battery.problem)
+    return Cause.of("bmu_silent", node_id=f.rules.bay.battery.node_id)
 
 
-def stale_reading(f: Facts) -> str | None:
+def stale_reading(f: Facts) -> Cause | None:
     """FAULTS B2: it answers, but not about everything that a charge needs."""
     if f.silent or f.present:
         return None
-    return f"no fresh {f.missing} from the BMU"
+    return Cause.of("stale_reading", missing=f.missing)
 
 
-def sdo_refused(f: Facts) -> str | None:
+def sdo_refused(f: Facts) -> Cause | None:
     """FAULTS B3: the object is not there, or not like this."""
-    return f.battery.abort if f.battery.abort and f.battery.abort_code >> 16 in REFUSALS else None
+    link = f.battery
+    return _abort("sdo_refused", f) if link.abort and link.abort_code >> 16 in REFUSALS else None
 
 
-def sdo_aborted(f: Facts) -> str | None:
+def sdo_aborted(f: Facts) -> Cause | None:
     """FAULTS B4: the BMU cannot answer now."""
-    return f.battery.abort if f.battery.abort and f.battery.abort_code >> 16 not in REFUSALS else None
+    link = f.battery
+    return _abort("sdo_aborted", f) if link.abort and link.abort_code >> 16 not in REFUSALS else None
 
 
-def heartbeat_lost(f: Facts) -> str | None:
+def _abort(id_: str, f: Facts) -> Cause:
+    return Cause.of(id_, problem=f.battery.abort, code=f.battery.abort_code)
+
+
+def heartbeat_lost(f: Facts) -> Cause | None:
     """FAULTS B6. A node that answers is alive, and a poor bus loses two heartbeats in a row several times a day."""
     link, volts = f.battery, f.snapshot.battery.voltage_v
     if link.heartbeat_s is None or link.heartbeat_t_s is None:
@@ -63,77 +71,75 @@ def heartbeat_lost(f: Facts) -> str | None:
     answered_s = volts.t_s if volts is not None else link.heartbeat_t_s
     silent = f.now_s - answered_s > SILENT_PERIODS * link.heartbeat_s
     allowed = SILENT_PERIODS if silent else ANSWERING_PERIODS
-    return f"no heartbeat of the BMU for {age_s:.1f} s" if age_s > allowed * link.heartbeat_s else None
+    return Cause.of("heartbeat_lost", age_s=age_s) if age_s > allowed * link.heartbeat_s else None
 
 
-def not_operational(f: Facts) -> str | None:
+def not_operational(f: Facts) -> Cause | None:
     """FAULTS B8: only heartbeats tell the state, and only TPDOs need it; SDO reads go on meanwhile."""
     link = f.battery
     if f.rules.bay.battery.tpdo_s is None or link.heartbeat_s is None or link.nmt_state in (None, OPERATIONAL):
         return None
-    name = NMT_NAMES.get(link.nmt_state, f"0x{link.nmt_state:02X}")
-    return f"the BMU's NMT state is {name}, not operational: it sends no TPDOs, and does not obey an NMT start"
+    return Cause.of("not_operational", nmt_state=NMT_NAMES.get(link.nmt_state, f"0x{link.nmt_state:02X}"))
 
 
-def bmu_rebooted(f: Facts) -> str | None:
+def bmu_rebooted(f: Facts) -> Cause | None:
     """FAULTS B7."""
-    return "the BMU has booted while charging: it must be qualified anew" if f.battery.boots != f.memory.boots else None
+    return Cause("bmu_rebooted") if f.battery.boots != f.memory.boots else None
 
 
-def status_trip(f: Facts) -> str | None:
+def status_trip(f: Facts) -> Cause | None:
     """FAULTS B9."""
-    return _status(f, STATUS_TRIPS)
+    return _status("status_trip", f, STATUS_TRIPS)
 
 
-def status_limit(f: Facts) -> str | None:
+def status_limit(f: Facts) -> Cause | None:
     """FAULTS B9, the mild bits."""
-    return _status(f, STATUS_LIMITS)
+    return _status("status_limit", f, STATUS_LIMITS)
 
 
-def _status(f: Facts, bits: tuple[BatteryStatus, ...]) -> str | None:
+def _status(id_: str, f: Facts, bits: tuple[BatteryStatus, ...]) -> Cause | None:
     if not f.status:
         return None
     word = int(f.status)
-    names = [bit.name.lower().replace("_", " ") for bit in bits if word >> bit & 1]
-    return f"the BMU reports {', '.join(names)} (status word 0x{word:04X})" if names else None
+    names = tuple(bit.name.lower() for bit in bits if word >> bit & 1)
+    return Cause.of(id_, bits=names, status=word) if names else None
 
 
-def emergency(f: Facts) -> str | None:
+def emergency(f: Facts) -> Cause | None:
     """FAULTS B9."""
-    return f.battery.emergency or None
+    return Cause.of("emergency", emergency=f.battery.emergency) if f.battery.emergency else None
 
 
-def over_temperature(f: Facts) -> str | None:
+def over_temperature(f: Facts) -> Cause | None:
     """FAULTS B10."""
     high = f.rules.temperature_c.high
     again = high - HEAT_HYSTERESIS_K
     if f.temperature_c is None or f.temperature_c < (again if "over_temperature" in f.raised else high):
         return None
-    limit = f"the limit is {high:g} °C ({f.rules.hottest_at})"
-    return f"the pack has {f.temperature_c:.1f} °C, {limit}; it charges again below {again:g} °C"
+    key, place = f.rules.hottest_at
+    return Cause.of("over_temperature", key=key, place=place, pack_c=f.temperature_c, limit_c=high, again_c=again)
 
 
-def hot_trip(f: Facts) -> str | None:
+def hot_trip(f: Facts) -> Cause | None:
     """FAULTS B10, where cooling down is not enough."""
     policy = f.rules.policy
     limit = policy.faults.temperature_trip_c
     if f.temperature_c is None or f.temperature_c < limit:
         return None
-    at = policy.source.at("faults.temperature_trip_c")
-    return f"the pack has {f.temperature_c:.1f} °C, at or above {limit:g} °C ({at})"
+    return f.rules.by_policy("hot_trip", "faults.temperature_trip_c", pack_c=f.temperature_c, limit_c=limit)
 
 
-def under_temperature(f: Facts) -> str | None:
+def under_temperature(f: Facts) -> Cause | None:
     """FAULTS B11."""
     low = f.rules.temperature_c.low
     again = low + COLD_HYSTERESIS_K
     if f.temperature_c is None or f.temperature_c >= (again if "under_temperature" in f.raised else low):
         return None
-    limit = f"the limit is {low:g} °C ({f.rules.coldest_at})"
-    return f"the pack has {f.temperature_c:.1f} °C, {limit}; it charges again at {again:g} °C"
+    key, place = f.rules.coldest_at
+    return Cause.of("under_temperature", key=key, place=place, pack_c=f.temperature_c, limit_c=low, again_c=again)
 
 
-def runaway(f: Facts) -> str | None:
+def runaway(f: Facts) -> Cause | None:
     """FAULTS B12."""
     if f.temperature_c is None or not f.memory.warmth:
         return None
@@ -143,64 +149,71 @@ def runaway(f: Facts) -> str | None:
         return None
     rate = (f.temperature_c - then_c) / lasted_s * 60
     limit = f.rules.policy.faults.temperature_rise_k_per_min
-    return f"the pack warms by {rate:.2f} K/min, more than {limit:g} K/min" if rate > limit else None
+    if rate <= limit:
+        return None
+    key = "faults.temperature_rise_k_per_min"
+    return f.rules.by_policy("runaway", key, rate_k_per_min=rate, limit_k_per_min=limit)
 
 
-def temperature_invalid(f: Facts) -> str | None:
+def temperature_invalid(f: Facts) -> Cause | None:
     """FAULTS B13."""
     if f.just_booted:
         return None
     wrong = f.battery.implausible.get("temperature_c")
     if wrong:
-        return wrong
+        return Cause.of("temperature_implausible", problem=wrong)
     if f.memory.sample is None or f.memory.sample_before is None:
         return None
     (before_s, before_c), (newest_s, newest_c) = f.memory.sample_before, f.memory.sample
     passed_s = newest_s - before_s
     if abs(newest_c - before_c) <= JUMP_K * max(passed_s, 1.0):
         return None
-    return f"the pack's temperature went from {before_c:.1f} to {newest_c:.1f} °C in {passed_s:.2f} s"
+    return Cause.of("temperature_jump", before_c=before_c, pack_c=newest_c, passed_s=passed_s)
 
 
-def implausible(f: Facts) -> str | None:
+def implausible(f: Facts) -> Cause | None:
     """FAULTS B14, B17: a value that cannot be."""
     if not f.battery.implausible or f.just_booted:
         return None
-    texts = [text for name, text in f.battery.implausible.items() if name != "temperature_c"]
-    return "; ".join(texts) or None
+    wrong = {name: text for name, text in f.battery.implausible.items() if name != "temperature_c"}
+    return Cause.of("implausible", fields=tuple(wrong), problems=tuple(wrong.values())) if wrong else None
 
 
-def under_voltage(f: Facts) -> str | None:
+def under_voltage(f: Facts) -> Cause | None:
     """FAULTS B14: below what may be woken."""
-    pack, source = f.rules.policy.pack, f.rules.policy.source
+    pack = f.rules.policy.pack
     if f.pack_v is None or f.pack_v >= pack.voltage_v.low or another_pack(f) is not None:
         return None
-    return f"the pack has {f.pack_v:.2f} V, below {pack.voltage_v.low:g} V ({source.at('pack.voltage_v')})"
+    return f.rules.by_policy("under_voltage", "pack.voltage_v", pack_v=f.pack_v, limit_v=pack.voltage_v.low)
 
 
-def needs_precharge(f: Facts) -> str | None:
+def needs_precharge(f: Facts) -> Cause | None:
     """A pack that the policy has no way to wake."""
     policy = f.rules.policy
     if policy.precharge is not None or f.status is None or not int(f.status) >> BatteryStatus.LOW_VOLTAGE & 1:
         return None
-    return "the BMU reports low voltage and the policy has no precharge"
+    return Cause("needs_precharge")
 
 
-def soh_low(f: Facts) -> str | None:
+def soh_low(f: Facts) -> Cause | None:
     """FAULTS B17."""
-    pack, source = f.rules.policy.pack, f.rules.policy.source
+    pack = f.rules.policy.pack
     if f.soh is None or f.soh >= pack.soh_min_pct:
         return None
-    return f"SOH {f.soh:.0f} %, below {pack.soh_min_pct:g} % ({source.at('pack.soh_min_pct')})"
+    return f.rules.by_policy("soh_low", "pack.soh_min_pct", soh_pct=f.soh, limit_pct=pack.soh_min_pct)
 
 
-def other_master(f: Facts) -> str | None:
+def other_master(f: Facts) -> Cause | None:
     """FAULTS B27: only said; what it does to the BMU shows elsewhere."""
     seen_s = f.battery.other_master_t_s
-    return f.battery.other_master if seen_s is not None and f.now_s - seen_s < NEWS_S else None
+    if seen_s is None or f.now_s - seen_s >= NEWS_S:
+        return None
+    return Cause.of("other_master", seen=f.battery.other_master)
 
 
-def heartbeat_set(f: Facts) -> str | None:
+def heartbeat_set(f: Facts) -> Cause | None:
     """FAULTS B28."""
     seen_s = f.battery.heartbeat_set_t_s
-    return f.battery.heartbeat_set if seen_s is not None and f.now_s - seen_s < NEWS_S else None
+    if seen_s is None or f.now_s - seen_s >= NEWS_S:
+        return None
+    return Cause.of("heartbeat_set", seen=f.battery.heartbeat_set)

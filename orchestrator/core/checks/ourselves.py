@@ -1,6 +1,7 @@
 """Faults of this service, and of the machine that it runs on."""
 
 from orchestrator.core.facts import Facts
+from orchestrator.model import Cause
 
 #: A bay is looked at every 0.2 s: two ticks late is said, five stop the charge. (A controller that hangs is killed by
 #: its guardian before; that much late is a machine that stood still with both.)
@@ -9,31 +10,33 @@ LATE_S, OVERRUN_S = 0.4, 1.0
 SUSPENDED_S = 2.0
 
 
-def internal(f: Facts) -> str | None:
+def internal(f: Facts) -> Cause | None:
     """FAULTS G5, P11."""
-    return "; ".join(filter(None, (f.snapshot.internal, *f.broken))) or None
+    said = Cause.of("internal_error", error=f.snapshot.internal)
+    whats = (said, *f.broken) if f.snapshot.internal else tuple(f.broken)
+    return Cause.of("internal", whats=whats) if whats else None
 
 
-def late(f: Facts) -> str | None:
+def late(f: Facts) -> Cause | None:
     """FAULTS G6."""
     late_s = f.snapshot.late_s
-    return f"this bay was looked at {late_s:.2f} s late" if late_s > LATE_S else None
+    return Cause.of("late", late_s=late_s) if late_s > LATE_S else None
 
 
-def overrun(f: Facts) -> str | None:
+def overrun(f: Facts) -> Cause | None:
     """FAULTS G6."""
     late_s = f.snapshot.late_s
-    return f"nobody looked at this bay for {late_s:.1f} s: the machine stood still" if late_s > OVERRUN_S else None
+    return Cause.of("overrun", late_s=late_s) if late_s > OVERRUN_S else None
 
 
-def suspended(f: Facts) -> str | None:
+def suspended(f: Facts) -> Cause | None:
     """FAULTS G7."""
     slept_s = f.snapshot.slept_s
     if slept_s <= SUSPENDED_S:
         return None
-    return f"the machine was suspended for {slept_s:.0f} s: nothing that is known of this bay holds any more"
+    return Cause.of("suspended", slept_s=slept_s)
 
 
-def unkept(f: Facts) -> str | None:
+def unkept(f: Facts) -> Cause | None:
     """FAULTS G8: a charge goes on, but none begins of which a latched fault would be forgotten by a restart."""
-    return f.snapshot.unkept or None
+    return Cause.of("unkept", problem=f.snapshot.unkept) if f.snapshot.unkept else None

@@ -4,6 +4,7 @@ Each of them alone may be a BMU that has corrected itself, so it only warns; two
 """
 
 from orchestrator.core.facts import TERMINAL_V, Facts
+from orchestrator.model import Cause
 
 #: From one reading to the next the SOC may take a step of this much, and what a tiny pack takes in each second.
 SOC_STEP_PCT, SOC_RATE_PCT_PER_S = 5.0, 1.0
@@ -22,21 +23,21 @@ LEAST_AH, LEAST_SOC_PCT, LEAST_A = 1.0, 10.0, 1.0
 DOUBTS = ("soc_jump", "soc_falls", "figures_disagree")
 
 
-def soc_jump(f: Facts) -> str | None:
+def soc_jump(f: Facts) -> Cause | None:
     """FAULTS B17."""
     step = f.memory.charge_step
     return step[1] if step is not None and f.now_s - step[0] < STEP_NEWS_S else None
 
 
-def soc_falls(f: Facts) -> str | None:
+def soc_falls(f: Facts) -> Cause | None:
     """FAULTS B17."""
     peak = f.memory.peak
     if peak is None or f.soc is None or f.now_s - peak[0] < FALLING_S or peak[1] - f.soc < FALLING_PCT:
         return None
-    return f"the SOC has fallen from {peak[1]:.0f} to {f.soc:.0f} % in {(f.now_s - peak[0]) / 60:.0f} min under charge"
+    return Cause.of("soc_falls", peak_pct=peak[1], soc_pct=f.soc, passed_min=(f.now_s - peak[0]) / 60)
 
 
-def figures_disagree(f: Facts) -> str | None:
+def figures_disagree(f: Facts) -> Cause | None:
     """FAULTS B17: remaining capacity, available energy, SOC and time to full of one pack, which hang together."""
     battery = f.snapshot.battery
     if battery.remaining_ah is None or f.soc is None or f.pack_v is None or f.pack_a is None:
@@ -46,32 +47,30 @@ def figures_disagree(f: Facts) -> str | None:
         return None
     wh = f.slow(battery.available_wh)
     if wh is not None and not 1 / ENERGY_FACTOR <= wh / (ah * f.pack_v) <= ENERGY_FACTOR:
-        return (
-            f"the BMU has {ah:.2f} Ah and {wh:.1f} Wh available: that is {wh / ah:.1f} V, the pack has {f.pack_v:.2f} V"
-        )
+        return Cause.of("energy_disagrees", remaining_ah=ah, available_wh=wh, implied_v=wh / ah, pack_v=f.pack_v)
     minutes = f.slow(battery.time_to_full_min)
     if minutes is None or f.soc < LEAST_SOC_PCT or f.pack_a < LEAST_A:
         return None
     missing_ah, takes_ah = ah * (100 - f.soc) / f.soc, f.pack_a * minutes / 60
     if min(missing_ah, takes_ah) < LEAST_AH or 1 / CAPACITY_FACTOR <= takes_ah / missing_ah <= CAPACITY_FACTOR:
         return None
-    return (
-        f"the BMU says full in {minutes:.0f} min: that is {takes_ah:.1f} Ah, "
-        f"by {ah:.2f} Ah at {f.soc:.0f} % it is {missing_ah:.1f} Ah"
-    )
+    return Cause.of(
+        "time_to_full_disagrees",
+        full_min=minutes, takes_ah=takes_ah, remaining_ah=ah, soc_pct=f.soc, missing_ah=missing_ah,
+    )  # fmt: skip
 
 
-def soc_not_believed(f: Facts) -> str | None:
+def soc_not_believed(f: Facts) -> Cause | None:
     """FAULTS B17: two doubts at once."""
     doubts = [name for name in DOUBTS if name in f.raised]
     if len(doubts) < 2:
         return None
-    return "; ".join(f.memory.faults[name].text for name in doubts)
+    return Cause.of("soc_not_believed", whats=tuple(f.memory.faults[name].cause for name in doubts))
 
 
-def battery_exchanged(f: Facts) -> str | None:
+def battery_exchanged(f: Facts) -> Cause | None:
     """FAULTS B18: the charger never saw the battery leave, and the BMU that answers again tells of another one."""
     exchange = f.memory.exchange
     if exchange is None or f.now_s - exchange[0] >= EXCHANGE_NEWS_S:
         return None
-    return f"{exchange[1]}, in which the BMU was not heard: this may be another battery"
+    return Cause.of("battery_exchanged", what=exchange[1])

@@ -6,7 +6,7 @@ from orchestrator.config.amperes import volts_differ
 from orchestrator.core.cells import chemistry
 from orchestrator.core.facts import Facts
 from orchestrator.core.witnesses.standby import FROZEN
-from orchestrator.model import ChargeMode
+from orchestrator.model import Cause, ChargeMode
 
 #: A pack under charge may lose this to the vehicle that it sits in before it counts as back-feed.
 BACK_FEED_A = 0.5
@@ -20,28 +20,28 @@ PULSES = (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)
 MOVED_SHARE = 0.02
 
 
-def over_voltage(f: Facts) -> str | None:
+def over_voltage(f: Facts) -> Cause | None:
     """FAULTS C10, B14."""
     limit_v = f.rules.max_v
     if f.volts is not None and f.volts > limit_v:
-        return f"{f.volts:.2f} V at the charger, the limit is {limit_v:g} V"
+        return Cause.of("over_voltage_charger", charger_v=f.volts, limit_v=limit_v)
     if f.pack_v is not None and f.pack_v > limit_v:
-        return f"{f.pack_v:.2f} V at the pack, the limit is {limit_v:g} V"
+        return Cause.of("over_voltage_pack", pack_v=f.pack_v, limit_v=limit_v)
     return None
 
 
-def volts_disagree(f: Facts) -> str | None:
+def volts_disagree(f: Facts) -> Cause | None:
     """FAULTS B15."""
     if f.volts is None or f.pack_v is None or not f.connected:
         return None
     volts, pack_v = _steady(f, "charger_v", f.volts), _steady(f, "pack_v", f.pack_v)
     if abs(volts - pack_v) <= volts_differ(f.rules.policy.faults, pack_v):
         return None
-    text = f"the charger reads {volts:.2f} V, the BMU {pack_v:.2f} V: not the same battery, or a bad connection"
-    return text + _likelier_wrong(_fits_soc(f, volts), _fits_soc(f, pack_v), "the pack's SOC")
+    wrong = _likelier_wrong(_fits_soc(f, volts), _fits_soc(f, pack_v), Cause("by_soc"))
+    return Cause.of("volts_disagree", charger_v=volts, pack_v=pack_v, wrong=wrong)
 
 
-def amps_disagree(f: Facts) -> str | None:
+def amps_disagree(f: Facts) -> Cause | None:
     """FAULTS B16."""
     if f.amps is None or f.pack_a is None:
         return None
@@ -49,12 +49,11 @@ def amps_disagree(f: Facts) -> str | None:
     tolerance_a = max(f.rules.policy.faults.amps_differ_a, f.rules.policy.faults.amps_differ_pct / 100 * amps)
     if abs(amps - pack_a) <= tolerance_a:
         return None
-    text = f"the charger reads {amps:.2f} A, the BMU {pack_a:.2f} A"
-    step = f.memory.step
-    if step is None:
-        return text
-    charger_fits, bmu_fits = (abs(seen_a - step.current_a) <= tolerance_a for seen_a in (amps, pack_a))
-    return text + _likelier_wrong(charger_fits, bmu_fits, f"the step that was set ({step.current_a:g} A)")
+    step, wrong = f.memory.step, None
+    if step is not None:
+        charger_fits, bmu_fits = (abs(seen_a - step.current_a) <= tolerance_a for seen_a in (amps, pack_a))
+        wrong = _likelier_wrong(charger_fits, bmu_fits, Cause.of("by_step", step_a=step.current_a))
+    return Cause.of("amps_disagree", charger_a=amps, pack_a=pack_a, wrong=wrong)
 
 
 def _steady(f: Facts, name: str, now: float) -> float:
@@ -72,13 +71,13 @@ def _fits_soc(f: Facts, volts: float) -> bool:
     return low_v <= volts / f.rules.policy.pack.cells_in_series <= high_v
 
 
-def _likelier_wrong(charger_fits: bool, bmu_fits: bool, by_what: str) -> str:  # noqa: FBT001 - the two of one question
+def _likelier_wrong(charger_fits: bool, bmu_fits: bool, by: Cause) -> Cause | None:  # noqa: FBT001 - one question's two
     if charger_fits == bmu_fits:
-        return ""
-    return f"; {'the BMU' if charger_fits else 'the charger'} is likelier wrong, by {by_what}"
+        return None
+    return Cause.of("bmu_likelier_wrong" if charger_fits else "charger_likelier_wrong", by=by)
 
 
-def charger_frozen(f: Facts) -> str | None:
+def charger_frozen(f: Facts) -> Cause | None:
     """FAULTS C20: its values stand still, and the battery's do not. Alone the one proves nothing: a good supply on a
     flat cell may show the same digits for minutes."""
     still = f.memory.still
@@ -87,13 +86,13 @@ def charger_frozen(f: Facts) -> str | None:
     moved_v, moved_a = abs(f.pack_v - still.pack_v), abs(f.pack_a - still.pack_a)
     if still.amps <= STILL_ABOVE_A or (moved_v <= MOVED_V and moved_a <= MOVED_A):
         return None
-    return (
-        f"the charger has said {still.volts:.2f} V and {still.amps:.2f} A for {f.now_s - still.t_s:.0f} s, "
-        f"while the BMU's values moved by {moved_v:.2f} V and {moved_a:.2f} A: its measurement is frozen"
-    )
+    return Cause.of(
+        "charger_frozen",
+        charger_v=still.volts, charger_a=still.amps, lasted_s=f.now_s - still.t_s, moved_v=moved_v, moved_a=moved_a,
+    )  # fmt: skip
 
 
-def charger_frozen_at_rest(f: Facts) -> str | None:
+def charger_frozen_at_rest(f: Facts) -> Cause | None:
     """FAULTS C31."""
     still = f.memory.still
     if still is None or not f.standby or not f.connected or f.now_s - still.t_s < STILL_S or f.pack_v is None:
@@ -101,30 +100,25 @@ def charger_frozen_at_rest(f: Facts) -> str | None:
     moved_v = abs(f.pack_v - still.pack_v)
     if moved_v <= MOVED_V or abs(f.pack_v - still.volts) <= MOVED_V:  # it moved to where the charger had been all along
         return None
-    return (
-        f"the charger has said {still.volts:.2f} V for {f.now_s - still.t_s:.0f} s at rest, while the BMU's voltage "
-        f"moved by {moved_v:.2f} V: its measurement is frozen"
-    )
+    lasted_s = f.now_s - still.t_s
+    return Cause.of("charger_frozen_at_rest", charger_v=still.volts, lasted_s=lasted_s, moved_v=moved_v)
 
 
-def bmu_frozen(f: Facts) -> str | None:
+def bmu_frozen(f: Facts) -> Cause | None:
     """FAULTS B23, the mirror of `charger_frozen`: every word of the BMU stands still, though a charge goes in."""
     frozen, session = f.memory.witnessed.frozen, f.memory.session
     if frozen is not None and FROZEN in f.raised:
-        return f"the BMU has said the same in every word for {f.now_s - frozen.t_s:.0f} s: its values are frozen"
+        return Cause.of("bmu_still_frozen", lasted_s=f.now_s - frozen.t_s)
     if frozen is None or session is None or f.volts is None or f.now_s - frozen.t_s < STILL_S:
         return None
     moved_v, moved_ah = abs(f.volts - frozen.charger_v), session.charged_ah - frozen.charged_ah
     if moved_v <= MOVED_V and moved_ah < MOVED_SHARE * f.rules.max_ah:
         return None
-    return (
-        f"the BMU has said the same in every word for {f.now_s - frozen.t_s:.0f} s, while the charger's voltage moved "
-        f"by {moved_v:.2f} V and {moved_ah:.2f} Ah went in: its values are frozen"
-    )
+    return Cause.of("bmu_frozen", lasted_s=f.now_s - frozen.t_s, moved_v=moved_v, moved_ah=moved_ah)
 
 
-def back_feed(f: Facts) -> str | None:
+def back_feed(f: Facts) -> Cause | None:
     """FAULTS C12."""
     if f.memory.runs_s is None or f.pack_a is None or f.pack_a >= -BACK_FEED_A:
         return None
-    return f"the BMU reports a discharge of {-f.pack_a:.2f} A while the charger runs"
+    return Cause.of("back_feed", discharge_a=-f.pack_a)

@@ -2,7 +2,7 @@
 
 from orchestrator.core.cells import chemistry
 from orchestrator.core.facts import Facts
-from orchestrator.model import State
+from orchestrator.model import Cause, State
 
 #: A pack that is charged may sink below its precharge voltage by this share, for the moment.
 MARGIN = 0.02
@@ -14,7 +14,7 @@ SEEN_BY_BOTH = 0.5
 SAME_CURRENT = 0.8
 
 
-def another_pack(f: Facts) -> str | None:
+def another_pack(f: Facts) -> Cause | None:
     """FAULTS B25, P3: volts a cell, SOC and chemistry contradict each other.
 
     While it is charged, a voltage that is high for the SOC is the SOC's mistake: the voltage's own limit and the taper
@@ -27,28 +27,25 @@ def another_pack(f: Facts) -> str | None:
     low_v, high_v = kind.bounds_v(f.soc)
     if low_v <= cell_v and (cell_v <= high_v or f.energised):
         return None
-    bound = f"at least {low_v:.2f}" if cell_v < low_v else f"at most {high_v:.2f}"
-    return (
-        f"the pack has {f.pack_v:.2f} V at SOC {f.soc:.0f} %: with {pack.cells_in_series} {kind.name} cells "
-        f"({f.rules.policy.source.at('pack.cells_in_series')}) that is {cell_v:.2f} V a cell, where {bound} V belong "
-        "to this SOC. It is another kind of pack, or its SOC is wrong"
-    )
+    id_, bound_v = ("pack_too_low", low_v) if cell_v < low_v else ("pack_too_high", high_v)
+    return f.rules.by_policy(
+        id_, "pack.cells_in_series",
+        pack_v=f.pack_v, soc_pct=f.soc, cells=pack.cells_in_series, kind=kind.name, cell_v=cell_v, bound_v=bound_v,
+    )  # fmt: skip
 
 
-def collapsed(f: Facts) -> str | None:
+def collapsed(f: Facts) -> Cause | None:
     """FAULTS B24: a cell that gives way under current takes its share of the voltage with it, and both see it."""
     if f.memory.state is not State.CHARGING or f.pack_v is None or f.pack_a is None or f.volts is None:
         return None
-    rule, pack, source = f.rules.policy.precharge, f.rules.policy.pack, f.rules.policy.source
-    floor_v, at = (rule.below_v, "precharge.below_v") if rule is not None else (pack.voltage_v.low, "pack.voltage_v")
+    rule, pack = f.rules.policy.precharge, f.rules.policy.pack
+    floor_v, key = (rule.below_v, "precharge.below_v") if rule is not None else (pack.voltage_v.low, "pack.voltage_v")
     if f.rules.manual and f.pack_v < floor_v * (1 - MARGIN) and f.volts < floor_v:
-        return f"the pack has sunk to {f.pack_v:.2f} V while it is charged, below {floor_v:g} V ({source.at(at)})"
+        return f.rules.by_policy("pack_sunk", key, pack_v=f.pack_v, floor_v=floor_v)
     for sample in f.memory.witnessed.trail:
         fell_v, charger_fell_v = sample.pack_v - f.pack_v, sample.charger_v - f.volts
         both_fell = fell_v > FALL * sample.pack_v and charger_fell_v > SEEN_BY_BOTH * fell_v
         if both_fell and f.pack_a >= SAME_CURRENT * sample.pack_a:
-            return (
-                f"the pack fell from {sample.pack_v:.2f} to {f.pack_v:.2f} V within {f.now_s - sample.t_s:.0f} s while "
-                f"{f.pack_a:.2f} A flowed: a cell or a contact has given way"
-            )
+            passed_s = f.now_s - sample.t_s
+            return Cause.of("pack_fell", before_v=sample.pack_v, pack_v=f.pack_v, passed_s=passed_s, pack_a=f.pack_a)
     return None

@@ -6,6 +6,8 @@ between them; and by the BMU, where it can be heard, with a value from after the
 
 from typing import TYPE_CHECKING
 
+from orchestrator.model import Cause
+
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
 
@@ -33,14 +35,10 @@ def proved(f: "Facts") -> bool:
     return f.pack_a is None or measured is None or (measured.t_s >= known.stop_s and not sees_current(f))
 
 
-def current_without_order(f: "Facts") -> str | None:
+def current_without_order(f: "Facts") -> Cause | None:
     """FAULTS C29."""
     if not f.unordered or f.pack_a is None:
         return None
     if f.reading is None:
-        return f"the BMU sees {f.pack_a:.2f} A flow into the pack, nothing was commanded, and the charger is not heard"
-    return (
-        f"the BMU sees {f.pack_a:.2f} A flow into the pack while the charger says {f.reading.current_a:.2f} A and "
-        "nothing was commanded. Either the charger's word is wrong, its cable belongs to another bay, something else "
-        "charges this pack, or the BMU's current is wrong"
-    )
+        return Cause.of("current_unheard", pack_a=f.pack_a)
+    return Cause.of("current_without_order", pack_a=f.pack_a, charger_a=f.reading.current_a)

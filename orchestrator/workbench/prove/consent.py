@@ -4,9 +4,11 @@ As in `properties.py`, nothing here asks the core's own predicates; of the fault
 itself.
 """
 
+from collections.abc import Iterator
+
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
-from orchestrator.model import ENERGISED, Alarm, Request, State
+from orchestrator.model import ENERGISED, Alarm, Cause, Request, State
 from orchestrator.workbench.prove.story import Taken
 
 UNPROVED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
@@ -59,9 +61,17 @@ def waits_for_a_start(taken: Taken) -> str | None:
 def _says_what_to_type(taken: Taken, *, waits: bool) -> str | None:
     if not waits:
         return "HELD, and nothing waits for a person"
-    command, reason = f"orchestrator start {taken.rules.bay.name}", taken.decision.reason
-    once = reason.endswith(f": {command}") and reason.count(command) == 1
-    return None if once else f"HELD does not end with what to type: {reason!r}"
+    told = [cause.param("bay") for cause in _parts(taken.decision.cause) if cause.id == "start_bay"]
+    return None if told == [taken.rules.bay.name] else f"HELD tells to start {told}"
+
+
+def _parts(cause: Cause) -> Iterator[Cause]:
+    """A cause and all those that are parameters in it."""
+    yield cause
+    for _, value in cause.params:
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, Cause):
+                yield from _parts(part)
 
 
 def tripped_until_reset(taken: Taken) -> str | None:

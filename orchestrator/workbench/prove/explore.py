@@ -13,7 +13,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.model import Decision, Snapshot, State
+from orchestrator.model import Cause, Decision, Snapshot, State
 from orchestrator.workbench.prove.gist import gist, outline
 from orchestrator.workbench.prove.properties import Property
 from orchestrator.workbench.prove.story import BEGIN_S, TICK_S, Counterexample, Move, Taken
@@ -79,7 +79,7 @@ class Walk:
         try:
             decision, after = self.step(now_s, snapshot, memory, self.rules)
         except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
-            stays = Decision(place.memory.state, f"{type(error).__name__}: {error}")
+            stays = Decision(place.memory.state, Cause.of("failed", error=f"{type(error).__name__}: {error}"))
             return Taken(move, now_s, snapshot, place.memory, stays, place.memory, self.rules, error=repr(error))
         return Taken(move, now_s, snapshot, place.memory, decision, after, self.rules)
 

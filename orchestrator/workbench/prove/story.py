@@ -6,6 +6,7 @@ from itertools import groupby
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.model import Action, Decision, Measurement, Request, Snapshot
+from orchestrator.text.catalogue import say
 
 #: Where time begins in a story; not 0, so that nobody takes "never" for a time.
 BEGIN_S = 1000.0
@@ -72,10 +73,10 @@ class Counterexample:
 
 def _told(taken: Taken) -> str:
     """One step; steps that tell the same are told once."""
-    answer = f"; answer: {taken.decision.answer}" if taken.decision.answer else ""
+    answer = f"; answer: {say(taken.decision.answer)}" if taken.decision.answer else ""
     return (
         f"{taken.move}\n      {_values(taken.snapshot)}\n"
-        f"      → {taken.decision.state}: {taken.decision.reason}; {_order(taken.decision)}{answer}"
+        f"      → {taken.decision.state}: {say(taken.decision.cause)}; {_order(taken.decision)}{answer}"
     )
 
 

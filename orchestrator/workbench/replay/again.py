@@ -13,7 +13,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.model import Decision
-from orchestrator.service.records import decision_lines
+from orchestrator.service.records import decision_lines, without_texts
 from orchestrator.workbench.replay.recording import Event, Recorded
 
 
@@ -60,8 +60,8 @@ def _differs(ours: Memory, recorded: Memory) -> str:
 
 
 def _said_otherwise(recorded: Recorded, lines: list[Event]) -> str:
-    ours = [json.loads(json.dumps(line)) for line in lines]
-    theirs = [list(event) for event in recorded.events]
+    ours = [json.loads(json.dumps((kind, without_texts(fields)))) for kind, fields in lines]
+    theirs = [[kind, without_texts(fields)] for kind, fields in recorded.events]
     if ours == theirs:
         return ""
     was, now = next(pair for pair in zip_longest(theirs, ours, fillvalue="nothing more") if pair[0] != pair[1])

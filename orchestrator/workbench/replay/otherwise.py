@@ -14,6 +14,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.model import Decision, Snapshot, State, Step
+from orchestrator.text.catalogue import say
 from orchestrator.workbench.replay.again import Again
 
 #: What a policy alone keeps from step to step: its own debounces and holds.
@@ -131,7 +132,7 @@ def told(difference: Difference) -> Iterator[str]:
 
 def _why(decision: Decision) -> str:
     step = decision.step
-    why = f"{step.label}: {step.rule}" if step is not None else decision.reason
+    why = f"{step.label}: {say(step.rule)}" if step is not None else say(decision.cause)
     return f"{decision.state}: {why}"
 
 

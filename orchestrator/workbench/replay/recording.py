@@ -23,13 +23,16 @@ from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.errors import ConfigError, Finding
-from orchestrator.model import Snapshot
+from orchestrator.model import Cause, Snapshot
+from orchestrator.model.cause import from_plain
 
 #: What `decision_lines` writes of a step.
 EVENTS = frozenset({"transition", "command", "fault", "session", "decision"})
 STREAMS = ("events", "snapshots")
 #: With these, nothing that was there before goes on: another run of the service, lines that no disk took.
 BREAKS = frozenset({"run", "lost"})
+#: Why a record cannot be decided again: it has the sentences of a version before, and no causes.
+SENTENCES = "an older version of this service has recorded this step: only that version can decide it again"
 #: No step takes longer than this to be written down.
 STEP_S = 60.0
 
@@ -38,6 +41,11 @@ Event = tuple[str, Mapping[str, object]]  #: kind, fields
 
 _CONVERTER = Converter(detailed_validation=False)
 _CONVERTER.register_structure_hook(Path, lambda text, _: Path(text))
+_CONVERTER.register_structure_hook(Cause, lambda value, _: from_plain(value))
+
+
+class _OlderError(Exception):
+    """A line that has sentences where the core has causes now."""
 
 
 @dataclass(slots=True)
@@ -98,6 +106,9 @@ class _Reader:
             line = _line(text)
             if line["kind"] == "snapshot":
                 self._snapshot(line)
+        except _OlderError:
+            self.broken(path, number, SENTENCES)
+            return
         except (BaseValidationError, LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:
             self.broken(path, number, f"this is no line of a journal: {error!r:.200}")
             return
@@ -130,6 +141,8 @@ class _Reader:
         rules: Rules | None = None
         bay, at_s, parts = line["bay"], float(line["at_s"]), self._stream.parts
         if line.get("whole"):
+            if "cause" not in line["memory"]:
+                raise _OlderError
             plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
             memory = _CONVERTER.structure(line["memory"], Memory)
             if "chemistry" not in line["config"]["policy"]["pack"]:

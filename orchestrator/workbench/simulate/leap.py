@@ -19,7 +19,7 @@ Outline = tuple[object, ...]
 
 #: What the memory carries that changes only when something happens.
 EVENTFUL = (
-    "since_s", "resets", "hold", "paused", "stop_reason", "full_pct", "boots", "resumed", "ran", "shown", "order",
+    "since_s", "resets", "hold", "paused", "stop_cause", "full_pct", "boots", "resumed", "ran", "shown", "order",
     "limit", "limit_before", "closed", "charge_step", "exchange", "reached_s", "raise_s", "taper_s", "qualified_s",
     "runs_s", "stopping_s", "verified_s", "returns", "unverified", "left_s", "left_as", "returned_s", "reverts",
     "confirmed", "ready", "intends", "rows", "row_returns", "full_s",

@@ -83,7 +83,7 @@ class Simulation:
         self._policy, self._scenario, self._max_leap = policy, scenario, max_leap
         self._rules = rules_of(policy, scenario)
         self._plant, self._devices = Plant(scenario), Devices()
-        self._memory, self._decision = Memory(), Decision(State.STARTING, "")
+        self._memory, self._decision = Memory(), Decision(State.STARTING, Memory().cause)
         self._outline: Outline = ()
         self._request: Request | None = None
         self._tick = 0

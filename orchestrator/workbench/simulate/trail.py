@@ -1,15 +1,12 @@
 """What a simulation leaves behind: measured values over time, and which rule bound the bay in each stretch of it."""
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from orchestrator.model import Decision, State
+from orchestrator.model import Cause, Decision, State
+from orchestrator.text.catalogue import say
 from orchestrator.workbench.simulate.plant import Plant
-
-#: The numbers in a reason, but not those of a line in a file (`policy.yaml:24`).
-_NUMBERS = re.compile(r"(?<![:\w])[-−]?\d+(\.\d+)?")
 
 
 class Moment(NamedTuple):
@@ -34,14 +31,23 @@ class Span:
     state: State
     step: int | None
     step_a: float | None
-    why: str  #: the rule that bound it, with its line in the policy; else why the bay is in this state
+    cause: Cause  #: the rule that bound it; else why the bay is in this state
     faults: tuple[str, ...] = ()  #: the ids of those in force
-    key: str = ""  #: of the policy's row that bound it, where one did
 
     @property
-    def rule(self) -> tuple[State, int | None, str]:
+    def key(self) -> str:
+        """Of the policy's row that bound it, where one did."""
+        return self.cause.key
+
+    @property
+    def why(self) -> str:
+        """The cause in words, with the rule's line in the policy."""
+        return say(self.cause)
+
+    @property
+    def rule(self) -> tuple[State, int | None, str, str]:
         """What bound it, without the numbers that were measured: equal for the same rule at another time."""
-        return self.state, self.step, self.key or _NUMBERS.sub("#", self.why)
+        return self.state, self.step, self.cause.id, self.cause.key
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +93,10 @@ class Trail:
                 decision.state,
             )
         )
-        charging = step is not None and decision.state is State.CHARGING
-        why, key = (step.rule, step.key) if step is not None and charging else (decision.reason, "")
+        cause = step.rule if step is not None and decision.state is State.CHARGING else decision.cause
         faults = tuple(fault.id for fault in decision.faults)
         index, amps = (step.index, step.current_a) if step else (None, None)
-        span = Span(plant.t_s, plant.t_s, decision.state, index, amps, why, faults, key)
+        span = Span(plant.t_s, plant.t_s, decision.state, index, amps, cause, faults)
         if self.spans and (span.rule, span.faults) == (self.spans[-1].rule, self.spans[-1].faults):
             return
         self.close(plant.t_s)

@@ -1,0 +1,101 @@
+"""Why something is as it is, as data: what a program compares and what a sentence in any language is made from."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+#: A cause within a cause within a cause … is nothing that was ever said.
+DEPTH = 8
+#: Several causes at once, in `whats`.
+SEVERAL = "several"
+#: The parts of a cause in JSON.
+PARTS = frozenset({"id", "params", "key", "place", "advice", "text"})
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One cause. Two are the same if `id` and `key` are: figures change all the time, and texts with the language.
+
+    `params` are (name, value) pairs, units in the names: numbers, words of a fixed list, other causes, tuples of these.
+    """
+
+    id: str
+    params: tuple[tuple[str, Any], ...] = ()
+    key: str = ""  #: the path of the key in policy or station file that sets the limit: "pack.temperature_c"
+    place: str = ""  #: where that stands: FILE:LINE
+    advice: str = ""  #: the id of what to do about it
+
+    @classmethod
+    def of(cls, id_: str, /, *, key: str = "", place: str = "", advice: str = "", **params: Any) -> "Cause":  # noqa: ANN401 - as `params`
+        """One with its parameters as keywords."""
+        return cls(id_, tuple(params.items()), key, place, advice)
+
+    def same_as(self, other: "Cause | None") -> bool:
+        """Whether both are the same cause, whatever the figures are by now."""
+        return other is not None and self.id == other.id and self.key == other.key
+
+    def param(self, name: str) -> Any:  # noqa: ANN401 - as `params`
+        """The parameter of this name; None if there is none."""
+        return next((value for known, value in self.params if known == name), None)
+
+    def with_(self, advice: str = "", **params: Any) -> "Cause":  # noqa: ANN401 - as `params`
+        """The same with more parameters, and with this advice."""
+        return Cause(self.id, (*self.params, *params.items()), self.key, self.place, advice or self.advice)
+
+
+def together(causes: Sequence[Cause]) -> Cause:
+    """One cause for all of them: itself where there is only one."""
+    return causes[0] if len(causes) == 1 else Cause.of(SEVERAL, whats=tuple(causes))
+
+
+def plain(cause: Cause) -> dict[str, object]:
+    """As JSON has it; `from_plain` makes it a cause again."""
+    return {
+        "id": cause.id,
+        "params": {name: _plain(value) for name, value in cause.params},
+        "key": cause.key,
+        "place": cause.place,
+        "advice": cause.advice,
+    }
+
+
+def _plain(value: Any) -> object:  # noqa: ANN401 - as `params`
+    if isinstance(value, Cause):
+        return plain(value)
+    return [_plain(one) for one in value] if isinstance(value, tuple) else value
+
+
+def from_plain(value: object, depth: int = DEPTH) -> Cause:
+    """The cause in a JSON value, ValueError for anything else. A `text` beside it is left out: it is made anew.
+
+    Parameters may be an object, or a list of pairs as `dataclasses.asdict` has them.
+    """
+    if not depth or not isinstance(value, Mapping) or not value.keys() <= PARTS or not value.get("id"):
+        raise ValueError(f"{value!r:.80} is no cause")
+    texts = [value.get(name, "") for name in ("id", "key", "place", "advice")]
+    params = value.get("params", ())
+    pairs = list(params.items()) if isinstance(params, Mapping) else params
+    if not isinstance(pairs, list | tuple) or not all(isinstance(text, str) for text in texts):
+        raise ValueError(f"{value!r:.80} is no cause")
+    id_, key, place, advice = map(str, texts)
+    f"{id_}{key}{place}{advice}".encode()  # as below
+    return Cause(id_, tuple(_pair(pair, depth) for pair in pairs), key, place, advice)
+
+
+def _pair(pair: Any, depth: int) -> tuple[str, Any]:  # noqa: ANN401 - it is judged here
+    if not isinstance(pair, list | tuple) or len(pair) != 2 or not isinstance(pair[0], str):
+        raise ValueError(f"{pair!r:.80} is no parameter of a cause")
+    return pair[0], _value(pair[1], depth - 1)
+
+
+def _value(value: object, depth: int) -> object:
+    if isinstance(value, Mapping):
+        return from_plain(value, depth)
+    if isinstance(value, list | tuple) and depth:
+        return tuple(_value(one, depth - 1) for one in value)
+    if isinstance(value, str):
+        value.encode()  # half a character can be neither shown nor written again
+    if not isinstance(value, str | int | float | None) or (isinstance(value, float) and not isfinite(value)):
+        raise ValueError(f"{value!r:.80} is no parameter of a cause")
+    return value

@@ -1,0 +1,1 @@
+"""Sentences from causes: the only place where any is made."""

@@ -1,0 +1,144 @@
+"""`say()`: the sentence for a cause, in English or Korean.
+
+Theory of operation. A template stands under the id of its cause and names its parameters, with the rounding of the
+figures. What an advice adds stands in a frame. Beside the formats of numbers there are five of our own: `word` (a word
+of a fixed list, translated), `nth` (the first time …), `and` and `then` (how the parts of a list are joined), `after`
+(a cause, if there is one, after what stands before it).
+
+`say` never raises, whatever it is given: what it is asked for is often the reason of a stop. A cause that is not known,
+of an older or newer version say, or lacks something, is shown as its data.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from orchestrator.model import Cause
+from orchestrator.model.cause import plain
+from orchestrator.text.en.advice import ADVICE as EN_ADVICE
+from orchestrator.text.en.bays import TEXTS as EN_BAYS
+from orchestrator.text.en.faults import TEXTS as EN_FAULTS
+from orchestrator.text.en.words import FRAMES as EN_FRAMES
+from orchestrator.text.en.words import WORDS as EN_WORDS
+from orchestrator.text.ko.advice import ADVICE as KO_ADVICE
+from orchestrator.text.ko.bays import TEXTS as KO_BAYS
+from orchestrator.text.ko.faults import TEXTS as KO_FAULTS
+from orchestrator.text.ko.words import FRAMES as KO_FRAMES
+from orchestrator.text.ko.words import WORDS as KO_WORDS
+
+#: Of a cause that a fault has made, what it does: such a sentence begins with what to do.
+TRIP = "TRIP"
+#: Formats that are not those of a number.
+JOINS = {"": "list", "word": "list", "and": "and", "then": "then"}
+#: No sentence is longer, whatever stands in its parameters.
+MOST_CHARACTERS = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class Language:
+    """All texts of one language."""
+
+    texts: Mapping[str, str]
+    advice: Mapping[str, str]
+    words: Mapping[str, str]
+    frames: Mapping[str, str]
+
+
+LANGUAGES: Mapping[str, Language] = {
+    "en": Language({**EN_FAULTS, **EN_BAYS}, EN_ADVICE, EN_WORDS, EN_FRAMES),
+    "ko": Language({**KO_FAULTS, **KO_BAYS}, KO_ADVICE, KO_WORDS, KO_FRAMES),
+}
+
+
+def say(cause: Cause | None, language: str = "en", otherwise: str = "") -> str:
+    """The sentence; "" for no cause. A language that is not known is English.
+
+    `otherwise` is what to say of a cause that is not understood, if its data are not to be shown.
+    """
+    if cause is None:
+        return ""
+    texts = LANGUAGES.get(language, LANGUAGES["en"])
+    try:
+        return _sentence(cause, texts)[:MOST_CHARACTERS]
+    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError):
+        return otherwise or _data(cause, texts)
+
+
+def fields(cause: Cause | None, language: str = "en") -> dict[str, object] | None:
+    """A cause with its sentence beside it, as JSON has it."""
+    return {**plain(cause), "text": say(cause, language)} if cause is not None else None
+
+
+def advise(id_: str, language: str = "en") -> str:
+    """What to do about a fault, alone; "" where nothing is known."""
+    return LANGUAGES.get(language, LANGUAGES["en"]).advice.get(id_, "")
+
+
+def _sentence(cause: Cause, texts: Language) -> str:
+    params = _Params(cause, texts)
+    what, frames = texts.texts[cause.id].format_map(params), texts.frames
+    tripped = params.get("effect") == _Value(TRIP, texts)
+    if "ago_min" in params and not tripped:
+        what = frames["ago" if cause.param("ago_min") else "just_now"].format(what=what, ago_min=params["ago_min"])
+    if cause.advice:
+        do = texts.advice[cause.advice].format_map(params)
+        if "strikes" in params:
+            do = frames["strikes"].format(do=do, strikes=params["strikes"])
+        what = frames["trip" if tripped else "advice"].format(do=do, what=what)
+    what = f"{what}{params['then']:after}" if "then" in params else what
+    return f"{what}: {params['how']}" if "how" in params else what
+
+
+def _data(cause: Cause, texts: Language) -> str:
+    """What is there of a cause that no template fits."""
+    try:
+        pairs = [*cause.params, ("key", cause.key), ("place", cause.place)]
+        shown = ", ".join(f"{name}={_plainly(value)}" for name, value in pairs if value not in ("", None))
+        return texts.frames["unknown"].format(id=cause.id, params=shown)[:MOST_CHARACTERS]
+    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError):
+        return str(cause.id)
+
+
+def _plainly(value: object) -> str:
+    if isinstance(value, Cause):
+        return value.id
+    return " ".join(map(_plainly, value)) if isinstance(value, tuple) else str(value)
+
+
+class _Params(dict[str, "_Value"]):
+    """A cause's parameters for `format_map`, and `at`: the place in brackets, where there is one."""
+
+    def __init__(self, cause: Cause, texts: Language) -> None:
+        super().__init__((name, _Value(value, texts)) for name, value in cause.params)
+        self["at"] = _Value(f" ({cause.place})" if cause.place else "", texts)
+        self["place"] = _Value(cause.place, texts)
+
+
+@dataclass(frozen=True, slots=True)
+class _Value:
+    """One parameter, which knows how it is written."""
+
+    value: object
+    texts: Language
+
+    def __format__(self, form: str) -> str:
+        value, texts = self.value, self.texts
+        if value is None:
+            return "" if form in ("", "after") else "–"
+        if isinstance(value, Cause):
+            return (texts.frames["then"] if form == "after" else "") + _sentence(value, texts)
+        if isinstance(value, tuple):
+            joint = "then" if not form and any(isinstance(one, Cause) for one in value) else JOINS[form]
+            return texts.frames[joint].join(_words(value, texts))
+        if form == "nth":
+            return texts.words[f"nth_{value}"]
+        if form in JOINS:
+            return texts.words.get(value, value) if form and isinstance(value, str) else str(value)
+        return format(value, form)
+
+
+def _words(values: tuple[object, ...], texts: Language) -> Iterator[str]:
+    for value in values:
+        if isinstance(value, Cause):
+            yield _sentence(value, texts)
+        else:
+            yield texts.words.get(value, value) if isinstance(value, str) else str(value)

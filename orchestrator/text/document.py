@@ -1,0 +1,40 @@
+"""The status document in another language than the service's: every sentence made anew from its cause."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from orchestrator.model.cause import from_plain
+from orchestrator.text.catalogue import say
+
+
+def in_language(document: Mapping[str, Any], language: str) -> dict[str, Any]:
+    """The document as `language` says it; "" leaves it as it is.
+
+    What a service of another version says, and is not understood here, stays as that one said it, too.
+    """
+    if not language:
+        return dict(document)
+    return {**document, "bays": [_bay(bay, language) for bay in document["bays"]]}
+
+
+def refusals(answer: Mapping[str, Any], language: str) -> dict[str, str]:
+    """What a service has answered to a request, by bay: "" is yes, else why not."""
+    results, causes = answer["results"], answer.get("causes", {})
+    return {bay: said(causes.get(bay), text, language) if language else text for bay, text in results.items()}
+
+
+def said(cause: object, text: str, language: str) -> str:
+    """The sentence for a cause in plain values; `text` where it is none, or none that is known here."""
+    try:
+        return say(from_plain(cause), language, text)
+    except ValueError:
+        return text
+
+
+def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
+    return {
+        **bay,
+        "reason": said(bay.get("cause"), bay["reason"], language),
+        "step_rule": said(bay.get("step_cause"), bay.get("step_rule", ""), language),
+        "faults": [{**one, "text": said(one.get("cause"), one["text"], language)} for one in bay["faults"]],
+    }

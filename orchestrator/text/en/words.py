@@ -1,0 +1,56 @@
+"""Single words that stand in parameters, how an advice goes with its evidence, and how lists are joined."""
+
+from collections.abc import Mapping
+
+WORDS: Mapping[str, str] = {
+    # bits of the BMU's status
+    "over_voltage": "over voltage",
+    "low_voltage": "low voltage",
+    "charge_over_current": "charge over current",
+    "discharge_over_current": "discharge over current",
+    "high_temperature": "high temperature",
+    "low_temperature": "low temperature",
+    "bmu_error": "bmu error",
+    # NMT states
+    "boot_up": "boot-up",
+    "stopped": "stopped",
+    "pre_operational": "pre-operational",
+    # what a charge needs to know
+    "voltage": "voltage",
+    "current": "current",
+    "status": "status",
+    "temperature": "temperature",
+    "soc": "SOC",
+    "soh": "SOH",
+    "pack_voltage": "pack voltage",
+    "long": "long",
+    # times within an hour
+    "nth_1": "1st",
+    "nth_2": "2nd",
+    "nth_3": "3rd",
+    # the charger's modes, orders and complaints
+    "manual": "manual",
+    "automatic": "automatic",
+    "run": "run",
+    "resume": "resume",
+    "stop": "stop",
+    "limit": "limit",
+    "step": "step",
+    "mode": "mode",
+    "precharge": "precharge",
+    "length": "length",
+    "command": "command",
+    "order": "order",
+    "checksum": "checksum",
+}
+FRAMES: Mapping[str, str] = {
+    "advice": "{what}; {do}",
+    "trip": "{do} – {what}",
+    "strikes": "{do}; it came {strikes} times within an hour: reset by a person",
+    "unknown": "{id} ({params})",
+    "list": ", ",
+    "and": " and ",
+    "then": "; ",
+    "ago": "{what}, {ago_min} min ago",
+    "just_now": "{what}, just now",
+}

@@ -1,0 +1,56 @@
+"""Single words that stand in parameters, how an advice goes with its evidence, and how lists are joined."""
+
+from collections.abc import Mapping
+
+WORDS: Mapping[str, str] = {
+    # bits of the BMU's status
+    "over_voltage": "과전압",
+    "low_voltage": "저전압",
+    "charge_over_current": "충전 과전류",
+    "discharge_over_current": "방전 과전류",
+    "high_temperature": "고온",
+    "low_temperature": "저온",
+    "bmu_error": "BMU 에러",
+    # NMT states
+    "boot_up": "boot-up",
+    "stopped": "stopped",
+    "pre_operational": "pre-operational",
+    # what a charge needs to know
+    "voltage": "전압",
+    "current": "전류",
+    "status": "상태",
+    "temperature": "온도",
+    "soc": "SOC",
+    "soh": "SOH",
+    "pack_voltage": "팩 전압",
+    "long": "오래",
+    # times within an hour
+    "nth_1": "1",
+    "nth_2": "2",
+    "nth_3": "3",
+    # the charger's modes, orders and complaints
+    "manual": "수동",
+    "automatic": "자동",
+    "run": "기동",
+    "resume": "재개",
+    "stop": "정지",
+    "limit": "전류 제한",
+    "step": "단계",
+    "mode": "충전 모드",
+    "precharge": "프리차지",
+    "length": "Length",
+    "command": "Command",
+    "order": "Order",
+    "checksum": "Checksum",
+}
+FRAMES: Mapping[str, str] = {
+    "advice": "{what}. {do}",
+    "trip": "{do} – {what}",
+    "strikes": "{do}. 1시간 안에 {strikes}회 발생했으므로 사람이 리셋해야 합니다",
+    "unknown": "{id} ({params})",
+    "list": ", ",
+    "and": ", ",
+    "then": ". ",
+    "ago": "{what}({ago_min}분 전)",
+    "just_now": "{what}(방금)",
+}

@@ -1,0 +1,63 @@
+"""docs/causes.md from the catalogue of texts: `python -m tests.docs.cause_page > docs/causes.md`."""
+
+import sys
+from collections.abc import Iterator
+from string import Formatter
+
+from orchestrator.text.catalogue import LANGUAGES
+
+HEAD = """\
+# Causes
+
+Whatever the service says of a bay is a cause: data, of which the sentence is made. `status --json`, the journal and the
+answers to requests carry both. A program compares `id` and `key`, never the text: figures change all the time, and the
+text with the language.
+
+```json
+{"id": "over_temperature", "params": {"pack_c": 45.2, "limit_c": 45, "again_c": 40.0, "effect": "PAUSE"},
+ "key": "pack.temperature_c", "place": "policies/li-ion-48v.yaml:15", "advice": "over_temperature",
+ "text": "the pack has 45.2 °C, the limit is 45 °C (policies/li-ion-48v.yaml:15); …"}
+```
+
+| field | what it is |
+| --- | --- |
+| `id` | which cause; an id is never used again for another one |
+| `params` | figures, with their units in their names: `_v`, `_a`, `_c` (°C), `_pct`, `_s`, `_min`, `_h`, `_ah`, `_wh`; words of a fixed list; other causes |
+| `key`, `place` | the key of policy or station file that sets the limit, and the line where it stands; empty where there is none |
+| `advice` | what a person shall do: of a fault its id in [faults.md](faults.md) |
+
+Some parameters are added by what the cause stands in: `effect` and `strikes` (a fault: what it does, how often it came
+within an hour), `ago_min` (a fault that tells of a moment), `then` and `how` (what comes next, what to type).
+
+`language: ko` in the station file makes the texts Korean. `orchestrator status` and the other verbs say them in the
+language of `LC_ALL`, `LC_MESSAGES` or `LANG`, whatever the service writes. This page is made from the catalogue itself.
+
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    return HEAD + "\n".join(_table()) + "\n"
+
+
+def _table() -> Iterator[str]:
+    yield "| id | parameters | English | Korean |"
+    yield "| --- | --- | --- | --- |"
+    english, korean = LANGUAGES["en"].texts, LANGUAGES["ko"].texts
+    for id_ in sorted(english):
+        params = ", ".join(f"`{name}`" for name in dict.fromkeys(_params(english[id_])))
+        yield f"| `{id_}` | {params or '–'} | {_shown(english[id_])} | {_shown(korean[id_])} |"
+
+
+def _params(template: str) -> Iterator[str]:
+    return (name for _, name, _, _ in Formatter().parse(template) if name not in (None, "at"))
+
+
+def _shown(template: str) -> str:
+    """With the names of the parameters only; where the place stands, nothing."""
+    parts = Formatter().parse(template)
+    return "".join(text + (f"{{{name}}}" if name not in (None, "at") else "") for text, name, _, _ in parts)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(page())
