@@ -47,7 +47,7 @@ class _Follower:
         if now is None or was is None or was >= len(rows) or amps[was] >= amps[now]:
             return now
         near = rows[was].from_ - table.inside < value < rows[was].to + table.inside
-        return was if near or self._stays(f"current.{table.name}.rows[{was}]", amps[was]) else now
+        return was if near or self._stays(f"current.{table.name}.rows[{was}]") else now
 
     def rule(self, number: int, rule: Where, known: Mapping[str, float | None]) -> bool:
         """Whether a rule of `where` holds; what is not known is taken to be inside."""
@@ -57,12 +57,12 @@ class _Follower:
             value = known[quantity]
             wider = hysteresis(self.f.rules.policy.current, quantity) if was else 0.0
             if value is not None and not span.low - wider <= value <= span.high + wider:
-                return was and self._stays(f"current.{name}", self.f.rules.where_a[number])
+                return was and self._stays(f"current.{name}")
         return True
 
-    def _stays(self, key: str, allowed_a: float) -> bool:
-        """Whether it came back too often. A pause may come again: it would else be for ever."""
-        return allowed_a >= self.f.rules.worst_a[0] and self.returns.get(key, 0) > MOST_RETURNS
+    def _stays(self, key: str) -> bool:
+        """Whether it came back too often. A pause is no step, and may come again: it would else be for ever."""
+        return self.returns.get(key, 0) > MOST_RETURNS
 
 
 def follow_rows(f: Facts) -> None:
