@@ -50,11 +50,11 @@ def test_an_accepted_stop_outlives_a_kill_right_after_it(station: Station) -> No
     charging(plant, service.start(), 1, 2)
     assert service.ask("stop", "bay-1") == {"bay-1": ""}
     service.kill_all()
-    assert kept(service)["bay-1"]["hold"] == "stopped by the operator"
+    assert kept(service)["bay-1"]["hold"]["id"] == "operator_stop"
     service.start()
     assert "then start: orchestrator start bay-1" in service.wait("HELD")["bay-1"]["reason"]
     assert plant.state(1)["operation"] == 0
-    assert kept(service)["bay-1"]["hold"] == "stopped by the operator"
+    assert kept(service)["bay-1"]["hold"]["id"] == "operator_stop"
 
 
 def test_a_stop_while_the_service_ends_is_kept(station: Station) -> None:
