@@ -451,6 +451,28 @@ PORTS: tuple[Seed, ...] = (
 
 RESTARTS: tuple[Seed, ...] = (
     scene(
+        "what flowed before a kill is forgotten",
+        "restart",
+        "ampere-hours that went in after the counters were last written count as nothing",
+        ("ampere-hours over kills",),
+        (
+            f"{CORE}persisted.py",
+            "min(seconds if unseen_s is None else unseen_s, COUNTERS_S) if self.running else 0.0",
+            "0.0",
+        ),
+    ),
+    part(
+        "a charger that ran at the start was never stopped",
+        "restart",
+        "one that ran at the start and runs again after each stop is called uncontrollable one return later",
+        ("tests/core/test_safestop.py::test_a_charger_that_ran_at_the_start_has_been_stopped_once_already",),
+        (
+            f"{CORE}safestop.py",
+            '        if memory.stopping_s is None and "found_running" in f.raised:',
+            "        if False:",
+        ),
+    ),
+    scene(
         "the open charge is not kept",
         "restart",
         "ampere-hours and seconds of a charge begin anew with a restart",

@@ -28,6 +28,7 @@ from tests.proof.seed_table import SEEDS, Seed
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs" / "proofs.md"
+HEADING = "## Which proof finds which bug"
 #: Who goes on working here meanwhile must not be what is found.
 COPIED = ("orchestrator", "tests")
 #: Of the seeds, at least this share must be found.
@@ -217,10 +218,10 @@ def _finding(said: str) -> tuple[str, str]:
 
 
 def page(results: Sequence[Result]) -> Iterator[str]:
-    """docs/proofs.md."""
+    """The end of docs/proofs.md, from its heading on."""
     found = [result for result in results if result.proof]
     mean_s = sum(result.all_s for result in results) / len(results)
-    yield "# Which proof finds which bug"
+    yield HEADING
     yield ""
     yield "Each hole that was once open is kept as a seeded bug: a small change that opens it again. `make campaign"
     yield "ARGS=seeds` applies each of them to a copy of the package, runs the proofs until one finds it, and writes"
@@ -228,7 +229,7 @@ def page(results: Sequence[Result]) -> Iterator[str]:
     yield ""
     yield f"{len(found)} of {len(results)} are found, in {mean_s:.0f} s each on average."
     yield ""
-    yield "## The proofs"
+    yield "### The proofs"
     yield ""
     yield "| proof | what it is | what it sees | what it cannot see | finds first |"
     yield "| --- | --- | --- | --- | --- |"
@@ -238,7 +239,7 @@ def page(results: Sequence[Result]) -> Iterator[str]:
     yield ""
     yield "The likeliest proof is asked first, so a proof that finds nothing first may still be able to find a bug."
     yield ""
-    yield "## The bugs"
+    yield "### The bugs"
     yield ""
     yield "| kind | seed | what is broken | found by | after |"
     yield "| --- | --- | --- | --- | --- |"
@@ -258,7 +259,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     with ThreadPool(options.workers) as pool:
         results = pool.map(search, chosen, chunksize=1)
     if not options.only:
-        PAGE.write_text("\n".join(page(results)) + "\n", encoding="utf-8")
+        before = PAGE.read_text(encoding="utf-8").partition(HEADING)[0]
+        PAGE.write_text(before + "\n".join(page(results)) + "\n", encoding="utf-8")
     found = sum(bool(result.proof) for result in results)
     mean_s = sum(result.all_s for result in results) / len(results)
     say(f"{found} of {len(results)} seeds found, in {mean_s:.0f} s each on average")
