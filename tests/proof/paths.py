@@ -36,7 +36,7 @@ PATHS: dict[str, Script] = {
     ),
     "UNCONTROLLABLE → SUSPENDED": _script(HALF, (8.0, "charger_cut_off"), (14.0, "heal")),
     "UNCONTROLLABLE → HELD": _script(HALF, (8.0, "charger_cut_off"), (13.0, "stop"), (14.0, "heal")),
-    "UNCONTROLLABLE → IDLE": _script(HALF, (8.0, "charger_cut_off"), (14.0, "heal"), (14.0, "implausible_soc", 100.0)),
+    "UNCONTROLLABLE → IDLE": _script(HALF, (8.0, "charger_cut_off"), (14.0, "heal"), (14.0, "battery_removed")),
     "STARTING → UNCONTROLLABLE": _script(BaySetup(running=True), (0.0, "ignore_stop")),
     "STARTING → SUSPENDED": _script(HALF, (0.0, "charger_cut_off"), (1.5, "pause"), (2.0, "heal")),
     "STARTING → IDLE": _script(IDLES, (0.0, "charger_cut_off"), (2.0, "heal")),

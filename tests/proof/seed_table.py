@@ -28,6 +28,7 @@ SERVICE, LASTRESORT, DEVICES, CORE, LINK = (
     "orchestrator/link/",
 )
 WORKBENCH = "orchestrator/workbench/"
+UNKNOWN_PAST = "return own.persisted if own else Persisted(hold=unknown)"
 
 
 def scene(name: str, kind: str, about: str, where: tuple[str, ...], *changes: Change) -> Seed:
@@ -151,7 +152,7 @@ DISK: tuple[Seed, ...] = (
         "disk",
         "a stop is answered with yes while the disk has not taken it",
         ("stopped at rest, then no power at once",),
-        (f"{SERVICE}asked.py", "        if answer:\n", "        if True:\n"),
+        (f"{SERVICE}asked.py", "        if answer is not None:\n", "        if True:\n"),
     ),
     part(
         "nobody is told what is not kept",
@@ -245,8 +246,8 @@ DISK: tuple[Seed, ...] = (
         (f"{SERVICE}past.py", "        if old in pasts or any(", "        if True or any("),
         (
             f"{SERVICE}past.py",
-            'Persisted(hold=f"{place} is not in {file}: nobody knows its past")',
-            "Persisted()",
+            UNKNOWN_PAST,
+            "return own.persisted if own else Persisted()",
         ),
     ),
     part(
@@ -256,8 +257,8 @@ DISK: tuple[Seed, ...] = (
         ("tests/service/test_past.py", "tests/service/test_store.py"),
         (
             f"{SERVICE}past.py",
-            'Persisted(hold=f"{place} is not in {file}: nobody knows its past")',
-            "Persisted()",
+            UNKNOWN_PAST,
+            "return own.persisted if own else Persisted()",
         ),
     ),
     scene(
@@ -272,8 +273,8 @@ DISK: tuple[Seed, ...] = (
         ),
         (
             f"{SERVICE}past.py",
-            'Persisted(hold=f"{place} is not in {file}: nobody knows its past")',
-            "Persisted()",
+            UNKNOWN_PAST,
+            "return own.persisted if own else Persisted()",
         ),
     ),
     scene(
@@ -327,9 +328,9 @@ WITNESSES: tuple[Seed, ...] = (
         ("restarted in order",),
         (
             f"{SERVICE}bay.py",
-            '        self._ending = f"the service ends: {why}"\n',
-            '        self._ending = f"the service ends: {why}"\n        if self._memory is not None:\n'
-            "            self._memory.hold = self._memory.hold or self._ending\n",
+            "        self._ending = why\n",
+            "        self._ending = why\n        if self._memory is not None:\n"
+            '            self._memory.hold = self._memory.hold or Cause.of("service_ends", why=why)\n',
         ),
     ),
     part(
@@ -857,11 +858,11 @@ SURROUNDINGS: tuple[Seed, ...] = (
         "an answer that drips byte for byte holds up whoever asks",
         ("tests/service/test_control.py::test_who_asks_waits_so_long_and_no_longer",),
         (
-            f"{SERVICE}control.py",
+            f"{LASTRESORT}asking.py",
             "        client.settimeout(max(end_s - monotonic(), 0.001))\n        part = client.recv(1 << 16)",
             "        client.settimeout(5.0)\n        part = client.recv(1 << 16)",
         ),
-        (f"{SERVICE}control.py", " or len(data) > MAX_ANSWER or monotonic() > end_s:", " or len(data) > MAX_ANSWER:"),
+        (f"{LASTRESORT}asking.py", " or len(data) > MAX_ANSWER or monotonic() > end_s:", " or len(data) > MAX_ANSWER:"),
     ),
     hostile(
         "a poor terminal makes a traceback",
