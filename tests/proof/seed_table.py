@@ -815,7 +815,7 @@ BUS: tuple[Seed, ...] = (
         "bus",
         "can_filters in the station file are refused, whatever they let through",
         ("tests/config",),
-        ("orchestrator/config/station_rules.py", "        if passed is None:\n", "        if True:\n"),
+        ("orchestrator/config/can_rules.py", "        if passed is None:\n", "        if True:\n"),
     ),
     part(
         "the kernel filters nothing",
