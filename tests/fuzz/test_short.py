@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from orchestrator.config import ports
 from orchestrator.config.yaml import tree
 from orchestrator.core import persisted
-from orchestrator.devices import battery, dialogue
+from orchestrator.devices import battery, dialogue, requester
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.lastresort import bareport
 from orchestrator.lastresort.guardian import Guardian
@@ -132,7 +132,7 @@ def short_emergency(patch: Patch) -> None:
 
 
 def asks_for_ever(patch: Patch) -> None:
-    patch.setattr(battery.BatteryNode, "_ask", lambda self, now_s, send: now_s)
+    patch.setattr(requester.Requester, "ask", lambda self, now_s, send, *, online: now_s)
 
 
 def texts_only(patch: Patch) -> None:
