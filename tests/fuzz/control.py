@@ -57,7 +57,7 @@ def _service() -> tuple[Supervisor, Loop]:
     supervisor = Supervisor(load_station(directory / "station.yaml"), GuardianLink(ours.detach()))
     supervisor._store.kept_revision = sys.maxsize  # the disk takes everything at once
     loop = Loop(supervisor)
-    supervisor._wake = loop  # type: ignore[assignment]  # no more is needed of a queue
+    supervisor._handler._wake = loop.put
     return supervisor, loop
 
 
