@@ -15,14 +15,13 @@ from orchestrator.config.station import ChargerConfig, Limits
 from orchestrator.devices.charger_line import ChargerLine
 from orchestrator.devices.charger_view import ChargerView
 from orchestrator.devices.dialogue import Dialogue
+from orchestrator.devices.poll import poll
 from orchestrator.devices.schedule import Schedule, Turn
 from orchestrator.errors import LinkError
 from orchestrator.interlock import Grant, permit
 from orchestrator.model import STOP, ChargerLink, ChargerReading, Command, ControlMode, Sent
 from orchestrator.protocol.charger import OPERATION_STOP_FRAME, STOP_FRAME, encode
 
-#: The wire takes 20 ms, an FTDI adapter holds the last bytes back for 16 ms; the rest is the charger's.
-REPLY_DEADLINE_S = 0.12
 #: Without a turn for so long the loop hangs: a write may take 0.2 s, a poll 0.12 s.
 STALL_S = 0.5
 #: A port is opened at most this often …
@@ -186,19 +185,12 @@ class ChargerPort:
             if not stale:
                 break
             dialogue.hear(stale, self._clock())
-        asked_s = now_s = self._clock()
-        request = dialogue.ask(asked_s)
-        line.write(request)
-        sending, reading = len(request), None
-        while reading is None and (left_s := asked_s + REPLY_DEADLINE_S - now_s) > 0:
-            data = line.read(left_s, sending + dialogue.missing)
-            sending, now_s = 0, self._clock()
-            reading = dialogue.hear(data, now_s)
-        if reading is None:
-            reading = dialogue.give_up(now_s)
+        asked_s = self._clock()
+        reading, _ = poll(line, dialogue, self._clock)
+        end_s = self._clock()
         if reading is None:
             self._found(self._restored(line))
-        self._took(Turn.POLL, asked_s, now_s)
+        self._took(Turn.POLL, asked_s, end_s)
         self._view.polled(reading, dialogue, self._clock(), refused)
 
     def _took(self, turn: Turn, start_s: float, end_s: float) -> None:
