@@ -133,7 +133,7 @@ TARGET = Target(
         b"\n", b", ", b": ", b"{", b"}", b"[", b"]", b"[" * 1200, b"]" * 1200, b'{"a":' * 300, b"\xff", b"\xef\xbb\xbf",
         b"\0", b" " * 4096, b'"bay-1", ', b'"' + b"\\u0001" * 600 + b'"', b"\\", b'"',
     ],
-    [f"orchestrator/service/{name}.py" for name in ("reception", "client", "control", "supervisor", "status")],
+    [f"orchestrator/service/{name}.py" for name in ("reception", "client", "control", "request_handler", "status")],
     max_bytes=client.MAX_REQUEST + 64,
     limit_s=1.0,
 )  # fmt: skip
