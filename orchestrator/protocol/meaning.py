@@ -53,11 +53,11 @@ def _raw(data: bytes) -> list[tuple[bytes, str]]:
 
 
 def _words(name: str, value: float) -> str:
-    if name == "current_limit" and (step := _STEPS.get(int(value))):
-        return f"{value} ({step})"
     if isinstance(value, IntEnum):
         return f"{value} ({value.name.lower().replace('_', ' ')})"
-    return f"{value}{_UNITS.get(name.rpartition('_')[2], '')}"
+    if name == "current_limit":
+        return f"{value} ({_STEPS[int(value)]})"
+    return f"{value}{_UNITS[name.rpartition('_')[2]]}"
 
 
 def error_names(bits: int) -> list[str]:

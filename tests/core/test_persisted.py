@@ -451,6 +451,7 @@ def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
 def test_the_first_format_is_read(name: str, latched: bool, strikes: int) -> None:
     fault = from_first_format(name, "text")
     assert (fault.cause, fault.latched, len(fault.strikes)) == (cause("text"), latched, strikes)
+    assert set(fault.strikes) <= {0.0}, "when it was raised is not known: just now, so that no wait is cut short"
     memory = Persisted(faults={name: fault}).memory(100.0)
     assert memory.faults[name].latched is latched
     assert memory.faults[name].raised_s == 100.0
