@@ -10,12 +10,13 @@ from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import finished, full_due, goes_full, goes_on, target
-from orchestrator.core.machine import RESTING, Trigger
+from orchestrator.core.machine import Trigger
 from orchestrator.core.operator import RESET
 from orchestrator.core.outofcontrol import out_of_control, problem
 from orchestrator.core.safestop import LOST_S, gives_up, verified
+from orchestrator.core.states import ENERGISED, SETTLED, STARTABLE
 from orchestrator.core.witnesses.standby import current_without_order
-from orchestrator.model import ENERGISED, ActiveFault, Cause, Effect, State
+from orchestrator.model import ActiveFault, Cause, Effect, State
 
 Course = tuple[Trigger | None, Cause]
 Faults = tuple[ActiveFault, ...]
@@ -45,7 +46,7 @@ def course(f: Facts, faults: Faults) -> Course:
     state = f.memory.state
     if state in ENERGISED:
         return _energised(f, faults)
-    if state in RESTING or state is State.TRIPPED:
+    if state in SETTLED:
         return _resting(f, faults)
     return _stopping(f, faults)
 
@@ -158,7 +159,7 @@ def _rest(f: Facts, faults: Faults) -> Course:
         return Trigger.RESET, _held(f, RESET)
     if state is State.QUALIFYING and trigger is Trigger.QUALIFY:
         return _qualifying(f)
-    if trigger is Trigger.QUALIFY and state not in (State.IDLE, State.HELD, State.FULL, State.SUSPENDED):
+    if trigger is Trigger.QUALIFY and state not in STARTABLE:
         return (Trigger.REST if f.memory.session is None else Trigger.SUSPEND), why
     return (None if LEADS.get(trigger) is state else trigger), why
 

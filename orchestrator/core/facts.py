@@ -7,9 +7,9 @@ from math import inf, isfinite
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import standby
 from orchestrator.model import (
-    ENERGISED,
     BatteryLink,
     Cause,
     ChargeMode,

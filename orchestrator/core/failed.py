@@ -6,10 +6,10 @@ that the next step, if it does not raise, goes on from there.
 
 from orchestrator.core.contactor import closes
 from orchestrator.core.latches import shown
-from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.safestop import OBEY_STOP_S
+from orchestrator.core.states import UNVERIFIED
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 
 FAULT = "internal"

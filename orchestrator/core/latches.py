@@ -15,9 +15,9 @@ from math import ceil
 from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
-from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory
 from orchestrator.core.safestop import verified
+from orchestrator.core.states import UNVERIFIED
 from orchestrator.model import ActiveFault, Cause, Effect
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").

@@ -9,11 +9,10 @@ from collections.abc import Callable
 from orchestrator.core import latches
 from orchestrator.core.memory import Memory
 from orchestrator.core.safestop import LASTS_S
-from orchestrator.model import ENERGISED, Cause, Request, State
+from orchestrator.core.states import AT_WORK
+from orchestrator.model import Cause, Request, State
 from orchestrator.model.cause import together
 
-#: A charge has been started already.
-AT_WORK = ENERGISED | {State.QUALIFYING}
 STOPPED = Cause("operator_stop")
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0

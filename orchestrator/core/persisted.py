@@ -10,11 +10,10 @@ from dataclasses import dataclass, field, replace
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory
-from orchestrator.model import ENERGISED, Cause, Session, State
+from orchestrator.core.states import MAY_RUN
+from orchestrator.model import Cause, Session
 from orchestrator.model.cause import together
 
-#: In these a charger may be delivering current.
-RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
 #: Mere counters are written this often while nothing else changes.
 COUNTERS_S = 30.0
 UNFINISHED = Cause("unfinished")
@@ -64,7 +63,7 @@ class Persisted:
         soc_s, soc_pct = memory.charge
         session = memory.session
         return cls(
-            running=memory.state in RUNNING or memory.intends or memory.unverified,
+            running=memory.state in MAY_RUN or memory.intends or memory.unverified,
             hold=memory.hold,
             paused=memory.paused,
             faults=faults,

@@ -13,7 +13,7 @@ old values as soon as it is resumed. So a bay that qualifies for a charge stops 
 """
 
 from orchestrator.core.facts import Facts
-from orchestrator.core.machine import UNVERIFIED
+from orchestrator.core.states import UNVERIFIED
 from orchestrator.model import State
 
 #: A stop that is not verified within this is not obeyed (DESIGN §6).

@@ -17,9 +17,9 @@ from orchestrator.core.rows import counted
 from orchestrator.core.rules import Rules
 from orchestrator.core.safestop import follow_stop, must_stop, stands_by
 from orchestrator.core.sequence import next_order
+from orchestrator.core.states import ALIKE, ENERGISED, SESSION_ENDS
 from orchestrator.core.track import follow, follow_state
 from orchestrator.model import (
-    ENERGISED,
     STANDBY,
     STOP,
     ActiveFault,
@@ -43,11 +43,6 @@ SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
     State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
 }
 PRECHARGE = Cause("precharge_step", key="precharge")
-#: After these a charge is over. A pause, a stop that is not verified, a device that does not answer and a restart do
-#: not end it: its limits would begin anew with each of them.
-SESSION_ENDS = frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})
-#: … but who waits for a person, or no longer does, has come no farther: what a restart has left open stays open.
-ALIKE = frozenset({State.IDLE, State.HELD})
 
 
 def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:

@@ -15,10 +15,11 @@ from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S, Facts
 from orchestrator.core.finish import FALLEN_PCT, known_full, tapers
 from orchestrator.core.memory import Still
 from orchestrator.core.rows import follow_rows
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import followed
 from orchestrator.core.witnesses.measured import STILL_ABOVE_A
 from orchestrator.core.witnesses.standby import sees_current
-from orchestrator.model import ENERGISED, Action, Cause, ChargeMode, ChargerReading, Operation, Session, State
+from orchestrator.model import Action, Cause, ChargeMode, ChargerReading, Operation, Session, State
 
 #: How far apart the kept temperatures are.
 WARMTH_EVERY_S = 10.0

@@ -6,6 +6,7 @@ from dataclasses import asdict
 
 from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
+from orchestrator.core.states import QUIET
 from orchestrator.model import (
     ActiveFault,
     BatteryLink,
@@ -25,8 +26,6 @@ from orchestrator.text.catalogue import say
 
 Line = tuple[str, dict[str, object]]  #: kind, fields
 
-#: States in which every step is the same until something happens.
-QUIET = frozenset({State.IDLE, State.HELD, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
 #: What of a record is said for people, beside its cause.
 TEXTS = frozenset({"reason", "text", "rule", "result"})
 #: What of a snapshot is about this service and its contactor.

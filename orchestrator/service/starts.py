@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from math import inf
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses.followed import FIRST_A, OWN_SHARE
-from orchestrator.model import ENERGISED, Cause, Snapshot, State
+from orchestrator.model import Cause, Snapshot, State
 
 #: A turn takes no longer than this: the charger's sequence takes 2 s on a good line, and its first amperes follow.
 TURN_S = 20.0

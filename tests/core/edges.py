@@ -8,9 +8,9 @@ from orchestrator.config.policy import Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses.followed import Witnessed
 from orchestrator.model import (
-    ENERGISED,
     BatteryLink,
     BatteryReading,
     ChargeMode,

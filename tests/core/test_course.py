@@ -8,9 +8,9 @@ import pytest
 from orchestrator.config.policy import Policy
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED
 from orchestrator.keys import Range
 from orchestrator.model import (
-    ENERGISED,
     STOP,
     Action,
     Alarm,

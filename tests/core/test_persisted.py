@@ -13,8 +13,9 @@ from orchestrator.config.policy import Policy
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import MAX_RESETS, STOPPED
-from orchestrator.core.persisted import COUNTERS_S, RUNNING, UNFINISHED, Persisted, PersistedFault, from_first_format
-from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargerLink, Request, Session, State
+from orchestrator.core.persisted import COUNTERS_S, UNFINISHED, Persisted, PersistedFault, from_first_format
+from orchestrator.core.states import ENERGISED, MAY_RUN
+from orchestrator.model import STOP, Action, Alarm, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle
 from tests.core.fault_scenes import SCENES
 from tests.core.said import cause, reason_of, say
@@ -51,7 +52,7 @@ def stopped_meanwhile(world: World) -> None:
 @every_state
 def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None:
     world = IN[state]()
-    ran = state in RUNNING
+    ran = state in MAY_RUN
     assert Persisted.of(world.memory, world.now_s).running is ran
     restarted(world)
     world.deaf.clear()
@@ -71,7 +72,7 @@ def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None
 
 @every_state
 def test_a_charger_that_may_run_and_is_not_heard_is_an_alarm_over_any_number_of_restarts(state: State) -> None:
-    if state not in RUNNING:
+    if state not in MAY_RUN:
         return
     world = IN[state]()
     for _ in range(3):
@@ -376,7 +377,7 @@ def test_nothing_is_lost_and_nothing_begins_by_itself(acts: list[tuple[int, int,
             world.tick()
         if gap_s is None:
             continue
-        before, now_s, ran = world.memory, world.now_s, world.state in RUNNING
+        before, now_s, ran = world.memory, world.now_s, world.state in MAY_RUN
         restarted(world, gap_s)
         assert_kept(before, now_s, world.memory, world.now_s, gap_s)
         for _ in range(20):

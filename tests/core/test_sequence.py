@@ -7,9 +7,9 @@ import pytest
 
 from orchestrator.core.facts import Facts
 from orchestrator.core.sequence import next_order
+from orchestrator.core.states import ENERGISED
 from orchestrator.devices.schedule import Turn
 from orchestrator.model import (
-    ENERGISED,
     STANDBY,
     STOP,
     Action,

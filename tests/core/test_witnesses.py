@@ -10,8 +10,9 @@ from orchestrator.config.load import load_policy
 from orchestrator.config.policy import CellType, Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import LASTS_S
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import pack as packs
-from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargeMode, Measurement, Operation, Request, State
+from orchestrator.model import STOP, Action, Alarm, ChargeMode, Measurement, Operation, Request, State
 from orchestrator.sim import chemistry
 from tests.core.bays import IN, POLICY, charging, idle, stopping
 from tests.core.edges import Edge

@@ -11,10 +11,11 @@ import pytest
 
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import STOPPED
+from orchestrator.core.states import AT_WORK
 from orchestrator.model import Cause, ControlMode, State
 from orchestrator.workbench.prove.explore import Place, Walk
 from orchestrator.workbench.prove.gist import Gist, gist, outline
-from orchestrator.workbench.prove.inputs import AT_WORK, StationInputs
+from orchestrator.workbench.prove.inputs import StationInputs
 from orchestrator.workbench.prove.story import BEGIN_S, TICK_S, Move, Taken
 from tests.proof.exploring import POLICIES, rules, small, walk_on
 

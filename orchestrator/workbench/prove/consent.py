@@ -8,12 +8,9 @@ from collections.abc import Iterator
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
-from orchestrator.model import ENERGISED, Alarm, Cause, Request, State
+from orchestrator.core.states import ENERGISED, READY, UNSEEN, UNVERIFIED
+from orchestrator.model import Alarm, Cause, Request, State
 from orchestrator.workbench.prove.story import Taken
-
-UNPROVED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
-#: States in which no person need act before a charge.
-READY = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED}) | ENERGISED
 
 
 def operator_stops(taken: Taken) -> str | None:
@@ -78,7 +75,7 @@ def tripped_until_reset(taken: Taken) -> str | None:
     """TRIPPED is left by a person's reset, or to stop a charger that runs."""
     if taken.before.state is not State.TRIPPED or taken.after.state in (State.TRIPPED, State.STOPPING):
         return None
-    if taken.move.restart and taken.after.state in UNPROVED:
+    if taken.move.restart and taken.after.state in UNVERIFIED:
         return None  # the stop is verified anew; what has latched is looked after by its own property
     return None if taken.snapshot.request is Request.RESET else f"left for {taken.after.state} without a reset"
 
@@ -106,7 +103,7 @@ def alarmed(taken: Taken) -> str | None:
     And of one that stands by until a person has seen to a fault; but not of what an operator has stopped.
     """
     after, alarm = taken.after, taken.decision.alarm
-    left = after.unverified and after.state in (State.STARTING, State.OFFLINE)
+    left = after.unverified and after.state in UNSEEN
     shared = bool(taken.snapshot.charger_link.locked_by) or "port_locked" in after.faults
     if after.state is State.UNCONTROLLABLE or left:
         right = alarm is Alarm.DANGER

@@ -11,10 +11,10 @@ from math import inf
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
-from orchestrator.model import ENERGISED, STOP, Request, State
+from orchestrator.core.states import AT_REST, ENERGISED
+from orchestrator.model import STOP, Request, State
 from orchestrator.workbench.prove.explore import Explorer, Node, Place, Walk
 from orchestrator.workbench.prove.gist import details
-from orchestrator.workbench.prove.properties import STANDBY
 from orchestrator.workbench.prove.story import TICK_S, Move, Taken
 
 #: While nothing changes: so many steps of each length. Beyond the last one all timers have run out.
@@ -51,7 +51,7 @@ class Ending:
 
 
 def _stands_by(taken: Taken) -> bool:
-    return taken.after.state in STANDBY and taken.decision.command is None
+    return taken.after.state in AT_REST and taken.decision.command is None
 
 
 def _uncontrollable(taken: Taken) -> bool:

@@ -10,14 +10,12 @@ from collections.abc import Callable, Mapping
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import release
-from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import Memory
+from orchestrator.core.states import ENERGISED, UNPROVED
 from orchestrator.core.witnesses.standby import UNORDERED_S
-from orchestrator.model import ENERGISED, Effect, State
+from orchestrator.model import Effect, State
 
 Gist = tuple[object, ...]
-#: In these standby comes first. What clears by itself decides only then, and until then it may come and go.
-UNPROVED = frozenset({*UNVERIFIED, State.OFFLINE})
 
 
 def outline(memory: Memory) -> Gist:

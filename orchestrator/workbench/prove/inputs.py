@@ -11,8 +11,8 @@ from typing import Any
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import AT_WORK, ENERGISED
 from orchestrator.model import (
-    ENERGISED,
     Action,
     ChargeMode,
     ChargerLink,
@@ -35,7 +35,6 @@ SENT_AGE_S, READ_AGE_S, OLD_S = 0.1, 0.05, 30.0
 #: Of two timers that are no farther apart than this, a jump past the longer one is past both.
 ALIKE = 1.1
 #: Where the tables of steps are looked at, or may be at the end of the step.
-AT_WORK = ENERGISED | {State.QUALIFYING}
 #: What flows in precharge.
 PRECHARGE_A = 1.0
 #: What a charger shows in each stage.

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from orchestrator.config.policy import Policy
-from orchestrator.core.machine import RESTING
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import RESTING
 from orchestrator.core.step import step
 from orchestrator.model import Decision, Snapshot, State, Step
 from orchestrator.text.catalogue import say

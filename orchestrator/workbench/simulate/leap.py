@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.track import thinned
-from orchestrator.model import ENERGISED, Decision
+from orchestrator.model import Decision
 
 Outline = tuple[object, ...]
 
