@@ -3,7 +3,9 @@
 A value here is a number, fresh and in range, or it is None. Nothing downstream looks at a reading's age again.
 """
 
+from collections.abc import Container
 from math import inf, isfinite
+from typing import NoReturn
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
@@ -50,59 +52,74 @@ def _valid(reading: ChargerReading | None, now_s: float) -> ChargerReading | Non
 
 
 class Facts:
-    """Read-only by convention; made anew by every step."""
+    """What is true now. Nobody can change it: who knows more makes other facts (`with_memory`, `with_broken`)."""
 
-    __slots__ = (
-        "amps",
-        "battery",
-        "broken",
-        "charger",
-        "connected",
-        "energised",
-        "memory",
-        "now_s",
-        "pack_a",
-        "pack_v",
-        "raised",
-        "reading",
-        "rules",
-        "slow_from_s",
-        "snapshot",
-        "soc",
-        "soh",
-        "state_s",
-        "status",
-        "temperature_c",
-        "volts",
-    )
+    now_s: float
+    snapshot: Snapshot
+    memory: Memory
+    rules: Rules
+    reading: ChargerReading | None
+    charger: ChargerLink
+    battery: BatteryLink
+    volts: float | None
+    amps: float | None
+    slow_from_s: float
+    pack_v: float | None
+    pack_a: float | None
+    status: float | None
+    temperature_c: float | None
+    soc: float | None
+    soh: float | None
+    connected: bool
+    broken: tuple[Cause, ...]  #: what of our own could not be judged in this step
+    energised: bool
+    state_s: float
+    raised: Container[str]  #: ids of the faults that the last step has left in force; for thresholds with hysteresis
 
     def __init__(self, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> None:
-        self.now_s = now_s
-        self.snapshot = snapshot
-        self.memory = memory
-        self.rules = rules
-        self.reading: ChargerReading | None = _valid(snapshot.charger, now_s)
-        self.charger: ChargerLink = snapshot.charger_link
-        self.battery: BatteryLink = snapshot.battery_link
-        self.volts = self.reading.voltage_v if self.reading else None
-        self.amps = self.reading.current_a if self.reading else None
-        battery, boot_s = snapshot.battery, self.battery.boot_t_s
-        settled_s = boot_s + SETTLE_S if boot_s is not None else -inf
+        reading, battery, link = _valid(snapshot.charger, now_s), snapshot.battery, snapshot.battery_link
+        settled_s = link.boot_t_s + SETTLE_S if link.boot_t_s is not None else -inf
         fast_s, slow_s = max(now_s - FAST_STALE_S, settled_s), max(now_s - SLOW_STALE_S, settled_s)
-        self.slow_from_s = slow_s
-        self.pack_v = _fresh(battery.voltage_v, now_s, fast_s)
-        self.pack_a = _fresh(battery.current_a, now_s, fast_s)
-        self.status = _fresh(battery.status, now_s, fast_s)
-        self.temperature_c = _fresh(battery.temperature_c, now_s, fast_s)
-        self.soc = _fresh(battery.soc_pct, now_s, slow_s)
-        self.soh = _fresh(battery.soh_pct, now_s, slow_s)
-        self.connected = snapshot.connected
-        #: what of our own could not be judged in this step
-        self.broken: list[Cause] = []
-        self.energised = memory.state in ENERGISED
-        self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
-        #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
-        self.raised = {name for name, fault in memory.faults.items() if fault.raised_s is not None}
+        self.__dict__.update(  # past `__setattr__`
+            now_s=now_s,
+            snapshot=snapshot,
+            memory=memory,
+            rules=rules,
+            reading=reading,
+            charger=snapshot.charger_link,
+            battery=link,
+            volts=reading.voltage_v if reading else None,
+            amps=reading.current_a if reading else None,
+            slow_from_s=slow_s,
+            pack_v=_fresh(battery.voltage_v, now_s, fast_s),
+            pack_a=_fresh(battery.current_a, now_s, fast_s),
+            status=_fresh(battery.status, now_s, fast_s),
+            temperature_c=_fresh(battery.temperature_c, now_s, fast_s),
+            soc=_fresh(battery.soc_pct, now_s, slow_s),
+            soh=_fresh(battery.soh_pct, now_s, slow_s),
+            connected=snapshot.connected,
+            broken=(),
+            energised=memory.state in ENERGISED,
+            state_s=now_s - memory.since_s if memory.since_s is not None else 0.0,
+            raised=frozenset(name for name, fault in memory.faults.items() if fault.raised_s is not None),
+        )
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise AttributeError(name)
+
+    def with_memory(self, memory: Memory) -> "Facts":
+        """The same facts, beside what follows from them. What was so before the step stays: state, faults in force."""
+        return self._with("memory", memory)
+
+    def with_broken(self, broken: tuple[Cause, ...]) -> "Facts":
+        """The same facts, and what could not be judged by them."""
+        return self._with("broken", broken)
+
+    def _with(self, name: str, value: object) -> "Facts":
+        facts = object.__new__(Facts)
+        facts.__dict__.update(self.__dict__)
+        facts.__dict__[name] = value
+        return facts
 
     def slow(self, measurement: Measurement | None) -> float | None:
         """A value of the slow objects that only few rows look at, if it may be relied on."""
@@ -173,7 +190,7 @@ class Facts:
         """The charger itself ended a charge that it was running (mode 5 is also plain standby)."""
         return (
             self.memory.state is State.CHARGING
-            and self.memory.ran
+            and self.memory.stage.ran
             and self.reading is not None
             and self.reading.charge_mode is ChargeMode.FULL
         )

@@ -9,6 +9,7 @@ A predicate that raises is a defect of ours: that row cannot be judged any more,
 which is judged last, and all the others go on.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import ceil
 
@@ -30,14 +31,14 @@ STRIKES_S = 3600.0
 
 def update(f: Facts) -> dict[str, FaultMemory]:
     """The fault memory after this step's facts."""
-    before, state = f.memory.faults, f.memory.state
-    passed_s = f.now_s - f.memory.looked_s if f.memory.looked_s is not None else 0.0
-    f.memory.looked_s = f.now_s
+    before, state, looked_s = f.memory.faults, f.memory.state, f.memory.looked_s
+    passed_s = f.now_s - looked_s if looked_s is not None else 0.0
     departed = f.departed and not f.energised
     after: dict[str, FaultMemory] = {}
     for row in FAULTS:
         fault = before.get(row.id)
-        if fault is None and state not in row.where:
+        where = state in row.where
+        if fault is None and not where:
             continue
         left = departed and row.departs
         if left and not (fault is not None and fault.latched):
@@ -45,8 +46,12 @@ def update(f: Facts) -> dict[str, FaultMemory]:
             if strikes:  # what it has just done was no fault; what it did before was
                 after[row.id] = FaultMemory(strikes=strikes)
             continue
-        looked_for = not left and (state in row.where or (fault is not None and fault.raised_s is not None))
-        seen = _seen(row, f) if looked_for else None
+        seen = None
+        if not left and (where or (fault is not None and fault.raised_s is not None)):
+            try:
+                seen = row.check(f)
+            except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
+                f = f.with_broken((*f.broken, Cause.of("not_judged", fault=row.id, error=repr(error))))
         if seen is not None:
             after[row.id] = _present(row, fault or FaultMemory(), seen, f, passed_s)
         elif fault is not None:
@@ -54,15 +59,6 @@ def update(f: Facts) -> dict[str, FaultMemory]:
             if kept is not None:
                 after[row.id] = kept
     return after
-
-
-def _seen(row: Row, f: Facts) -> Cause | None:
-    """What the row's predicate sees."""
-    try:
-        return row.check(f)
-    except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
-        f.broken.append(Cause.of("not_judged", fault=row.id, error=repr(error)))
-        return None
 
 
 def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
@@ -121,14 +117,14 @@ def effect(name: str, fault: FaultMemory) -> Effect:
     return Effect.TRIP if fault.latched else ROW[name].effect
 
 
-def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
+def raised(faults: Mapping[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
     """The faults in force, worst effect first, then the oldest."""
     live = [(name, fault) for name, fault in faults.items() if fault.raised_s is not None]
     live.sort(key=lambda item: (-effect(*item), item[1].raised_s))
     return live
 
 
-def shown(faults: dict[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
+def shown(faults: Mapping[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
     """The faults in force: what was seen, and the id of what to do.
 
     `at_rest`: the charger stands by, verified.
@@ -182,7 +178,7 @@ def _left_s(row: Row, fault: FaultMemory, now_s: float) -> float | None:
 
 
 def release(
-    faults: dict[str, FaultMemory], now_s: float, *, by_reset: bool
+    faults: Mapping[str, FaultMemory], now_s: float, *, by_reset: bool
 ) -> tuple[dict[str, FaultMemory], list[Cause]]:
     """Clear what a person may clear: by a reset everything, by a start what waits for a start.
 

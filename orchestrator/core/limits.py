@@ -31,7 +31,7 @@ def bounds(f: Facts, worst: ActiveFault | None) -> Iterator[Bound]:
 
     `worst` is the worst of the faults in force; LIMIT, and what is worse, means the lowest step.
     """
-    rules, rows = f.rules, dict(f.memory.rows)
+    rules, rows = f.rules, dict(f.memory.tables.rows)
     yield Bound(rules.policy.pack.current_a, "pack.current_a")
     if rules.top_step < len(rules.steps_a) - 1:
         yield Bound(rules.worst_a[rules.top_step], "limits.current_a")
@@ -71,7 +71,7 @@ def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
     index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # where none is allowed a fault has ended the charge
     if index == len(f.rules.steps_a) - 1:
         bound = Bound(bound.allowed_a, "")
-    before, raise_s = f.memory.step, f.memory.raise_s
+    before, raise_s = f.memory.stage.step, f.memory.stage.raise_s
     if before is None or index < before.index:
         return _step(f, index, bound), None
     if index == before.index:

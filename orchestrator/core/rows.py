@@ -11,23 +11,18 @@ from dataclasses import dataclass
 from orchestrator.config.amperes import TableRule, hysteresis, ranges
 from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
+from orchestrator.core.memory import Tables
+from orchestrator.core.parts import changed
 
 #: A row that has brought the step down more often than this in one charge is not left any more.
 MOST_RETURNS = 2
 
-InForce = tuple[tuple[str, int], ...]  #: the row of each table, and the rules of `where` (`where[1]`)
-Returns = tuple[tuple[str, int], ...]  #: how often each key has brought the step down in this charge
+NONE = Tables()
 
 
 def values(f: Facts) -> dict[str, float | None]:
     """What the tables are about."""
     return {"temperature_c": f.temperature_c, "soc_pct": f.soc, "soh_pct": f.soh, "voltage_v": f.pack_v}
-
-
-def counted(returns: Returns, key: str) -> Returns:
-    """One more time."""
-    times = dict(returns)
-    return tuple((times | {key: times.get(key, 0) + 1}).items())
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,22 +60,31 @@ class _Follower:
         return self.returns.get(key, 0) > MOST_RETURNS
 
 
-def follow_rows(f: Facts) -> None:
-    """Bring the memory's rows up to this step."""
+def update(f: Facts) -> Tables:
+    """The rows that are in force by these facts."""
     memory, current = f.memory, f.rules.policy.current
-    if f.departed or f.battery.boots != memory.boots:
-        memory.rows, memory.row_returns = (), ()
-        return
-    if memory.session is None:
-        memory.row_returns = ()
-    follower, now, known = _Follower(f, dict(memory.rows), dict(memory.row_returns)), {}, values(f)
+    before = memory.tables
+    if f.departed or f.battery.boots != memory.battery.boots:
+        return before if before == NONE else NONE
+    returns = before.row_returns if memory.session is not None else ()
+    follower, known = _Follower(f, dict(before.rows), dict(returns)), values(f)
+    now: dict[str, int] = {}
     for table in f.rules.tables:
         if (found := follower.table(table, known[table.name])) is not None:
             now[table.name] = found
     for number, rule in enumerate(current.where):
         if follower.rule(number, rule, known):
             now[f"where[{number}]"] = number
-    memory.rows = tuple(now.items())
+    rows = tuple(now.items())
+    if rows == before.rows and returns == before.row_returns:
+        return before
+    return changed(before, rows=rows, row_returns=returns)
+
+
+def lowered(tables: Tables, key: str) -> Tables:
+    """What this key names has brought the step down once more."""
+    times = dict(tables.row_returns)
+    return changed(tables, row_returns=tuple((times | {key: times.get(key, 0) + 1}).items()))
 
 
 def _row(rows: tuple[Band, ...], value: float) -> int | None:

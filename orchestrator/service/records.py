@@ -6,6 +6,7 @@ from dataclasses import asdict
 
 from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
+from orchestrator.core.memory import plain as plain_memory
 from orchestrator.core.states import QUIET
 from orchestrator.model import (
     ActiveFault,
@@ -140,7 +141,7 @@ class SnapshotRecorder:
             return None
         fields: dict[str, object] = {"at_s": now_s}
         if self._last is None or self._since_whole >= WHOLE_EVERY:
-            fields |= {"whole": True, **asdict(snapshot), "memory": asdict(memory), "config": self._config}
+            fields |= {"whole": True, **asdict(snapshot), "memory": plain_memory(memory), "config": self._config}
             self._since_whole = 0
         else:
             fields |= _difference(self._last, snapshot)

@@ -69,7 +69,7 @@ class Starts:
         self._seen[name] = Amps(bmu.value if bmu is not None else 0.0, charger.current_a if charger else 0.0)
         turn = self._turn
         if turn is None:
-            if memory.ready and now_s - self._began_s >= self._stagger_s:
+            if memory.stage.ready and now_s - self._began_s >= self._stagger_s:
                 self._turn, self._moves = Turn(name, now_s), ""
         elif turn.name == name:
             self._go_on(turn, now_s, memory)
@@ -82,7 +82,7 @@ class Starts:
             self._moves = self._moved(turn)
             over = memory.witnessed.proved
         else:
-            over = memory.state is not State.QUALIFYING or not memory.ready
+            over = memory.state is not State.QUALIFYING or not memory.stage.ready
         if over:
             self._turn = None
 

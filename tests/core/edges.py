@@ -6,7 +6,7 @@ from typing import Any
 
 from orchestrator.config.policy import Policy
 from orchestrator.core.facts import Facts
-from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.memory import FaultMemory
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses.followed import Witnessed
@@ -27,7 +27,7 @@ from orchestrator.model import (
 )
 from tests.core.bays import POLICY
 from tests.core.said import cause
-from tests.core.world import bay
+from tests.core.world import bay, remembering
 
 NOW_S = 100_000.0
 AT = POLICY.source.at
@@ -69,8 +69,8 @@ class Edge:
         values = self.bmu if self.state in ENERGISED else {"current_a": 0.0, **self.bmu}
         measured = {name: None if x is None else Measurement(x, NOW_S) for name, x in values.items()}
         proof = witnessed() if "stop_sent_s" in self.charger_link else {}
-        memory = Memory(**{"state": self.state, "since_s": ago(self.state_s), "ran": True, "runs_s": ago(50),
-                           **proof, **self.memory})  # fmt: skip
+        begun = {"state": self.state, "since_s": ago(self.state_s), "ran": True, "runs_s": ago(50)}
+        memory = remembering(**{**begun, **proof, **self.memory})
         snapshot = Snapshot(
             charger=replace(READING, **self.charger),
             charger_link=replace(ChargerLink(online=True), **self.charger_link),

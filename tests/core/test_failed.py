@@ -136,7 +136,7 @@ def test_a_stop_is_heard_meanwhile_and_nothing_else_is(raises: Switch, state: St
     assert world.ask(Request.RESET) == ""
     world.run(60)
     assert world.is_in(State.HELD)
-    assert world.memory.hold
+    assert world.memory.operator.hold
 
 
 def test_what_was_known_of_the_bay_is_kept(raises: Switch) -> None:

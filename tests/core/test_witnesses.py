@@ -442,7 +442,7 @@ def test_a_step_that_is_told_anew_is_not_one_that_went_back() -> None:
         world.values["temperature_c"] = celsius
         world.run(61)
     assert "limit_reverted" not in world.raised
-    assert world.memory.reverts == ()
+    assert world.memory.charger.reverts == ()
 
 
 # --- mode 5 -----------------------------------------------------------------------------------------------------------
@@ -457,7 +457,7 @@ def test_a_charger_that_somebody_stopped_is_not_full(soc_pct: float) -> None:
     world.shows.update(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED, current_a=0.0)
     world.until(State.HELD, 3.0)
     assert set(world.raised) - {"soc_jump"} == {"stopped_by_itself"}
-    assert world.memory.full_pct is None
+    assert world.memory.battery.full_pct is None
     world.shows.clear()
     world.run(600, dt_s=1.0)
     assert world.is_in(State.HELD)  # it does not charge again by itself

@@ -110,7 +110,7 @@ DISK: tuple[Seed, ...] = (
         ("charging, then no power",),
         (
             f"{CORE}persisted.py",
-            "running=memory.state in RUNNING or memory.intends or memory.unverified,",
+            "running=memory.state in RUNNING or memory.stage.intends or memory.stop.unverified,",
             "running=False,",
         ),
         (
@@ -192,7 +192,7 @@ DISK: tuple[Seed, ...] = (
         "disk",
         "an operator's stop is forgotten with a restart",
         ("stopped, then no power",),
-        (f"{CORE}persisted.py", "            hold=memory.hold,\n", '            hold="",\n'),
+        (f"{CORE}persisted.py", "            hold=memory.operator.hold,\n", '            hold="",\n'),
     ),
     scene(
         "latches are not kept",
@@ -330,7 +330,7 @@ WITNESSES: tuple[Seed, ...] = (
             f"{SERVICE}bay.py",
             "        self._ending = why\n",
             "        self._ending = why\n        if self._memory is not None:\n"
-            '            self._memory.hold = self._memory.hold or Cause.of("service_ends", why=why)\n',
+            '            self._memory.operator.hold = self._memory.operator.hold or Cause.of("service_ends", why=why)\n',
         ),
     ),
     part(
@@ -469,7 +469,7 @@ RESTARTS: tuple[Seed, ...] = (
         ("tests/core/test_safestop.py::test_a_charger_that_ran_at_the_start_has_been_stopped_once_already",),
         (
             f"{CORE}safestop.py",
-            '        if memory.stopping_s is None and "found_running" in f.raised:',
+            '        if memory.stop.stopping_s is None and "found_running" in f.raised:',
             "        if False:",
         ),
     ),
@@ -481,8 +481,8 @@ RESTARTS: tuple[Seed, ...] = (
         (
             f"{CORE}persisted.py",
             "            session=replace(session, started_s=now_s - session.started_s) if session is not "
-            "None else None,\n            full_pct=memory.full_pct,",
-            "            full_pct=memory.full_pct,",
+            "None else None,\n            full_pct=memory.battery.full_pct,",
+            "            full_pct=memory.battery.full_pct,",
         ),
     ),
     scene(
@@ -526,7 +526,11 @@ RESTARTS: tuple[Seed, ...] = (
         "restart",
         "a restart allows three more resets",
         ("tests/core/test_persisted.py",),
-        (f"{CORE}persisted.py", "            resets=tuple((now_s - t_s, name) for t_s, name in memory.resets),\n", ""),
+        (
+            f"{CORE}persisted.py",
+            "            resets=tuple((now_s - t_s, name) for t_s, name in memory.operator.resets),\n",
+            "",
+        ),
     ),
 )
 
@@ -727,11 +731,15 @@ WORDS: tuple[Seed, ...] = (
         "words",
         "a charger that ran when the service died and is not heard is no alarm",
         ("cut off and not heard, then killed",),
-        (f"{CORE}alarm.py", "    unknown = memory.unverified and", "    unknown = False and"),
-        (f"{CORE}safestop.py", "        return memory.unverified and f.state_s >= LOST_S\n", "        return False\n"),
+        (f"{CORE}alarm.py", "    unknown = memory.stop.unverified and", "    unknown = False and"),
+        (
+            f"{CORE}safestop.py",
+            "        return memory.stop.unverified and f.state_s >= LOST_S\n",
+            "        return False\n",
+        ),
         (
             f"{CORE}course.py",
-            "if state is State.STARTING and not memory.unverified and not f.charger.online",
+            "if state is State.STARTING and not memory.stop.unverified and not f.charger.online",
             "if state is State.STARTING and not f.charger.online",
         ),
     ),

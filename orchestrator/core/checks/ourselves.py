@@ -13,7 +13,7 @@ SUSPENDED_S = 2.0
 def internal(f: Facts) -> Cause | None:
     """FAULTS G5, P11."""
     said = Cause.of("internal_error", error=f.snapshot.internal)
-    whats = (said, *f.broken) if f.snapshot.internal else tuple(f.broken)
+    whats = (said, *f.broken) if f.snapshot.internal else f.broken
     return Cause.of("internal", whats=whats) if whats else None
 
 

@@ -1,9 +1,10 @@
 """What is followed of both witnesses from step to step."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from orchestrator.core.drain import drained
+from orchestrator.core.parts import changed, event, measured
 from orchestrator.core.witnesses.standby import FROZEN, UNORDERED_MOST_S, sees_current
 
 if TYPE_CHECKING:
@@ -38,20 +39,20 @@ class Frozen:
     charged_ah: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Witnessed:
-    """Made anew by every step."""
+    """What both have shown until now."""
 
-    stop_s: float | None = None  #: when the first whole stop of the present state was handed to the port
-    proof: tuple[float, ...] = ()  #: when the first and the newest of the status replies since then were asked for that
-    #: showed standby, without a break
-    sees: bool = False  #: the BMU sees a charging current that nobody ordered …
-    unordered_s: float = 0.0  #: … and for how long it has; drains
-    trail: tuple[Sample, ...] = ()  #: of the last seconds under current, oldest first
-    frozen: Frozen | None = None
-    before_a: float = 0.0  #: what the BMU saw before this charge began
-    proved: bool = False  #: the BMU has seen the charge begin
-    alone_s: float = 0.0  #: for how long the charger has delivered without that; drains
+    stop_s: float | None = event(None)  #: when the first whole stop of the present state was handed to the port
+    proof: tuple[float, ...] = measured(())  #: when the first and the newest of the status replies since then were
+    #: asked for that showed standby, without a break
+    sees: bool = measured(default=False)  #: the BMU sees a charging current that nobody ordered …
+    unordered_s: float = measured(0.0)  #: … and for how long it has; drains
+    trail: tuple[Sample, ...] = measured(())  #: of the last seconds under current, oldest first
+    frozen: Frozen | None = measured(None)
+    before_a: float = measured(0.0)  #: what the BMU saw before this charge began
+    proved: bool = event(default=False)  #: the BMU has seen the charge begin
+    alone_s: float = measured(0.0)  #: for how long the charger has delivered without that; drains
 
 
 def follow(f: "Facts", passed_s: float) -> Witnessed:
@@ -59,7 +60,7 @@ def follow(f: "Facts", passed_s: float) -> Witnessed:
     known = f.memory.witnessed
     stop_s = _stop_s(f)
     sees = sees_current(f) and not f.energised
-    return replace(
+    return changed(
         _first_amperes(f, known, passed_s),
         stop_s=stop_s,
         proof=_proof(f, stop_s, known.proof if stop_s == known.stop_s else ()),
@@ -118,9 +119,9 @@ def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
 
 def _first_amperes(f: "Facts", known: Witnessed, passed_s: float) -> Witnessed:
     if not f.energised:
-        return replace(known, before_a=f.pack_a or 0.0, proved=False, alone_s=0.0)
+        return changed(known, before_a=f.pack_a or 0.0, proved=False, alone_s=0.0)
     if known.proved or f.amps is None or f.pack_a is None:
         return known
     flows = f.amps >= FIRST_A
     proved = flows and f.pack_a - known.before_a >= OWN_SHARE * f.amps
-    return replace(known, proved=proved, alone_s=drained(known.alone_s, passed_s, holds=flows and not proved))
+    return changed(known, proved=proved, alone_s=drained(known.alone_s, passed_s, holds=flows and not proved))

@@ -75,7 +75,7 @@ def _wakes(taken: Taken) -> bool:
 def _runs(taken: Taken, state: State) -> bool:
     """Long enough for any fault to show."""
     since_s = taken.after.since_s or taken.now_s
-    runs = taken.after.state is state and taken.after.ran and taken.now_s - since_s > STEADY_S
+    runs = taken.after.state is state and taken.after.stage.ran and taken.now_s - since_s > STEADY_S
     return runs or _exchanged(taken)
 
 
@@ -96,12 +96,13 @@ def _ended(taken: Taken) -> bool:
 def _free(memory: Memory) -> bool:
     """No person must act before the bay charges (again), and it is not charging."""
     waits = any(fault.latched or ROW[name].clear is Clear.OPERATOR for name, fault in memory.faults.items())
-    return memory.state not in (*ENERGISED, State.TRIPPED) and not (waits or memory.hold or memory.paused)
+    asked = memory.operator.hold or memory.operator.paused
+    return memory.state not in (*ENERGISED, State.TRIPPED) and not (waits or asked)
 
 
 def _charging(memory: Memory) -> bool:
     """With nothing ordered that is not seen yet: no charger leaves an order alone for `SLOWLY_S`."""
-    return memory.state is State.CHARGING and memory.ran and memory.order is None
+    return memory.state is State.CHARGING and memory.stage.ran and memory.sequence.order is None
 
 
 def _energised(memory: Memory) -> bool:
@@ -231,7 +232,7 @@ def _circles(walk: Walk, surroundings: Surroundings, places: Sequence[Place]) ->
 
 def lasting(walk: Walk, place: Place, first: Move) -> Iterator[Taken]:
     """What comes of it when the surroundings of a move last: steps until nothing has changed for a long time."""
-    move, order = first, place.memory.order
+    move, order = first, place.memory.sequence.order
     rungs = _ladder()
     while True:
         taken = walk.take(place, move)

@@ -28,7 +28,7 @@ def outline(memory: Memory) -> Gist:
     if memory.state in ENERGISED:  # a precharge is on the lowest step anyhow
         return (memory.state,)
     waits = any(ROW[name].clear is Clear.OPERATOR for name, _ in faults)
-    asked = "start" if memory.hold else (memory.paused, waits)
+    asked = "start" if memory.operator.hold else (memory.operator.paused, waits)
     if memory.state in UNPROVED:
         return memory.state, asked
     bars = any(ROW[name].effect >= Effect.NO_START and ROW[name].clear is not Clear.OPERATOR for name, _ in faults)
@@ -38,7 +38,7 @@ def outline(memory: Memory) -> Gist:
 def gist(memory: Memory) -> Gist:
     """Equal for two memories from which a bay can come to the same, as far as it is explored here."""
     more = TELLS.get(memory.state, _at_rest)
-    return *outline(memory), memory.session is not None, memory.full_pct is not None, *more(memory)
+    return *outline(memory), memory.session is not None, memory.battery.full_pct is not None, *more(memory)
 
 
 def details(memory: Memory) -> Gist:
@@ -53,7 +53,7 @@ def details(memory: Memory) -> Gist:
 def _at_rest(memory: Memory) -> Gist:
     """The current that nobody ordered: whether it is there, and whether it has been for long enough to count."""
     witnessed = memory.witnessed
-    return memory.unverified, witnessed.sees, witnessed.unordered_s >= UNORDERED_S
+    return memory.stop.unverified, witnessed.sees, witnessed.unordered_s >= UNORDERED_S
 
 
 def _offline(memory: Memory) -> Gist:
@@ -61,11 +61,11 @@ def _offline(memory: Memory) -> Gist:
 
 
 def _qualifying(memory: Memory) -> Gist:
-    return *_offline(memory), memory.qualified_s is not None, memory.intends
+    return *_offline(memory), memory.stage.qualified_s is not None, memory.stage.intends
 
 
 def _starting(memory: Memory) -> Gist:
-    return memory.unverified, _proof_began(memory)
+    return memory.stop.unverified, _proof_began(memory)
 
 
 def _stopping(memory: Memory) -> Gist:
@@ -82,12 +82,13 @@ def _proof_began(memory: Memory) -> bool:
 def _tripped(memory: Memory) -> Gist:
     """Whether a reset would be granted now."""
     _, reasons = release(memory.faults, memory.last_s or 0.0, by_reset=True)
-    return memory.unverified, not reasons
+    return memory.stop.unverified, not reasons
 
 
 def _energised(memory: Memory) -> Gist:
-    resumed = memory.resumed or (memory.ran and memory.state is State.CHARGING)  # the last stage needs it no more
-    return resumed, memory.ran, memory.order and memory.order.action, memory.witnessed.proved
+    ran, order = memory.stage.ran, memory.sequence.order
+    resumed = memory.sequence.resumed or (ran and memory.state is State.CHARGING)  # the last stage needs it no more
+    return resumed, ran, order and order.action, memory.witnessed.proved
 
 
 #: What else decides, by state; elsewhere the bay is at rest.

@@ -1,0 +1,134 @@
+"""What the bay's battery has told until now: makes the next `BatteryHistory`."""
+
+from orchestrator.core.checks.battery import WARMING_S
+from orchestrator.core.checks.state_of_charge import (
+    SOC_DRIFT_PCT_PER_S,
+    SOC_OTHER_PCT,
+    SOC_RATE_PCT_PER_S,
+    SOC_STEP_PCT,
+)
+from orchestrator.core.facts import SLOW_STALE_S, Facts
+from orchestrator.core.memory import BatteryHistory
+from orchestrator.core.parts import changed
+from orchestrator.core.witnesses.measured import STILL_ABOVE_A
+from orchestrator.model import Cause, State
+
+#: How far apart the kept temperatures are.
+WARMTH_EVERY_S = 10.0
+#: A battery that leaves in mid-charge and is back within this was not taken away: its plug is loose.
+LOOSE_PLUG_S = 60.0
+#: … unless its volts are so much other ones: several times what a pack loses when its charge is cut off.
+OTHER_V_SHARE = 0.05
+
+Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
+
+
+def update(f: Facts) -> BatteryHistory:
+    """The history after these facts."""
+    known = f.memory.battery
+    peak = _peak(f)
+    if peak is not known.peak:
+        known = changed(known, peak=peak)
+    return _known(f, _warmth(f, _charge(f, _departure(f, known))))
+
+
+def _departure(f: Facts, known: BatteryHistory) -> BatteryHistory:
+    """A battery that leaves in mid-charge and is back at once: its plug is loose."""
+    if known.returned_s is not None:
+        known = changed(known, returned_s=None)
+    if f.departed:
+        session, volts = f.memory.session, f.snapshot.battery.voltage_v
+        if session is not None and known.left_s is None:
+            left_as = (session.soc_pct, volts.value if volts is not None else None)
+            return changed(known, left_s=f.now_s, left_as=left_as)
+    elif known.left_s is not None and f.battery.online and f.soc is not None and f.pack_v is not None:
+        loose = f.now_s - known.left_s < LOOSE_PLUG_S and not _is_another(f)
+        return changed(known, returned_s=f.now_s if loose else None, left_s=None)
+    return known
+
+
+def _is_another(f: Facts) -> bool:
+    """What has come is not the battery that left, by its SOC or its volts; those of a loose plug go on."""
+    left_pct, left_v = f.memory.battery.left_as
+    by_soc = left_pct is not None and f.soc is not None and abs(f.soc - left_pct) > SOC_OTHER_PCT
+    by_volts = left_v is not None and f.pack_v is not None and abs(f.pack_v - left_v) > OTHER_V_SHARE * left_v
+    return by_soc or by_volts
+
+
+def _charge(f: Facts, known: BatteryHistory) -> BatteryHistory:
+    """Steps of the SOC.
+
+    A battery that was seen to leave, or whose BMU boots, is forgotten: what comes is qualified as another one.
+    """
+    newest = f.snapshot.battery.soc_pct
+    before_s, before_pct = known.charge
+    if f.departed or known.boots != f.battery.boots:
+        before_s, before_pct = f.now_s, None
+        known = changed(known, charge=(before_s, before_pct))
+    if newest is None or f.soc is None or newest.t_s <= before_s:
+        return known
+    known = changed(known, charge=(newest.t_s, f.soc))
+    if before_pct is None:
+        return known
+    gap_s, step_pct = newest.t_s - before_s, abs(f.soc - before_pct)
+    watched = gap_s <= SLOW_STALE_S
+    usual_pct = SOC_STEP_PCT + SOC_RATE_PCT_PER_S * gap_s if watched else SOC_OTHER_PCT + SOC_DRIFT_PCT_PER_S * gap_s
+    if step_pct <= usual_pct:
+        return known
+    step = (f.now_s, Cause.of("soc_step", before_pct=before_pct, soc_pct=f.soc, passed_s=gap_s))
+    return changed(known, charge_step=step) if watched else changed(known, exchange=step)
+
+
+def _peak(f: Facts) -> tuple[float, float] | None:
+    """The highest SOC while current flows."""
+    if f.soc is None or f.pack_a is None or f.pack_a <= STILL_ABOVE_A or not f.energised:
+        return None
+    peak = f.memory.battery.peak
+    return peak if peak is not None and f.soc < peak[1] else (f.now_s, f.soc)
+
+
+def _warmth(f: Facts, known: BatteryHistory) -> BatteryHistory:
+    """Keep the last minutes' temperatures, thinned out, for the rate of warming and for jumps.
+
+    After a silence it may be another battery, so nothing from before it is compared with.
+    """
+    newest = f.snapshot.battery.temperature_c
+    if newest is None or f.temperature_c is None:
+        if known.sample is None and not known.warmth:
+            return known
+        return changed(known, sample=None, sample_before=None, warmth=())
+    sample = (newest.t_s, newest.value)
+    if sample == known.sample:
+        return known
+    return changed(known, sample_before=known.sample, sample=sample, warmth=thinned(known.warmth, sample))
+
+
+def thinned(warmth: Warmth, sample: tuple[float, float]) -> Warmth:
+    """The kept temperatures with this one, if it is due, and without those that are too old."""
+    if warmth and sample[0] - warmth[-1][0] < WARMTH_EVERY_S:
+        return warmth
+    return (*(kept for kept in warmth if sample[0] - kept[0] <= WARMING_S + WARMTH_EVERY_S), sample)
+
+
+def _known(f: Facts, known: BatteryHistory) -> BatteryHistory:
+    """A battery that left, or whose BMU booted, comes back as one that is not known."""
+    if f.energised:
+        return known
+    if known.full_s is None and f.soc is not None:
+        known = changed(known, full_s=f.now_s)
+    if known.full_pct is not None and (known.boots != f.battery.boots or not f.battery.online):
+        known = changed(known, full_pct=None)
+    if known.boots != f.battery.boots and f.memory.state is not State.STOPPING:
+        known = changed(known, boots=f.battery.boots)
+    return known
+
+
+def charged_full(f: Facts, *, all_the_way: bool) -> BatteryHistory:
+    """A charge has ended as it should."""
+    known = f.memory.battery
+    return changed(known, full_pct=f.soc, full_s=f.now_s if all_the_way else known.full_s)
+
+
+def begins(known: BatteryHistory) -> BatteryHistory:
+    """A charge of it begins."""
+    return changed(known, full_pct=None) if known.full_pct is not None else known
