@@ -4,10 +4,11 @@ A value here is a number, fresh and in range, or it is None. Nothing downstream 
 """
 
 from collections.abc import Container
+from dataclasses import dataclass
 from math import inf, isfinite
-from typing import NoReturn
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.parts import changed, made
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import standby
@@ -51,8 +52,9 @@ def _valid(reading: ChargerReading | None, now_s: float) -> ChargerReading | Non
     return reading if isfinite(reading.voltage_v) and isfinite(reading.current_a) else None
 
 
+@dataclass(frozen=True, slots=True)
 class Facts:
-    """What is true now. Nobody can change it: who knows more makes other facts (`with_memory`, `with_broken`)."""
+    """What is true now. Who knows more makes other facts: the memory brought up to them, what could not be judged."""
 
     now_s: float
     snapshot: Snapshot
@@ -71,55 +73,45 @@ class Facts:
     soc: float | None
     soh: float | None
     connected: bool
-    broken: tuple[Cause, ...]  #: what of our own could not be judged in this step
-    energised: bool
+    energised: bool  #: the last step has left the bay so, as the two that follow
     state_s: float
-    raised: Container[str]  #: ids of the faults that the last step has left in force; for thresholds with hysteresis
+    raised: Container[str]  #: ids of the faults in force; for thresholds with hysteresis
+    broken: tuple[Cause, ...] = ()  #: what of our own could not be judged in this step
 
-    def __init__(self, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> None:
+    @classmethod
+    def of(cls, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> "Facts":
+        """What is true by this snapshot."""
         reading, battery, link = _valid(snapshot.charger, now_s), snapshot.battery, snapshot.battery_link
         settled_s = link.boot_t_s + SETTLE_S if link.boot_t_s is not None else -inf
         fast_s, slow_s = max(now_s - FAST_STALE_S, settled_s), max(now_s - SLOW_STALE_S, settled_s)
-        self.__dict__.update(  # past `__setattr__`
-            now_s=now_s,
-            snapshot=snapshot,
-            memory=memory,
-            rules=rules,
-            reading=reading,
-            charger=snapshot.charger_link,
-            battery=link,
-            volts=reading.voltage_v if reading else None,
-            amps=reading.current_a if reading else None,
-            slow_from_s=slow_s,
-            pack_v=_fresh(battery.voltage_v, now_s, fast_s),
-            pack_a=_fresh(battery.current_a, now_s, fast_s),
-            status=_fresh(battery.status, now_s, fast_s),
-            temperature_c=_fresh(battery.temperature_c, now_s, fast_s),
-            soc=_fresh(battery.soc_pct, now_s, slow_s),
-            soh=_fresh(battery.soh_pct, now_s, slow_s),
-            connected=snapshot.connected,
-            broken=(),
-            energised=memory.state in ENERGISED,
-            state_s=now_s - memory.since_s if memory.since_s is not None else 0.0,
-            raised=frozenset(name for name, fault in memory.faults.items() if fault.raised_s is not None),
+        return made(
+            cls,
+            now_s,
+            snapshot,
+            memory,
+            rules,
+            reading,
+            snapshot.charger_link,
+            link,
+            reading.voltage_v if reading else None,
+            reading.current_a if reading else None,
+            slow_s,
+            _fresh(battery.voltage_v, now_s, fast_s),
+            _fresh(battery.current_a, now_s, fast_s),
+            _fresh(battery.status, now_s, fast_s),
+            _fresh(battery.temperature_c, now_s, fast_s),
+            _fresh(battery.soc_pct, now_s, slow_s),
+            _fresh(battery.soh_pct, now_s, slow_s),
+            snapshot.connected,
+            memory.state in ENERGISED,
+            now_s - memory.since_s if memory.since_s is not None else 0.0,
+            frozenset(name for name, fault in memory.faults.items() if fault.raised_s is not None),
+            (),
         )
 
-    def __setattr__(self, name: str, value: object) -> NoReturn:
-        raise AttributeError(name)
-
     def with_memory(self, memory: Memory) -> "Facts":
-        """The same facts, beside what follows from them. What was so before the step stays: state, faults in force."""
-        return self._with("memory", memory)
-
-    def with_broken(self, broken: tuple[Cause, ...]) -> "Facts":
-        """The same facts, and what could not be judged by them."""
-        return self._with("broken", broken)
-
-    def _with(self, name: str, value: object) -> "Facts":
-        facts = object.__new__(Facts)
-        facts.__dict__.update(self.__dict__)
-        facts.__dict__[name] = value
-        return facts
+        """The same facts, beside what follows from them."""
+        return changed(self, memory=memory)
 
     def slow(self, measurement: Measurement | None) -> float | None:
         """A value of the slow objects that only few rows look at, if it may be relied on."""

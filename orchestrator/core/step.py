@@ -54,7 +54,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     """
     if memory.since_s is None:
         memory = changed(memory, since_s=now_s)
-    f = Facts(now_s, snapshot, memory, rules)
+    f = Facts.of(now_s, snapshot, memory, rules)
     f = update_history(f, now_s - memory.last_s if memory.last_s is not None else 0.0)
     refusal: Cause | None = None
     if snapshot.request is not None:

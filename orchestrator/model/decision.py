@@ -129,7 +129,7 @@ class Step:
         return f"step {self.number} ({self.current_a:.1f} A)"
 
 
-@dataclass(frozen=True)  # no slots: every decision of a charge makes the next one from its `__dict__`
+@dataclass(frozen=True, slots=True)
 class Session:
     """One charge of one battery, from its first stage to its end; a pause does not end it."""
 

@@ -79,7 +79,7 @@ class Edge:
         )
         the_bay = bay(self.policy, self.control)
         the_bay = replace(the_bay, battery=replace(the_bay.battery, tpdo_s=self.tpdo_s))
-        return Facts(NOW_S, replace(snapshot, **self.snapshot), memory, Rules.of(the_bay))
+        return Facts.of(NOW_S, replace(snapshot, **self.snapshot), memory, Rules.of(the_bay))
 
 
 def session(hours: float = 1.0, ah: float = 1.0, soc_start_pct: float | None = 0.0) -> dict[str, Any]:

@@ -253,7 +253,7 @@ def test_the_first_step_lasts_no_time() -> None:
 )
 def test_a_value_counts_while_it_is_fresh_and_not_from_the_future(t_s: float, value: float | None) -> None:
     battery = replace(BMU, voltage_v=Measurement(48.0, t_s))
-    assert Facts(NOW_S, Snapshot(battery=battery), Memory(), Rules.of(bay())).pack_v == value
+    assert Facts.of(NOW_S, Snapshot(battery=battery), Memory(), Rules.of(bay())).pack_v == value
 
 
 def test_a_fault_of_the_first_moment_is_shown_from_then_on() -> None:

@@ -230,13 +230,13 @@ def test_without_a_reading_the_order_stays() -> None:
     """The fault table ends the charge in the same step; whoever asks meanwhile gets nothing new."""
     world, _ = new_charge()
     memory = world.memory
-    facts = Facts(world.now_s + 10, Snapshot(), memory, world.rules)
+    facts = Facts.of(world.now_s + 10, Snapshot(), memory, world.rules)
     assert next_order(facts, Setpoint(run=True))[0] == memory.sequence.order == limit(4)
 
 
 def test_what_a_setpoint_leaves_open_is_not_ordered() -> None:
     world = charging()
-    facts = Facts(world.now_s, world.snapshot(None, ""), world.memory, world.rules)
+    facts = Facts.of(world.now_s, world.snapshot(None, ""), world.memory, world.rules)
     assert next_order(facts, STANDBY)[0] is None
 
 

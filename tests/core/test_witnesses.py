@@ -518,7 +518,7 @@ def test_facts_without_a_reading_have_no_witness() -> None:
         world = idle()
         snapshot = world.snapshot(None, "")
         battery = replace(snapshot.battery, current_a=value)
-        f = Facts(world.now_s, replace(snapshot, battery=battery), world.memory, world.rules)
+        f = Facts.of(world.now_s, replace(snapshot, battery=battery), world.memory, world.rules)
         assert f.pack_a is None
         assert not f.unordered
 

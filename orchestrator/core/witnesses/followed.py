@@ -39,7 +39,7 @@ class Frozen:
     charged_ah: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Witnessed:
     """What both have shown until now."""
 
