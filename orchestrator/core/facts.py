@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 
 from orchestrator.core.memory import Memory
-from orchestrator.core.parts import changed, made
+from orchestrator.core.parts import made
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import standby
@@ -37,6 +37,9 @@ SETTLE_S = 1.0
 STANDBY_A = 0.5
 #: Below this the charger sees no battery at its terminals.
 TERMINAL_V = 5.0
+
+
+NONE: frozenset[str] = frozenset()
 
 
 def _fresh(measurement: Measurement | None, now_s: float, oldest_s: float) -> float | None:
@@ -105,13 +108,19 @@ class Facts:
             snapshot.connected,
             memory.state in ENERGISED,
             now_s - memory.since_s if memory.since_s is not None else 0.0,
-            frozenset(name for name, fault in memory.faults.items() if fault.raised_s is not None),
+            frozenset(name for name, fault in memory.faults.items() if fault.raised_s is not None)
+            if memory.faults
+            else NONE,
             (),
         )
 
     def with_memory(self, memory: Memory) -> "Facts":
-        """The same facts, beside what follows from them."""
-        return changed(self, memory=memory)
+        """The same facts, beside what follows from them. (By hand, since every step does this several times.)"""
+        return made(
+            Facts, self.now_s, self.snapshot, memory, self.rules, self.reading, self.charger, self.battery, self.volts,
+            self.amps, self.slow_from_s, self.pack_v, self.pack_a, self.status, self.temperature_c, self.soc, self.soh,
+            self.connected, self.energised, self.state_s, self.raised, self.broken,
+        )  # fmt: skip
 
     def slow(self, measurement: Measurement | None) -> float | None:
         """A value of the slow objects that only few rows look at, if it may be relied on."""

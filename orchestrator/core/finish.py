@@ -41,10 +41,9 @@ def finished(f: Facts) -> Cause | None:
 def known_full(f: Facts) -> Cause | None:
     """By what the pack is known to be full now; None while it is not."""
     rule = f.rules.policy.finish.full
-    signs = {"soc_pct": _by_soc(f), "taper": _by_taper(f), "charger": _by_charger(f)}
     if rule.needs is Needs.ANY:
-        return next((sign for sign in signs.values() if sign is not None), None)
-    needed = [signs[name] for name in signs if getattr(rule, name) not in (None, False)]
+        return _by_soc(f) or _by_taper(f) or _by_charger(f)
+    needed = [sign(f) for name, sign in SIGNS.items() if getattr(rule, name) not in (None, False)]
     seen = [sign for sign in needed if sign is not None]
     if not seen or len(seen) < len(needed):
         return None
@@ -73,6 +72,10 @@ def _by_charger(f: Facts) -> Cause | None:
     if f.soc < early_below_pct(f) or not ends_full(f):
         return None
     return f.rules.by_policy("full_charger", "finish.full.charger")
+
+
+#: Each sign of a full pack by its key of the policy.
+SIGNS = {"soc_pct": _by_soc, "taper": _by_taper, "charger": _by_charger}
 
 
 def ends_full(f: Facts) -> bool:

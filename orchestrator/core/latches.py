@@ -9,7 +9,7 @@ A predicate that raises is a defect of ours: that row cannot be judged any more,
 which is judged last, and all the others go on.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
 
@@ -19,7 +19,7 @@ from orchestrator.core.faults import FAULTS, ROW, Clear, Row
 from orchestrator.core.memory import FaultMemory
 from orchestrator.core.safestop import verified
 from orchestrator.core.states import UNVERIFIED
-from orchestrator.model import ActiveFault, Cause, Effect
+from orchestrator.model import ActiveFault, Cause, Effect, State
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
@@ -29,17 +29,14 @@ MINUTE_S = 60.0
 STRIKES_S = 3600.0
 
 
-def update(f: Facts) -> dict[str, FaultMemory]:
+def update(f: Facts) -> Mapping[str, FaultMemory]:
     """The fault memory after this step's facts."""
     before, state, looked_s = f.memory.faults, f.memory.state, f.memory.looked_s
     passed_s = f.now_s - looked_s if looked_s is not None else 0.0
     departed = f.departed and not f.energised
     after: dict[str, FaultMemory] = {}
-    for row in FAULTS:
-        fault = before.get(row.id)
-        where = state in row.where
-        if fault is None and not where:
-            continue
+    for row in _looked_for(state, before):
+        fault = before.get(row.id) if before else None
         left = departed and row.departs
         if left and not (fault is not None and fault.latched):
             strikes = tuple(t for t in fault.strikes if t != fault.raised_s) if fault is not None else ()
@@ -47,7 +44,7 @@ def update(f: Facts) -> dict[str, FaultMemory]:
                 after[row.id] = FaultMemory(strikes=strikes)
             continue
         seen = None
-        if not left and (where or (fault is not None and fault.raised_s is not None)):
+        if fault is None or (not left and (fault.raised_s is not None or state in row.where)):
             try:
                 seen = row.check(f)
             except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
@@ -59,7 +56,22 @@ def update(f: Facts) -> dict[str, FaultMemory]:
             kept = _absent(row, fault, f, passed_s)
             if kept is not None:
                 after[row.id] = kept
-    return after
+    return after if after or before else before
+
+
+def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[Row]:
+    """The rows that are looked for in a state, and those that are known, in their order."""
+    usual = _USUAL.get(state)
+    if usual is None or usual[0] is not FAULTS:
+        rows = tuple(row for row in FAULTS if state in row.where)
+        usual = _USUAL[state] = FAULTS, rows, frozenset(row.id for row in rows)
+    if known.keys() <= usual[2]:
+        return usual[1]
+    return [row for row in FAULTS if state in row.where or row.id in known]
+
+
+#: The rows of each state, and their ids; and of which table they are.
+_USUAL: dict[State, tuple[Sequence[Row], Sequence[Row], frozenset[str]]] = {}
 
 
 def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:

@@ -3,6 +3,8 @@
 facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the order.
 """
 
+from functools import cache
+
 from orchestrator.core import latches, limits, rows
 from orchestrator.core.alarm import alarm
 from orchestrator.core.contactor import closes
@@ -61,13 +63,15 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
         heard = hear(f.memory, snapshot.request, now_s, snapshot.unkept)
         refusal = heard.refusal
         f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
-    f = f.with_memory(changed(f.memory, faults=latches.update(f), looked_s=now_s, last_s=now_s))
-    faults = latches.shown(f.memory.faults, now_s, at_rest=stands_by(f))
-    f, ended = _move(f, faults)
+    known = latches.update(f)
+    if known is not f.memory.faults:
+        f = f.with_memory(changed(f.memory, faults=known))
+    faults = latches.shown(known, now_s, at_rest=stands_by(f)) if known else ()
+    f, cause, ended = _move(f, faults)
     f, setpoint, chosen = _setpoint(f, faults)
     command, sequence = _order(f, setpoint, faults)
     closed = closes(f.memory.state, closed=f.memory.closed, standby=f.standby)
-    memory = changed(f.memory, sequence=sequence, closed=closed)
+    memory = changed(f.memory, cause=cause, sequence=sequence, closed=closed, looked_s=now_s, last_s=now_s)
     decision = Decision(
         state=memory.state,
         cause=memory.cause,
@@ -83,20 +87,21 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     return decision, memory
 
 
-def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Session | None]:
-    """Let the state follow the facts; and the session that has ended by it, if any."""
+def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Cause, Session | None]:
+    """Let the state follow the facts: with the reason, and the session that has ended by it, if any."""
     before = f.memory.state
     trigger, cause, changes = course(f, faults)
-    f = f.with_memory(changed(f.memory, cause=cause, **changes))
+    if changes:
+        f = f.with_memory(changed(f.memory, **changes))
     state = fire(before, trigger) if trigger is not None else before
     if state is not before:
-        f = f.with_memory(entered(f, state))
+        f = f.with_memory(entered(f, state, cause))
     memory = f.memory
     if memory.session is None or not _is_over(f, before):
-        return f, None
+        return f, cause, None
     held = memory.operator.hold if memory.state is State.HELD else None  # the rest of that cause is what to do next
     result = (memory.stop.stop_cause if before is State.STOPPING else held) or cause
-    return f.with_memory(changed(memory, session=None)), session.ended(memory.session, result)
+    return f.with_memory(changed(memory, session=None)), cause, session.ended(memory.session, result)
 
 
 def _is_over(f: Facts, before: State) -> bool:
@@ -104,11 +109,13 @@ def _is_over(f: Facts, before: State) -> bool:
 
     Who waits for a person, or no longer does, has come no farther: what a restart has left open stays open.
     """
+    after = f.memory.state
+    if after not in SESSION_ENDS:
+        return False
     exchanged = f.memory.faults.get("battery_exchanged")
     another = f.departed or (exchanged is not None and exchanged.raised_s is not None)
-    after = f.memory.state
     goes_on = after is before or before is State.STARTING or {before, after} == ALIKE
-    return after in SESSION_ENDS and (another or not goes_on)
+    return another or not goes_on
 
 
 def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoint, Step | None]:
@@ -118,7 +125,6 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoin
         return f, STANDBY, None
     if not rules.manual:
         return f, BY_ITSELF, None
-    mode, precharge = SETPOINTS[memory.state]
     before = memory.stage.step
     if memory.state is State.CHARGING:
         chosen, raise_s = limits.choose(f, faults[0] if faults else None)
@@ -138,7 +144,13 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoin
                 tables=rows.lowered(memory.tables, chosen.key) if lower else memory.tables,
             )
         )
-    return f, Setpoint(run=True, current_limit=chosen.index, charge_mode=mode, precharge=precharge), chosen
+    return f, _told(memory.state, chosen.index), chosen
+
+
+@cache  # one for each stage and step
+def _told(state: State, index: int) -> Setpoint:
+    mode, precharge = SETPOINTS[state]
+    return Setpoint(run=True, current_limit=index, charge_mode=mode, precharge=precharge)
 
 
 def _order(f: Facts, setpoint: Setpoint, faults: tuple[ActiveFault, ...]) -> tuple[Command | None, Sequence]:

@@ -278,7 +278,7 @@ def test_temperatures_are_kept_ten_seconds_apart_for_three_minutes(kept: Warmth,
 @pytest.mark.parametrize(("charger", "counted_t_s"), [({}, NOW_S), ({"t_s": ago(9)}, None)])
 def test_a_session_counts_from_its_beginning(charger: dict[str, Any], counted_t_s: float | None) -> None:
     f = Edge(goes, None, state=QUALIFYING, bmu={"voltage_v": None}, charger=charger).facts
-    memory = entered(f, State.CHARGING)
+    memory = entered(f, State.CHARGING, cause("begun"))
     assert memory.session == Session(NOW_S, soc_start_pct=50.0, soc_pct=50.0)
     assert memory.charger.counted_t_s == counted_t_s
 
@@ -293,7 +293,7 @@ def test_a_session_counts_from_its_beginning(charger: dict[str, Any], counted_t_
 )
 def test_a_rise_counts_from_the_first_precharge_of_a_charge(state: State, before: Session, now: Session) -> None:
     f = Edge(goes, None, {"session": before}, QUALIFYING, bmu={"voltage_v": 33.0}).facts
-    assert entered(f, state).session == now
+    assert entered(f, state, cause("begun")).session == now
 
 
 boots = followed("boots")

@@ -160,7 +160,7 @@ def over_current(f: Facts) -> Cause | None:
         return None
     limit_a = rules.bay.limits.current_a
     if rules.manual and reading.current_limit is not None:
-        limit_a = min(limit_a, max(rules.steps_a[step] for step in _steps_in_force(f, reading.current_limit)))
+        limit_a = min(limit_a, max([rules.steps_a[step] for step in _steps_in_force(f, reading.current_limit)]))
     allowed_a = limit_a * rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
     if reading.current_a <= allowed_a:
         return None

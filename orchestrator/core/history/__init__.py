@@ -7,7 +7,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.parts import changed
 from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import followed
-from orchestrator.model import State
+from orchestrator.model import Cause, State
 
 
 def update_history(f: Facts, passed_s: float) -> Facts:
@@ -29,15 +29,15 @@ def update_history(f: Facts, passed_s: float) -> Facts:
     return after.with_memory(changed(after.memory, session=open_charge))
 
 
-def entered(f: Facts, state: State) -> Memory:
-    """The memory when `state` has just been entered: what it counts from."""
+def entered(f: Facts, state: State, cause: Cause) -> Memory:
+    """The memory when `state` has just been entered, for this cause: what it counts from."""
     memory, before = f.memory, f.memory.state
     begun = changed(
         memory,
         state=state,
         since_s=f.now_s,
         stage=stage.EMPTY,
-        stop=safestop.update(f, state, memory.cause),
+        stop=safestop.update(f, state, cause),
         charger=charger.told_anew(memory.charger),
     )
     if state not in ENERGISED:

@@ -1,5 +1,8 @@
 """What the bay's battery has told until now: makes the next `BatteryHistory`."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from orchestrator.core.checks.battery import WARMING_S
 from orchestrator.core.checks.state_of_charge import (
     SOC_DRIFT_PCT_PER_S,
@@ -21,15 +24,26 @@ LOOSE_PLUG_S = 60.0
 OTHER_V_SHARE = 0.05
 
 Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
+Steps = Mapping[str, Any]  #: at most one: `charge_step` or `exchange`
 
 
 def update(f: Facts) -> BatteryHistory:
     """The history after these facts."""
-    known = f.memory.battery
+    known = _departure(f, f.memory.battery)
+    charge, step = _charge(f, known)
+    sample, sample_before, warmth = known.sample, known.sample_before, known.warmth
+    newest = f.snapshot.battery.temperature_c
+    if newest is None or f.temperature_c is None:  # after a silence it may be another battery: nothing is compared
+        sample, sample_before, warmth = None, None, ()
+    elif sample is None or (newest.t_s, newest.value) != sample:
+        sample, sample_before = (newest.t_s, newest.value), sample
+        warmth = thinned(warmth, sample)
     peak = _peak(f)
-    if peak is not known.peak:
-        known = changed(known, peak=peak)
-    return _known(f, _warmth(f, _charge(f, _departure(f, known))))
+    if charge is not known.charge or sample is not known.sample or peak is not known.peak:
+        known = changed(
+            known, charge=charge, peak=peak, sample=sample, sample_before=sample_before, warmth=warmth, **step
+        )
+    return _known(f, known)
 
 
 def _departure(f: Facts, known: BatteryHistory) -> BatteryHistory:
@@ -55,28 +69,27 @@ def _is_another(f: Facts) -> bool:
     return by_soc or by_volts
 
 
-def _charge(f: Facts, known: BatteryHistory) -> BatteryHistory:
-    """Steps of the SOC.
+def _charge(f: Facts, known: BatteryHistory) -> tuple[tuple[float, float | None], Steps]:
+    """The newest SOC, and the step that it took since the one before, where no charge explains that.
 
     A battery that was seen to leave, or whose BMU boots, is forgotten: what comes is qualified as another one.
     """
-    newest = f.snapshot.battery.soc_pct
-    before_s, before_pct = known.charge
+    newest, charge = f.snapshot.battery.soc_pct, known.charge
     if f.departed or known.boots != f.battery.boots:
-        before_s, before_pct = f.now_s, None
-        known = changed(known, charge=(before_s, before_pct))
+        charge = (f.now_s, None)
+    before_s, before_pct = charge
     if newest is None or f.soc is None or newest.t_s <= before_s:
-        return known
-    known = changed(known, charge=(newest.t_s, f.soc))
+        return charge, {}
+    charge = (newest.t_s, f.soc)
     if before_pct is None:
-        return known
+        return charge, {}
     gap_s, step_pct = newest.t_s - before_s, abs(f.soc - before_pct)
     watched = gap_s <= SLOW_STALE_S
     usual_pct = SOC_STEP_PCT + SOC_RATE_PCT_PER_S * gap_s if watched else SOC_OTHER_PCT + SOC_DRIFT_PCT_PER_S * gap_s
     if step_pct <= usual_pct:
-        return known
-    step = (f.now_s, Cause.of("soc_step", before_pct=before_pct, soc_pct=f.soc, passed_s=gap_s))
-    return changed(known, charge_step=step) if watched else changed(known, exchange=step)
+        return charge, {}
+    cause = Cause.of("soc_step", before_pct=before_pct, soc_pct=f.soc, passed_s=gap_s)
+    return charge, {"charge_step" if watched else "exchange": (f.now_s, cause)}
 
 
 def _peak(f: Facts) -> tuple[float, float] | None:
@@ -87,24 +100,8 @@ def _peak(f: Facts) -> tuple[float, float] | None:
     return peak if peak is not None and f.soc < peak[1] else (f.now_s, f.soc)
 
 
-def _warmth(f: Facts, known: BatteryHistory) -> BatteryHistory:
-    """Keep the last minutes' temperatures, thinned out, for the rate of warming and for jumps.
-
-    After a silence it may be another battery, so nothing from before it is compared with.
-    """
-    newest = f.snapshot.battery.temperature_c
-    if newest is None or f.temperature_c is None:
-        if known.sample is None and not known.warmth:
-            return known
-        return changed(known, sample=None, sample_before=None, warmth=())
-    sample = (newest.t_s, newest.value)
-    if sample == known.sample:
-        return known
-    return changed(known, sample_before=known.sample, sample=sample, warmth=thinned(known.warmth, sample))
-
-
 def thinned(warmth: Warmth, sample: tuple[float, float]) -> Warmth:
-    """The kept temperatures with this one, if it is due, and without those that are too old."""
+    """The temperatures of the last minutes with this one, if it is due, for the rate of warming."""
     if warmth and sample[0] - warmth[-1][0] < WARMTH_EVERY_S:
         return warmth
     return (*(kept for kept in warmth if sample[0] - kept[0] <= WARMING_S + WARMTH_EVERY_S), sample)

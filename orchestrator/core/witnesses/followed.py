@@ -1,11 +1,13 @@
 """What is followed of both witnesses from step to step."""
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from orchestrator.core.drain import drained
 from orchestrator.core.parts import changed, event, measured
 from orchestrator.core.witnesses.standby import FROZEN, UNORDERED_MOST_S, sees_current
+from orchestrator.model import BatteryReading
 
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
@@ -16,6 +18,10 @@ TRAIL_S, TRAIL_EVERY_S = 10.0, 0.5
 FIRST_A = 0.5
 #: The BMU must see this share of it, on top of what flowed before.
 OWN_SHARE = 0.5
+
+
+#: All that a BMU says.
+WORDS = attrgetter(*BatteryReading.__slots__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,18 +63,16 @@ class Witnessed:
 
 def follow(f: "Facts", passed_s: float) -> Witnessed:
     """What is known after this step's facts; `passed_s` since the step before."""
-    known = f.memory.witnessed
-    stop_s = _stop_s(f)
+    before = f.memory.witnessed
+    stop_s, known = _stop_s(f), _first_amperes(f, before, passed_s)
+    proof = _proof(f, stop_s, before.proof if stop_s == before.stop_s else ())
     sees = sees_current(f) and not f.energised
-    return changed(
-        _first_amperes(f, known, passed_s),
-        stop_s=stop_s,
-        proof=_proof(f, stop_s, known.proof if stop_s == known.stop_s else ()),
-        sees=sees,
-        unordered_s=0.0 if f.energised else _unordered_s(known, passed_s, sees=sees),
-        trail=_trail(f, known.trail),
-        frozen=_frozen(f, known.frozen),
-    )
+    unordered_s = 0.0 if f.energised else _unordered_s(before, passed_s, sees=sees)
+    trail, frozen = _trail(f, before.trail), _frozen(f, before.frozen)
+    now = (stop_s, proof, sees, unordered_s, trail, frozen)
+    if now == (known.stop_s, known.proof, known.sees, known.unordered_s, known.trail, known.frozen):
+        return known
+    return changed(known, stop_s=stop_s, proof=proof, sees=sees, unordered_s=unordered_s, trail=trail, frozen=frozen)
 
 
 def _unordered_s(known: Witnessed, passed_s: float, *, sees: bool) -> float:
@@ -107,9 +111,7 @@ def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
 def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
     """Watched while a charge goes in; what was found frozen stays so, at rest too, until a word changes."""
     session, battery = f.memory.session, f.snapshot.battery
-    words = tuple(
-        value.value if (value := getattr(battery, name)) is not None else None for name in type(battery).__slots__
-    )
+    words = tuple([word.value if word is not None else None for word in WORDS(battery)])
     if frozen is not None and frozen.words == words:
         return frozen if f.energised or FROZEN in f.raised else None
     if f.volts is None or session is None or not f.energised or f.pack_v is None:
@@ -119,7 +121,10 @@ def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
 
 def _first_amperes(f: "Facts", known: Witnessed, passed_s: float) -> Witnessed:
     if not f.energised:
-        return changed(known, before_a=f.pack_a or 0.0, proved=False, alone_s=0.0)
+        before_a = f.pack_a or 0.0
+        if (known.before_a, known.proved, known.alone_s) == (before_a, False, 0.0):
+            return known
+        return changed(known, before_a=before_a, proved=False, alone_s=0.0)
     if known.proved or f.amps is None or f.pack_a is None:
         return known
     flows = f.amps >= FIRST_A
