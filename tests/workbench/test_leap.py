@@ -8,7 +8,8 @@ import pytest
 
 from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Ask, Defect, Sensor, SensorFault
-from orchestrator.core.memory import Memory, value_of
+from orchestrator.core.memory import Memory, names, paths, value_of, with_values
+from orchestrator.core.parts import Kind
 from orchestrator.core.step import step
 from orchestrator.model import Decision, Request, State
 from orchestrator.workbench.processes import cores
@@ -115,3 +116,18 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
     assert outline(Decision(State.CHARGING, Memory().cause), leapt) == outline(
         Decision(State.CHARGING, Memory().cause), ticked
     )
+
+
+@pytest.mark.parametrize("name", names())
+def test_an_outline_has_what_is_an_event_and_nothing_else(name: str) -> None:
+    """What a field is, it says itself; of a total that there is anything."""
+    if name in ("faults", "session", "witnessed", "state"):
+        return
+    memory = with_values(Memory(), search_s=1.0, wake_s=1.0, idle_s=1.0)
+    decision = Decision(State.CHARGING, Memory().cause)
+    kinds = [kind for kind in Kind if any(path.rpartition(".")[2] == name for path in paths(kind))]
+    for value, same in (("another", kinds != [Kind.EVENT]), (0.0, kinds == [Kind.MEASURED])):
+        if kinds == [Kind.TOTAL] and value == "another":
+            continue
+        if value_of(memory, name) != value:
+            assert (outline(decision, with_values(memory, **{name: value})) == outline(decision, memory)) is same

@@ -39,7 +39,7 @@ def update(f: Facts) -> BatteryHistory:
         sample, sample_before = (newest.t_s, newest.value), sample
         warmth = thinned(warmth, sample)
     peak = _peak(f)
-    if charge is not known.charge or sample is not known.sample or peak is not known.peak:
+    if charge is not known.charge or sample is not known.sample or peak != known.peak:
         known = changed(
             known, charge=charge, peak=peak, sample=sample, sample_before=sample_before, warmth=warmth, **step
         )
