@@ -110,7 +110,7 @@ DISK: tuple[Seed, ...] = (
         ("charging, then no power",),
         (
             f"{CORE}persisted.py",
-            "running=memory.state in RUNNING or memory.stage.intends or memory.stop.unverified,",
+            "running=memory.state in MAY_RUN or memory.stage.intends or memory.stop.unverified,",
             "running=False,",
         ),
         (
@@ -330,7 +330,13 @@ WITNESSES: tuple[Seed, ...] = (
             f"{SERVICE}bay.py",
             "        self._ending = why\n",
             "        self._ending = why\n        if self._memory is not None:\n"
-            '            self._memory.operator.hold = self._memory.operator.hold or Cause.of("service_ends", why=why)\n',
+            '            hold = self._memory.operator.hold or Cause.of("service_ends", why=why)\n'
+            "            self._memory = with_values(self._memory, hold=hold)\n",
+        ),
+        (
+            f"{SERVICE}bay.py",
+            "from orchestrator.core.memory import Memory\n",
+            "from orchestrator.core.memory import Memory, with_values\n",
         ),
     ),
     part(
@@ -469,7 +475,7 @@ RESTARTS: tuple[Seed, ...] = (
         ("tests/core/test_safestop.py::test_a_charger_that_ran_at_the_start_has_been_stopped_once_already",),
         (
             f"{CORE}safestop.py",
-            '        if memory.stop.stopping_s is None and "found_running" in f.raised:',
+            '        if stop.stopping_s is None and "found_running" in f.raised:',
             "        if False:",
         ),
     ),
@@ -491,9 +497,14 @@ RESTARTS: tuple[Seed, ...] = (
         "the limits of a charge begin anew when its BMU was silent for a while",
         ("ampere-hours over silences",),
         (
-            f"{CORE}step.py",
-            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})",
-            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED, State.OFFLINE, State.SUSPENDED})",
+            f"{CORE}states.py",
+            "K.UNSEEN, K.RESTING, K.SETTLED, K.QUIET})",
+            "K.UNSEEN, K.RESTING, K.SETTLED, K.QUIET, K.SESSION_ENDS})",
+        ),
+        (
+            f"{CORE}states.py",
+            "    S.SUSPENDED: frozenset({",
+            "    S.SUSPENDED: frozenset({K.SESSION_ENDS, ",
         ),
     ),
     scene(
@@ -562,7 +573,7 @@ CONDITIONS: tuple[Seed, ...] = (
         "comes and goes",
         "a battery that leaves and comes back is charged again each time",
         ("loose plug",),
-        (f"{CORE}track.py", "f.now_s if gap_s < LOOSE_PLUG_S and not _is_another(f) else None", "None"),
+        (f"{CORE}history/battery.py", "f.now_s - known.left_s < LOOSE_PLUG_S and not _is_another(f)", "False"),
     ),
     scene(
         "another kind of pack is charged",
