@@ -11,8 +11,11 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from typing import Any
 
 from orchestrator.core.parts import Kind, changed, event, measured, of_kind, total
+from orchestrator.core.states import ENERGISED, SETTLED
 from orchestrator.core.witnesses.followed import Witnessed
 from orchestrator.model import Cause, Command, Session, State, Step
+
+ANYWHERE, QUALIFYING = frozenset(State), frozenset({State.QUALIFYING})
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,9 @@ class Stop:
     stopping_s: float | None = event(None)  #: since when a stop has been tried that was not proved to last …
     verified_s: float | None = event(None)  #: … and when standby was last proved
     returns: int = event(0)  #: how often the charger has run again since that stop began
-    unverified: bool = event(default=False)  #: the charger was told to run, perhaps by the last run of the service, and
+    unverified: bool = event(
+        default=False, tells=SETTLED | {State.STARTING}
+    )  #: the charger was told to run, perhaps by the last run of the service, and
     #: has not been seen to stand by since
 
 
@@ -66,11 +71,13 @@ class Stop:
 class Stage:
     """What the present state has come to; every state begins with an empty one."""
 
-    ran: bool = event(default=False)  #: the charger runs, or did: by its own word, by the BMU's, or by what it left
+    ran: bool = event(
+        default=False, tells=ENERGISED
+    )  #: the charger runs, or did: by its own word, by the BMU's, or by what it left
     shown: bool = event(default=False)  #: the charger has shown the mode that it was told
-    qualified_s: float | None = event(None)  #: since when everything has spoken for a charge
+    qualified_s: float | None = event(None, tells=QUALIFYING)  #: since when everything has spoken for a charge
     ready: bool = event(default=False)  #: everything speaks for a charge; it waits for its turn
-    intends: bool = event(default=False)  #: it is its turn, and a charge begins once that is on disk
+    intends: bool = event(default=False, tells=QUALIFYING)  #: it is its turn, and a charge begins once that is on disk
     reached_s: float | None = event(None, by_policy=True)  #: since when the pack has been above the stage's voltage
     taper_s: float | None = event(None, by_policy=True)  #: since when the current has been tapered off
     step: Step | None = measured(None, by_policy=True)
@@ -81,7 +88,7 @@ class Stage:
 class Sequence:
     """How far the charger has been brought to its setpoint."""
 
-    order: Command | None = event(None)  #: what the sequence is waiting to see confirmed …
+    order: Command | None = event(None, tells=ENERGISED)  #: what the sequence is waiting to see confirmed …
     order_s: float = measured(0.0)  #: … since when
     tries: int = measured(0)  #: … and how often the resume was repeated for it
     resumed: bool = event(default=False)  #: the charger was brought back from standby …
@@ -111,7 +118,9 @@ class BatteryHistory:
 
     boots: int = event(0)  #: boot-ups of the BMU that were dealt with
     full_s: float | None = event(None)  #: when it was last charged all the way; before that, first seen
-    full_pct: float | None = event(None)  #: the SOC at which it was charged full here; None: it was not, or it left
+    full_pct: float | None = event(
+        None, tells=ANYWHERE
+    )  #: the SOC at which it was charged full here; None: it was not, or it left
     left_s: float | None = event(None)  #: when it left in mid-charge; None: it did not, or that is dealt with
     left_as: tuple[float | None, float | None] = event((None, None))  #: … and with which SOC and volts
     returned_s: float | None = event(None)  #: when one came back so soon that only its plug can have been loose
@@ -186,6 +195,14 @@ def paths(kind: Kind) -> list[str]:
     """Where to find all values of this kind, from the memory on: "stage.ran"."""
     inside = [f"{part}.{name}" for part, one in PARTS.items() for name in of_kind(one, kind)]
     return [*of_kind(Memory, kind), *inside]
+
+
+def telling(state: State) -> list[str]:
+    """Where to find all that tells two memories in this state apart."""
+    return [
+        f"{part}.{one.name}" for part, kind in PARTS.items() for one in fields(kind)
+        if state in one.metadata.get("tells", ())
+    ]  # fmt: skip
 
 
 def by_policy() -> list[str]:

@@ -10,9 +10,12 @@ from enum import Enum, auto
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from orchestrator.model import State
+
 __all__ = ["Kind", "changed", "event", "made", "measured", "of_kind", "total", "unclassed"]
 
 T = TypeVar("T")
+NOWHERE: frozenset[State] = frozenset()
 
 
 class Kind(Enum):
@@ -23,19 +26,23 @@ class Kind(Enum):
     MEASURED = auto()  #: all the time: values, their times, and what is taken from them
 
 
-def event(default: T, *, by_policy: bool = False) -> T:
-    """A field that changes only when something happens. `by_policy`: only what the policy says changes it."""
-    return field(default=default, metadata={"kind": Kind.EVENT, "by_policy": by_policy})
+def event(default: T, *, by_policy: bool = False, tells: frozenset[State] = NOWHERE) -> T:
+    """A field that changes only when something happens.
+
+    `by_policy`: only what the policy says changes it. `tells`: the states in which it decides, once it is there or not,
+    where the bay can go from there.
+    """
+    return field(default=default, metadata={"kind": Kind.EVENT, "by_policy": by_policy, "tells": tells})
 
 
 def total(default: float) -> float:
     """A field that sums up."""
-    return field(default=default, metadata={"kind": Kind.TOTAL, "by_policy": False})
+    return field(default=default, metadata={"kind": Kind.TOTAL, "by_policy": False, "tells": NOWHERE})
 
 
-def measured(default: T, *, by_policy: bool = False) -> T:
+def measured(default: T, *, by_policy: bool = False, tells: frozenset[State] = NOWHERE) -> T:
     """A field that follows the values."""
-    return field(default=default, metadata={"kind": Kind.MEASURED, "by_policy": by_policy})
+    return field(default=default, metadata={"kind": Kind.MEASURED, "by_policy": by_policy, "tells": tells})
 
 
 def of_kind(part: Any, kind: Kind) -> Iterator[str]:  # noqa: ANN401 - any dataclass

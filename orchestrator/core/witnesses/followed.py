@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator.core.drain import drained
 from orchestrator.core.parts import changed, event, measured
+from orchestrator.core.states import ENERGISED, RESTING
 from orchestrator.core.witnesses.standby import FROZEN, UNORDERED_MOST_S, sees_current
 from orchestrator.model import BatteryReading
 
@@ -52,12 +53,12 @@ class Witnessed:
     stop_s: float | None = event(None)  #: when the first whole stop of the present state was handed to the port
     proof: tuple[float, ...] = measured(())  #: when the first and the newest of the status replies since then were
     #: asked for that showed standby, without a break
-    sees: bool = measured(default=False)  #: the BMU sees a charging current that nobody ordered …
+    sees: bool = measured(default=False, tells=RESTING)  #: the BMU sees a charging current that nobody ordered …
     unordered_s: float = measured(0.0)  #: … and for how long it has; drains
     trail: tuple[Sample, ...] = measured(())  #: of the last seconds under current, oldest first
     frozen: Frozen | None = measured(None)
     before_a: float = measured(0.0)  #: what the BMU saw before this charge began
-    proved: bool = event(default=False)  #: the BMU has seen the charge begin
+    proved: bool = event(default=False, tells=ENERGISED)  #: the BMU has seen the charge begin
     alone_s: float = measured(0.0)  #: for how long the charger has delivered without that; drains
 
 
