@@ -80,7 +80,7 @@ class Stage:
     intends: bool = event(default=False, tells=QUALIFYING)  #: it is its turn, and a charge begins once that is on disk
     reached_s: float | None = event(None, by_policy=True)  #: since when the pack has been above the stage's voltage
     taper_s: float | None = event(None, by_policy=True)  #: since when the current has been tapered off
-    step: Step | None = measured(None, by_policy=True)
+    step: Step | None = measured(None, by_policy=True)  #: while energised
     raise_s: float | None = event(None, by_policy=True)  #: since when a higher step has been allowed
 
 
