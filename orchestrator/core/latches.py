@@ -37,14 +37,13 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
     after: dict[str, FaultMemory] = {}
     for row in _looked_for(state, before):
         fault = before.get(row.id) if before else None
-        left = departed and row.departs
-        if left and not (fault is not None and fault.latched):
+        if departed and row.departs and not (fault is not None and fault.latched):
             strikes = tuple(t for t in fault.strikes if t != fault.raised_s) if fault is not None else ()
             if strikes:  # what it has just done was no fault; what it did before was
                 after[row.id] = FaultMemory(strikes=strikes)
             continue
         seen = None
-        if fault is None or (not left and (fault.raised_s is not None or state in row.where)):
+        if fault is None or _is_looked_for(row, fault, state, departed=departed):
             try:
                 seen = row.check(f)
             except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
@@ -57,6 +56,11 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
             if kept is not None:
                 after[row.id] = kept
     return after if after or before else before
+
+
+def _is_looked_for(row: Row, fault: FaultMemory, state: State, *, departed: bool) -> bool:
+    """Whether a known fault's condition is looked for; one in force is followed in every state."""
+    return not (departed and row.departs) and (fault.raised_s is not None or state in row.where)
 
 
 def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[Row]:
