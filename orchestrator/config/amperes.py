@@ -111,8 +111,10 @@ def ranges(rule: Where) -> dict[str, Range]:
 
 def highest_step(allowed_a: float, worst_a: tuple[float, ...]) -> int | None:
     """The highest step of which the worst case is not above; None where even the lowest one is."""
-    fitting = [index for index, amps in enumerate(worst_a) if round(amps, DIGITS) <= allowed_a]
-    return max(fitting, default=None)
+    for index in range(len(worst_a) - 1, -1, -1):
+        if round(worst_a[index], DIGITS) <= allowed_a:
+            return index
+    return None
 
 
 def end_v(pack: Pack) -> float:

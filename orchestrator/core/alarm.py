@@ -3,6 +3,7 @@
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
 from orchestrator.core.operator import OWN
+from orchestrator.core.states import UNSEEN
 from orchestrator.model import ActiveFault, Alarm, State
 
 Faults = tuple[ActiveFault, ...]
@@ -17,7 +18,7 @@ def alarm(memory: Memory, faults: Faults) -> Alarm:
 
 def _may_run(memory: Memory, faults: Faults) -> bool:
     """A charger does not obey, or nobody knows whether the one that ran has stopped, or who else commands it."""
-    unknown = memory.unverified and memory.state in (State.STARTING, State.OFFLINE)
+    unknown = memory.stop.unverified and memory.state in UNSEEN
     locked = any(fault.id == "port_locked" for fault in faults)
     return memory.state is State.UNCONTROLLABLE or unknown or locked
 
@@ -27,4 +28,4 @@ def _waits(memory: Memory, faults: Faults) -> bool:
     if memory.state is not State.HELD:
         return memory.state is State.TRIPPED
     by_fault = any(ROW[fault.id].clear is Clear.OPERATOR for fault in faults)
-    return by_fault or memory.hold not in (None, *OWN)
+    return by_fault or memory.operator.hold not in (None, *OWN)

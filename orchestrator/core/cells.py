@@ -29,10 +29,10 @@ class Chemistry:
 
     def ocv_v(self, soc_pct: float) -> float:
         """Between two points of the curve on a straight line, beyond its ends as at its ends."""
-        (last_pct, last_v), *rest = self.curve
+        last_pct, last_v = self.curve[0]
         if soc_pct <= last_pct:
             return last_v
-        for pct, volts in rest:
+        for pct, volts in self.curve:
             if soc_pct <= pct:
                 return last_v + (volts - last_v) * (soc_pct - last_pct) / (pct - last_pct)
             last_pct, last_v = pct, volts

@@ -11,10 +11,8 @@ mean the charger or the BMU: it is closed there as long as the charger itself sa
 stays isolated until a person has looked. The charger must keep its mains: one that is dead can prove nothing.
 """
 
-from orchestrator.model import ENERGISED, State
-
-#: States in which the charger is known to do as it is told.
-OBEYS = frozenset({State.IDLE, State.HELD, State.QUALIFYING, State.FULL, State.SUSPENDED}) | ENERGISED
+from orchestrator.core.states import OBEYS
+from orchestrator.model import State
 
 
 def closes(state: State, *, closed: bool, standby: bool) -> bool:

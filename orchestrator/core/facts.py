@@ -3,13 +3,16 @@
 A value here is a number, fresh and in range, or it is None. Nothing downstream looks at a reading's age again.
 """
 
+from collections.abc import Container
+from dataclasses import dataclass
 from math import inf, isfinite
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.parts import made
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import standby
 from orchestrator.model import (
-    ENERGISED,
     BatteryLink,
     Cause,
     ChargeMode,
@@ -36,6 +39,9 @@ STANDBY_A = 0.5
 TERMINAL_V = 5.0
 
 
+NONE: frozenset[str] = frozenset()
+
+
 def _fresh(measurement: Measurement | None, now_s: float, oldest_s: float) -> float | None:
     """The value, if it may be relied on. A time in the future is as wrong as one too long ago."""
     if measurement is None or not oldest_s <= measurement.t_s <= now_s + FAST_STALE_S:
@@ -49,60 +55,72 @@ def _valid(reading: ChargerReading | None, now_s: float) -> ChargerReading | Non
     return reading if isfinite(reading.voltage_v) and isfinite(reading.current_a) else None
 
 
+@dataclass(frozen=True, slots=True)
 class Facts:
-    """Read-only by convention; made anew by every step."""
+    """What is true now. Who knows more makes other facts: the memory brought up to them, what could not be judged."""
 
-    __slots__ = (
-        "amps",
-        "battery",
-        "broken",
-        "charger",
-        "connected",
-        "energised",
-        "memory",
-        "now_s",
-        "pack_a",
-        "pack_v",
-        "raised",
-        "reading",
-        "rules",
-        "slow_from_s",
-        "snapshot",
-        "soc",
-        "soh",
-        "state_s",
-        "status",
-        "temperature_c",
-        "volts",
-    )
+    now_s: float
+    snapshot: Snapshot
+    memory: Memory
+    rules: Rules
+    reading: ChargerReading | None
+    charger: ChargerLink
+    battery: BatteryLink
+    volts: float | None
+    amps: float | None
+    slow_from_s: float
+    pack_v: float | None
+    pack_a: float | None
+    status: float | None
+    temperature_c: float | None
+    soc: float | None
+    soh: float | None
+    connected: bool
+    energised: bool  #: the last step has left the bay so, as the two that follow
+    state_s: float
+    raised: Container[str]  #: ids of the faults in force; for thresholds with hysteresis
+    broken: tuple[Cause, ...] = ()  #: what of our own could not be judged in this step
 
-    def __init__(self, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> None:
-        self.now_s = now_s
-        self.snapshot = snapshot
-        self.memory = memory
-        self.rules = rules
-        self.reading: ChargerReading | None = _valid(snapshot.charger, now_s)
-        self.charger: ChargerLink = snapshot.charger_link
-        self.battery: BatteryLink = snapshot.battery_link
-        self.volts = self.reading.voltage_v if self.reading else None
-        self.amps = self.reading.current_a if self.reading else None
-        battery, boot_s = snapshot.battery, self.battery.boot_t_s
-        settled_s = boot_s + SETTLE_S if boot_s is not None else -inf
+    @classmethod
+    def of(cls, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> "Facts":
+        """What is true by this snapshot."""
+        reading, battery, link = _valid(snapshot.charger, now_s), snapshot.battery, snapshot.battery_link
+        settled_s = link.boot_t_s + SETTLE_S if link.boot_t_s is not None else -inf
         fast_s, slow_s = max(now_s - FAST_STALE_S, settled_s), max(now_s - SLOW_STALE_S, settled_s)
-        self.slow_from_s = slow_s
-        self.pack_v = _fresh(battery.voltage_v, now_s, fast_s)
-        self.pack_a = _fresh(battery.current_a, now_s, fast_s)
-        self.status = _fresh(battery.status, now_s, fast_s)
-        self.temperature_c = _fresh(battery.temperature_c, now_s, fast_s)
-        self.soc = _fresh(battery.soc_pct, now_s, slow_s)
-        self.soh = _fresh(battery.soh_pct, now_s, slow_s)
-        self.connected = snapshot.connected
-        #: what of our own could not be judged in this step
-        self.broken: list[Cause] = []
-        self.energised = memory.state in ENERGISED
-        self.state_s = now_s - memory.since_s if memory.since_s is not None else 0.0
-        #: ids of the faults that are raised, as the last step left them; for thresholds with hysteresis
-        self.raised = {name for name, fault in memory.faults.items() if fault.raised_s is not None}
+        return made(
+            cls,
+            now_s,
+            snapshot,
+            memory,
+            rules,
+            reading,
+            snapshot.charger_link,
+            link,
+            reading.voltage_v if reading else None,
+            reading.current_a if reading else None,
+            slow_s,
+            _fresh(battery.voltage_v, now_s, fast_s),
+            _fresh(battery.current_a, now_s, fast_s),
+            _fresh(battery.status, now_s, fast_s),
+            _fresh(battery.temperature_c, now_s, fast_s),
+            _fresh(battery.soc_pct, now_s, slow_s),
+            _fresh(battery.soh_pct, now_s, slow_s),
+            snapshot.connected,
+            memory.state in ENERGISED,
+            now_s - memory.since_s if memory.since_s is not None else 0.0,
+            frozenset(name for name, fault in memory.faults.items() if fault.raised_s is not None)
+            if memory.faults
+            else NONE,
+            (),
+        )
+
+    def with_memory(self, memory: Memory) -> "Facts":
+        """The same facts, beside what follows from them. (By hand, since every step does this several times.)"""
+        return made(
+            Facts, self.now_s, self.snapshot, memory, self.rules, self.reading, self.charger, self.battery, self.volts,
+            self.amps, self.slow_from_s, self.pack_v, self.pack_a, self.status, self.temperature_c, self.soc, self.soh,
+            self.connected, self.energised, self.state_s, self.raised, self.broken,
+        )  # fmt: skip
 
     def slow(self, measurement: Measurement | None) -> float | None:
         """A value of the slow objects that only few rows look at, if it may be relied on."""
@@ -173,7 +191,7 @@ class Facts:
         """The charger itself ended a charge that it was running (mode 5 is also plain standby)."""
         return (
             self.memory.state is State.CHARGING
-            and self.memory.ran
+            and self.memory.stage.ran
             and self.reading is not None
             and self.reading.charge_mode is ChargeMode.FULL
         )

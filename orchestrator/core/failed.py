@@ -4,12 +4,14 @@ Nothing is judged here but the plainest words of the charger. The memory knows s
 that the next step, if it does not raise, goes on from there.
 """
 
+from orchestrator.core import operator, safestop, sequence
 from orchestrator.core.contactor import closes
+from orchestrator.core.history import stage
 from orchestrator.core.latches import shown
-from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory, Memory
-from orchestrator.core.operator import STOPPED
+from orchestrator.core.parts import changed
 from orchestrator.core.safestop import OBEY_STOP_S
+from orchestrator.core.states import UNVERIFIED
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 
 FAULT = "internal"
@@ -17,26 +19,30 @@ FAULT = "internal"
 
 def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tuple[Decision, Memory]:
     """The decision and the memory after an exception, whose words are `error`."""
-    memory = memory.copy()
-    memory.last_s = now_s
-    if memory.state not in UNVERIFIED or memory.stopping_s is None:
-        memory.stopping_s = memory.since_s = now_s
-        memory.state, memory.stop_cause = State.STOPPING, Cause.of("failed", error=error)
-    memory.unverified, memory.ready, memory.intends, memory.order = True, False, False, None
-    known = memory.faults.get(FAULT)
-    since_s = known.raised_s if known is not None and known.raised_s is not None else now_s
-    what = Cause.of("internal_error", error=error)
-    memory.faults[FAULT] = FaultMemory(present=True, raised_s=since_s, cause=what, latched=True)
-    if snapshot.request is Request.STOP:
-        memory.hold = STOPPED
-    tried_s = now_s - memory.stopping_s
+    since_s, cause = memory.stop.stopping_s, None
+    state = memory.state
+    if state not in UNVERIFIED or since_s is None:
+        since_s, state, cause = now_s, State.STOPPING, Cause.of("failed", error=error)
+        memory = changed(memory, since_s=now_s)
+    tried_s = now_s - since_s
     if tried_s >= OBEY_STOP_S:
-        memory.state = State.UNCONTROLLABLE
-    out = memory.state is State.UNCONTROLLABLE
-    memory.closed = closes(memory.state, closed=memory.closed, standby=False)
-    memory.cause = Cause.of("failed_stopping", error=error)
+        state = State.UNCONTROLLABLE
+    out = state is State.UNCONTROLLABLE
+    why = Cause.of("failed_stopping", error=error)
     if out:
-        memory.cause = Cause.of("failed_uncontrollable", tried_s=tried_s, error=error)
+        why = Cause.of("failed_uncontrollable", tried_s=tried_s, error=error)
+    memory = changed(
+        memory,
+        state=state,
+        cause=why,
+        last_s=now_s,
+        closed=closes(state, closed=memory.closed, standby=False),
+        faults=_latched(memory, now_s, error),
+        operator=operator.stopped(memory.operator) if snapshot.request is Request.STOP else memory.operator,
+        stop=safestop.failed(memory.stop, now_s, cause),
+        stage=stage.not_ready(memory.stage),
+        sequence=sequence.ends(memory.sequence),
+    )
     refused = snapshot.request is not None and snapshot.request is not Request.STOP
     answer = Cause.of("failed_request", error=error) if refused else None
     level = Alarm.DANGER if out else Alarm.NONE
@@ -45,3 +51,11 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory
+
+
+def _latched(memory: Memory, now_s: float, error: str) -> dict[str, FaultMemory]:
+    """The faults, with this one among them."""
+    known = memory.faults.get(FAULT)
+    raised_s = known.raised_s if known is not None and known.raised_s is not None else now_s
+    what = Cause.of("internal_error", error=error)
+    return {**memory.faults, FAULT: FaultMemory(present=True, raised_s=raised_s, cause=what, latched=True)}

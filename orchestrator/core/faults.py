@@ -15,8 +15,9 @@ from enum import Enum, auto
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import OBEY_STOP_S
+from orchestrator.core.states import AT_REST, AT_WORK, ENERGISED, UNSEEN, UNVERIFIED
 from orchestrator.core.witnesses import measured, pack, paired, standby
-from orchestrator.model import ENERGISED, Cause, Effect, State
+from orchestrator.model import Cause, Effect, State
 
 Check = Callable[[Facts], Cause | None]
 Past = Callable[[Cause, float], Cause]
@@ -32,13 +33,7 @@ class Clear(Enum):
 
 
 ALWAYS = frozenset(State)
-#: The charger was verified to stand by and was not told to run.
-AT_REST = frozenset({State.IDLE, State.HELD, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
-AT_WORK = ENERGISED | {State.QUALIFYING}
-#: The charger is heard for the first time, or again.
-UNSEEN = frozenset({State.STARTING, State.OFFLINE})
 QUALIFYING = frozenset({State.QUALIFYING})
-UNSTOPPED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
 #: A heartbeat, the NMT start that answers it, and the next heartbeat, at the longest period that can be asked for.
 NMT_OBEY_S = 4.0
 #: Steady values that all change at once are read from the one a moment before the other.
@@ -84,7 +79,7 @@ FAULTS: tuple[Row, ...] = (
     Row("rogue_run", "C5", E.TRIP, Clear.RESET, obedience.rogue_run, AT_REST),
     Row("current_without_order", "C29", E.TRIP, Clear.RESET, standby.current_without_order, AT_REST | UNSEEN,
         clean_s=5),
-    Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNSTOPPED,
+    Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNVERIFIED,
         for_s=OBEY_STOP_S, at_rest="stands_by_now", past=obedience.did_not_stop),
     Row("contactor_lost", "C6", E.STOP, Clear.BACKOFF, obedience.contactor_lost, ALWAYS),
     Row("will_not_start", "C7", E.STOP, Clear.BACKOFF, obedience.will_not_start, ENERGISED),

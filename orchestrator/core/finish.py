@@ -41,10 +41,9 @@ def finished(f: Facts) -> Cause | None:
 def known_full(f: Facts) -> Cause | None:
     """By what the pack is known to be full now; None while it is not."""
     rule = f.rules.policy.finish.full
-    signs = {"soc_pct": _by_soc(f), "taper": _by_taper(f), "charger": _by_charger(f)}
     if rule.needs is Needs.ANY:
-        return next((sign for sign in signs.values() if sign is not None), None)
-    needed = [signs[name] for name in signs if getattr(rule, name) not in (None, False)]
+        return _by_soc(f) or _by_taper(f) or _by_charger(f)
+    needed = [sign(f) for name, sign in SIGNS.items() if getattr(rule, name) not in (None, False)]
     seen = [sign for sign in needed if sign is not None]
     if not seen or len(seen) < len(needed):
         return None
@@ -59,7 +58,7 @@ def _by_soc(f: Facts) -> Cause | None:
 
 
 def _by_taper(f: Facts) -> Cause | None:
-    taper, since_s = f.rules.taper, f.memory.taper_s
+    taper, since_s = f.rules.taper, f.memory.stage.taper_s
     if taper is None or since_s is None or f.amps is None or f.now_s - since_s < taper.for_s:
         return None
     key, below_a = "finish.full.taper", tapered_a(f)
@@ -75,6 +74,10 @@ def _by_charger(f: Facts) -> Cause | None:
     return f.rules.by_policy("full_charger", "finish.full.charger")
 
 
+#: Each sign of a full pack by its key of the policy.
+SIGNS = {"soc_pct": _by_soc, "taper": _by_taper, "charger": _by_charger}
+
+
 def ends_full(f: Facts) -> bool:
     """What led to the charger's end looks like full: the current had tapered off, or the pack was at its end voltage.
 
@@ -87,7 +90,8 @@ def ends_full(f: Facts) -> bool:
     flowed = [sample for sample in trail if sample.charger_a > 0]
     if not flowed or flowed[-1].t_s - flowed[0].t_s < SEEN_TAPER_S:
         return False
-    set_a = f.memory.step.current_a if f.memory.step is not None else max(sample.charger_a for sample in flowed)
+    step = f.memory.stage.step
+    set_a = step.current_a if step is not None else max(sample.charger_a for sample in flowed)
     return flowed[-1].charger_a < TAPERED_SHARE * set_a
 
 
@@ -99,13 +103,13 @@ def early_below_pct(f: Facts) -> float:
 def tapered_a(f: Facts) -> float:
     """Below this the current has tapered off: on a low step, whose own current is as low, only well below that."""
     below_a = f.rules.taper.below_a if f.rules.taper is not None else 0.0
-    return min(below_a, TAPERED_SHARE * f.memory.step.current_a) if f.memory.step is not None else below_a
+    return min(below_a, TAPERED_SHARE * f.memory.stage.step.current_a) if f.memory.stage.step is not None else below_a
 
 
 def tapers(f: Facts) -> bool:
     """The current is low because the pack is nearly full, not because the charge has not begun."""
     taper = f.rules.taper
-    if taper is None or f.amps is None or f.pack_v is None or f.memory.runs_s is None:
+    if taper is None or f.amps is None or f.pack_v is None or not f.runs:
         return False
     return f.amps < tapered_a(f) and f.pack_v > taper.above_v
 
@@ -115,7 +119,7 @@ def tapers(f: Facts) -> bool:
 
 def full_due(f: Facts) -> bool:
     """The battery was not charged all the way for as long as the policy says."""
-    days, full_s = f.rules.policy.finish.full_every_days, f.memory.full_s
+    days, full_s = f.rules.policy.finish.full_every_days, f.memory.battery.full_s
     return days is not None and full_s is not None and f.now_s - full_s >= days * DAY_S
 
 

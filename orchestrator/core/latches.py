@@ -9,16 +9,17 @@ A predicate that raises is a defect of ours: that row cannot be judged any more,
 which is judged last, and all the others go on.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import ceil
 
 from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, ROW, Clear, Row
-from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory
 from orchestrator.core.safestop import verified
-from orchestrator.model import ActiveFault, Cause, Effect
+from orchestrator.core.states import UNVERIFIED
+from orchestrator.model import ActiveFault, Cause, Effect, State
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
@@ -28,41 +29,53 @@ MINUTE_S = 60.0
 STRIKES_S = 3600.0
 
 
-def update(f: Facts) -> dict[str, FaultMemory]:
+def update(f: Facts) -> Mapping[str, FaultMemory]:
     """The fault memory after this step's facts."""
-    before, state = f.memory.faults, f.memory.state
-    passed_s = f.now_s - f.memory.looked_s if f.memory.looked_s is not None else 0.0
-    f.memory.looked_s = f.now_s
+    before, state, looked_s = f.memory.faults, f.memory.state, f.memory.looked_s
+    passed_s = f.now_s - looked_s if looked_s is not None else 0.0
     departed = f.departed and not f.energised
     after: dict[str, FaultMemory] = {}
-    for row in FAULTS:
-        fault = before.get(row.id)
-        if fault is None and state not in row.where:
-            continue
-        left = departed and row.departs
-        if left and not (fault is not None and fault.latched):
+    for row in _looked_for(state, before):
+        fault = before.get(row.id) if before else None
+        if departed and row.departs and not (fault is not None and fault.latched):
             strikes = tuple(t for t in fault.strikes if t != fault.raised_s) if fault is not None else ()
             if strikes:  # what it has just done was no fault; what it did before was
                 after[row.id] = FaultMemory(strikes=strikes)
             continue
-        looked_for = not left and (state in row.where or (fault is not None and fault.raised_s is not None))
-        seen = _seen(row, f) if looked_for else None
+        seen = None
+        if fault is None or _is_looked_for(row, fault, state, departed=departed):
+            try:
+                seen = row.check(f)
+            except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
+                why = Cause.of("not_judged", fault=row.id, error=repr(error))
+                f = replace(f, broken=(*f.broken, why))
         if seen is not None:
             after[row.id] = _present(row, fault or FaultMemory(), seen, f, passed_s)
         elif fault is not None:
             kept = _absent(row, fault, f, passed_s)
             if kept is not None:
                 after[row.id] = kept
-    return after
+    return after if after or before else before
 
 
-def _seen(row: Row, f: Facts) -> Cause | None:
-    """What the row's predicate sees."""
-    try:
-        return row.check(f)
-    except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
-        f.broken.append(Cause.of("not_judged", fault=row.id, error=repr(error)))
-        return None
+def _is_looked_for(row: Row, fault: FaultMemory, state: State, *, departed: bool) -> bool:
+    """Whether a known fault's condition is looked for; one in force is followed in every state."""
+    return not (departed and row.departs) and (fault.raised_s is not None or state in row.where)
+
+
+def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[Row]:
+    """The rows that are looked for in a state, and those that are known, in their order."""
+    usual = _USUAL.get(state)
+    if usual is None or usual[0] is not FAULTS:
+        rows = tuple(row for row in FAULTS if state in row.where)
+        usual = _USUAL[state] = FAULTS, rows, frozenset(row.id for row in rows)
+    if known.keys() <= usual[2]:
+        return usual[1]
+    return [row for row in FAULTS if state in row.where or row.id in known]
+
+
+#: The rows of each state, and their ids; and of which table they are.
+_USUAL: dict[State, tuple[Sequence[Row], Sequence[Row], frozenset[str]]] = {}
 
 
 def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
@@ -121,14 +134,14 @@ def effect(name: str, fault: FaultMemory) -> Effect:
     return Effect.TRIP if fault.latched else ROW[name].effect
 
 
-def raised(faults: dict[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
+def raised(faults: Mapping[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
     """The faults in force, worst effect first, then the oldest."""
     live = [(name, fault) for name, fault in faults.items() if fault.raised_s is not None]
     live.sort(key=lambda item: (-effect(*item), item[1].raised_s))
     return live
 
 
-def shown(faults: dict[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
+def shown(faults: Mapping[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
     """The faults in force: what was seen, and the id of what to do.
 
     `at_rest`: the charger stands by, verified.
@@ -182,7 +195,7 @@ def _left_s(row: Row, fault: FaultMemory, now_s: float) -> float | None:
 
 
 def release(
-    faults: dict[str, FaultMemory], now_s: float, *, by_reset: bool
+    faults: Mapping[str, FaultMemory], now_s: float, *, by_reset: bool
 ) -> tuple[dict[str, FaultMemory], list[Cause]]:
     """Clear what a person may clear: by a reset everything, by a start what waits for a start.
 

@@ -5,23 +5,13 @@ after a hold. Which rows apply, `core/rows.py` follows.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ranges
-from orchestrator.config.policy import Band, Where
+from orchestrator.config.policy import Band
 from orchestrator.core.facts import Facts
 from orchestrator.core.rows import values
+from orchestrator.core.rules import Bound
 from orchestrator.model import ActiveFault, Cause, Effect, Step
-
-
-@dataclass(frozen=True, slots=True)
-class Bound:
-    """One thing that limits the current."""
-
-    allowed_a: float
-    key: str  #: of policy or station; "fault ID" for a fault
-    row: Band | Where | None = None
-
 
 # --- how much they allow ----------------------------------------------------------------------------------------------
 
@@ -31,27 +21,31 @@ def bounds(f: Facts, worst: ActiveFault | None) -> Iterator[Bound]:
 
     `worst` is the worst of the faults in force; LIMIT, and what is worse, means the lowest step.
     """
-    rules, rows = f.rules, dict(f.memory.rows)
-    yield Bound(rules.policy.pack.current_a, "pack.current_a")
+    rules, rows = f.rules, dict(f.memory.tables.rows)
+    yield rules.pack_bound
     if rules.top_step < len(rules.steps_a) - 1:
         yield Bound(rules.worst_a[rules.top_step], "limits.current_a")
     if worst is not None and worst.effect >= Effect.LIMIT:
         yield Bound(rules.worst_a[0], f"fault {worst.id}")
     known = values(f)
-    for table in rules.tables:
+    for table, allowed in zip(rules.tables, rules.table_bounds, strict=True):
         name, row = table.name, rows.get(table.name)
         if known[name] is None or row is None:  # a rule of its own ends a charge that no row covers
             yield Bound(rules.worst_a[0], f"current.{name}")
         else:
-            yield Bound(table.amps[row], f"current.{name}.rows[{row}]", table.rows[row])
+            yield allowed[row]
     for name, number in rows.items():
         if name.startswith("where"):
-            yield Bound(rules.where_a[number], f"current.{name}", rules.policy.current.where[number])
+            yield rules.where_bounds[number]
 
 
 def lowest(f: Facts, worst: ActiveFault | None = None) -> Bound:
     """What limits the current most; of equals the first."""
-    return min(bounds(f, worst), key=lambda bound: bound.allowed_a)
+    least = f.rules.pack_bound
+    for bound in bounds(f, worst):
+        if bound.allowed_a < least.allowed_a:
+            least = bound
+    return least
 
 
 def none_allowed(f: Facts) -> Cause | None:
@@ -69,13 +63,14 @@ def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
     """The step for now, and since when a higher one has been allowed (None: none is)."""
     bound = lowest(f, worst)
     index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # where none is allowed a fault has ended the charge
-    if index == len(f.rules.steps_a) - 1:
+    top = index == len(f.rules.steps_a) - 1
+    before, raise_s = f.memory.stage.step, f.memory.stage.raise_s
+    if before is not None and index == before.index and before.key == ("" if top else bound.key):
+        return before, None
+    if top:
         bound = Bound(bound.allowed_a, "")
-    before, raise_s = f.memory.step, f.memory.raise_s
-    if before is None or index < before.index:
+    if before is None or index <= before.index:
         return _step(f, index, bound), None
-    if index == before.index:
-        return (before if before.key == bound.key else _step(f, index, bound)), None
     raise_s = raise_s if raise_s is not None else f.now_s
     if f.now_s - raise_s >= f.rules.policy.current.raise_after_s:
         return _step(f, index, bound), None

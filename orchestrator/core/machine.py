@@ -17,6 +17,7 @@ from functools import cache
 
 from transitions import Machine, MachineError
 
+from orchestrator.core.states import ENERGISED, RESTING, SETTLED, STARTABLE, UNVERIFIED, ordered
 from orchestrator.errors import RefusedError
 from orchestrator.model import State
 
@@ -40,27 +41,22 @@ class Trigger(StrEnum):
 
 
 S, T = State, Trigger
-
-#: Current flows; in the order in which a deeply discharged pack goes through them.
-ENERGISED_STAGES = (S.PRECHARGE_PULSE, S.PRECHARGE_CONTINUOUS, S.CHARGING)
-#: States in which the charger stands by, verified, and from which a bay goes where the facts lead.
-RESTING = (S.OFFLINE, S.IDLE, S.HELD, S.QUALIFYING, S.FULL, S.SUSPENDED)
-#: States that wait for a verified standby.
-UNVERIFIED = (S.STARTING, S.STOPPING, S.UNCONTROLLABLE)
+#: Standby was verified, or is verified now: what follows is chosen.
+FROM_REST = (*ordered(RESTING), *ordered(UNVERIFIED))
 
 #: (trigger, the states it is accepted in, the state it leads to; None: the state stays).
 TABLE: tuple[tuple[Trigger, tuple[State, ...], State | None], ...] = (
-    (T.STOP, UNVERIFIED, None),  # they are stopping already
-    (T.STOP, (*RESTING, *ENERGISED_STAGES, S.TRIPPED), S.STOPPING),
+    (T.STOP, ordered(UNVERIFIED), None),  # they are stopping already
+    (T.STOP, (*ordered(SETTLED), *ordered(ENERGISED)), S.STOPPING),
     (T.GIVE_UP, (S.STARTING, S.STOPPING), S.UNCONTROLLABLE),
-    (T.LOSE, (*RESTING, *UNVERIFIED), S.OFFLINE),
-    (T.REST, (*RESTING, *UNVERIFIED), S.IDLE),
-    (T.HOLD, (*RESTING, *UNVERIFIED), S.HELD),
-    (T.SUSPEND, (*RESTING, *UNVERIFIED), S.SUSPENDED),
-    (T.FILL, (*RESTING, *UNVERIFIED), S.FULL),
-    (T.TRIP, (S.OFFLINE, *UNVERIFIED), S.TRIPPED),  # only after a stop that was verified just now
+    (T.LOSE, FROM_REST, S.OFFLINE),
+    (T.REST, FROM_REST, S.IDLE),
+    (T.HOLD, FROM_REST, S.HELD),
+    (T.SUSPEND, FROM_REST, S.SUSPENDED),
+    (T.FILL, FROM_REST, S.FULL),
+    (T.TRIP, (S.OFFLINE, *ordered(UNVERIFIED)), S.TRIPPED),  # only after a stop that was verified just now
     (T.RESET, (S.TRIPPED,), S.HELD),
-    (T.QUALIFY, (S.IDLE, S.HELD, S.FULL, S.SUSPENDED), S.QUALIFYING),
+    (T.QUALIFY, ordered(STARTABLE), S.QUALIFYING),
     (T.PULSE, (S.QUALIFYING,), S.PRECHARGE_PULSE),
     (T.CONTINUE, (S.PRECHARGE_PULSE,), S.PRECHARGE_CONTINUOUS),
     (T.CHARGE, (S.QUALIFYING, S.PRECHARGE_CONTINUOUS), S.CHARGING),

@@ -4,16 +4,17 @@ Accepted is what has an effect, or what is so already. Any other request that wo
 the bay does, or waits for; a stop alone is always accepted.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from orchestrator.core import latches
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import FaultMemory, Memory, Operator
+from orchestrator.core.parts import changed
 from orchestrator.core.safestop import LASTS_S
-from orchestrator.model import ENERGISED, Cause, Request, State
+from orchestrator.core.states import AT_WORK
+from orchestrator.model import Cause, Request, State
 from orchestrator.model.cause import together
 
-#: A charge has been started already.
-AT_WORK = ENERGISED | {State.QUALIFYING}
 STOPPED = Cause("operator_stop")
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
@@ -23,59 +24,74 @@ OWN = frozenset({STOPPED, RESET})
 OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 
-def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Cause | None:
-    """Change the memory as the operator asks; None when it was done, else why not.
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What a request has changed; `refusal` is why it was not done."""
+
+    operator: Operator
+    faults: Mapping[str, FaultMemory]
+    refusal: Cause | None = None
+
+
+def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Heard:
+    """What becomes of the request.
 
     What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
     """
     if unkept and request in (Request.START, Request.RESET):
-        return Cause.of("not_done", problem=unkept)
+        return _refused(memory, Cause.of("not_done", problem=unkept))
     return VERBS[request](memory, now_s)
 
 
-def _stop(memory: Memory, _now_s: float) -> Cause | None:
-    memory.hold = STOPPED
-    return None
+def stopped(known: Operator) -> Operator:
+    """An operator has stopped the bay."""
+    return changed(known, hold=STOPPED)
 
 
-def _pause(memory: Memory, _now_s: float) -> Cause | None:
+def _refused(memory: Memory, why: Cause) -> Heard:
+    return Heard(memory.operator, memory.faults, why)
+
+
+def _stop(memory: Memory, _now_s: float) -> Heard:
+    return Heard(stopped(memory.operator), memory.faults)
+
+
+def _pause(memory: Memory, _now_s: float) -> Heard:
     latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
     if latched:  # its reset leads to a start, which would end the pause
-        return Cause.of("reset_first", faults=latched)
-    if memory.hold:
-        return Cause.of("not_running", what=memory.hold)
-    memory.paused = True
-    return None
+        return _refused(memory, Cause.of("reset_first", faults=latched))
+    if memory.operator.hold:
+        return _refused(memory, Cause.of("not_running", what=memory.operator.hold))
+    return Heard(changed(memory.operator, paused=True), memory.faults)
 
 
-def _start(memory: Memory, now_s: float) -> Cause | None:
+def _start(memory: Memory, now_s: float) -> Heard:
     if memory.state is State.UNCONTROLLABLE:
-        return OUT_OF_CONTROL
-    before = memory.faults
-    memory.faults, refusals = latches.release(before, now_s, by_reset=False)
+        return _refused(memory, OUT_OF_CONTROL)
+    before, known = memory.faults, memory.operator
+    faults, refusals = latches.release(before, now_s, by_reset=False)
     if refusals:
-        return together(refusals)
-    if not (memory.hold or memory.paused) and len(memory.faults) == len(before) and memory.state not in AT_WORK:
-        return Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause)
-    memory.hold, memory.paused = None, False
-    return None
+        return _refused(memory, together(refusals))
+    if not (known.hold or known.paused) and len(faults) == len(before) and memory.state not in AT_WORK:
+        return _refused(memory, Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause))
+    return Heard(changed(known, hold=None, paused=False), faults)
 
 
-def _reset(memory: Memory, now_s: float) -> Cause | None:
+def _reset(memory: Memory, now_s: float) -> Heard:
     if memory.state is State.UNCONTROLLABLE:
-        return OUT_OF_CONTROL
-    before = memory.faults
+        return _refused(memory, OUT_OF_CONTROL)
+    before, known = memory.faults, memory.operator
     faults, refusals = latches.release(before, now_s, by_reset=True)
     cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
-    resets = tuple(reset for reset in memory.resets if now_s - reset[0] < RESETS_S)
+    resets = tuple(reset for reset in known.resets if now_s - reset[0] < RESETS_S)
     refusals = refusals or [cause for name in cleared if (cause := _too_often(name, resets, now_s))]
     if refusals:
-        return together(refusals)
+        return _refused(memory, together(refusals))
     if len(faults) == len(before):
-        return Cause.of("nothing_to_reset", state=memory.state.value, what=memory.cause)
-    memory.faults, memory.resets = faults, resets + tuple((now_s, name) for name in cleared)
-    memory.hold = RESET  # in whatever state: the way on is a start, also while the stop is verified
-    return None
+        return _refused(memory, Cause.of("nothing_to_reset", state=memory.state.value, what=memory.cause))
+    resets += tuple((now_s, name) for name in cleared)
+    # in whatever state: the way on is a start, also while the stop is verified
+    return Heard(changed(known, hold=RESET, resets=resets), faults)
 
 
 def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> Cause | None:
@@ -87,7 +103,7 @@ def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -
     return Cause.of("reset_too_often", fault=name, times=len(times), wait_min=wait_min)
 
 
-VERBS: dict[Request, Callable[[Memory, float], Cause | None]] = {
+VERBS: Mapping[Request, Callable[[Memory, float], Heard]] = {
     Request.START: _start,
     Request.PAUSE: _pause,
     Request.STOP: _stop,

@@ -16,7 +16,7 @@ def out_of_control(f: Facts) -> Cause:
         # a BMU with an offset, or one that stands still, looks the same as a charger that lies
         charger_a, pack_a = f.reading.current_a, f.pack_a
         return Cause.of("uncontrollable_contradicted", port=port, charger_a=charger_a, pack_a=pack_a)
-    since_s = memory.stopping_s if memory.stopping_s is not None else f.now_s - f.state_s
+    since_s = memory.stop.stopping_s if memory.stop.stopping_s is not None else f.now_s - f.state_s
     id_ = "uncontrollable" if _heard(f) and f.runs else "uncontrollable_unproved"
     return Cause.of(id_, port=port, since_s=f.now_s - since_s, why=_witnesses(f))
 

@@ -9,12 +9,11 @@ from dataclasses import dataclass, field, replace
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import BACKOFF_S
-from orchestrator.core.memory import FaultMemory, Memory
-from orchestrator.model import ENERGISED, Cause, Session, State
+from orchestrator.core.memory import FaultMemory, Memory, with_values
+from orchestrator.core.states import MAY_RUN
+from orchestrator.model import Cause, Session
 from orchestrator.model.cause import together
 
-#: In these a charger may be delivering current.
-RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
 #: Mere counters are written this often while nothing else changes.
 COUNTERS_S = 30.0
 UNFINISHED = Cause("unfinished")
@@ -61,17 +60,17 @@ class Persisted:
             for name, fault in memory.faults.items()
             if fault.raised_s is not None or fault.strikes
         }
-        soc_s, soc_pct = memory.charge
+        soc_s, soc_pct = memory.battery.charge
         session = memory.session
         return cls(
-            running=memory.state in RUNNING or memory.intends or memory.unverified,
-            hold=memory.hold,
-            paused=memory.paused,
+            running=memory.state in MAY_RUN or memory.stage.intends or memory.stop.unverified,
+            hold=memory.operator.hold,
+            paused=memory.operator.paused,
             faults=faults,
-            resets=tuple((now_s - t_s, name) for t_s, name in memory.resets),
+            resets=tuple((now_s - t_s, name) for t_s, name in memory.operator.resets),
             session=replace(session, started_s=now_s - session.started_s) if session is not None else None,
-            full_pct=memory.full_pct,
-            full=_age(memory.full_s, now_s),
+            full_pct=memory.battery.full_pct,
+            full=_age(memory.battery.full_s, now_s),
             soc=(now_s - soc_s, soc_pct) if soc_pct is not None else None,
         )
 
@@ -127,7 +126,8 @@ class Persisted:
             faults["found_running"] = FaultMemory(raised_s=now_s, cause=UNFINISHED)
         unknown = [one.cause or _unknown(name) for name, one in self.faults.items() if name not in ROW]
         session = self.session
-        memory = Memory(
+        return with_values(
+            Memory(),
             hold=self.hold or (together(unknown) if unknown else None),
             paused=self.paused,
             faults=faults,
@@ -136,10 +136,8 @@ class Persisted:
             full_pct=self.full_pct,
             full_s=None if self.full is None else now_s - self.full,
             unverified=self.running,
+            charge=(now_s - self.soc[0], self.soc[1]) if self.soc is not None else (0.0, None),
         )
-        if self.soc is not None:
-            memory.charge = (now_s - self.soc[0], self.soc[1])
-        return memory
 
 
 def _unknown(name: str) -> Cause:

@@ -6,17 +6,21 @@ chatters at a bound.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-from orchestrator.config.amperes import TableRule, hysteresis, ranges
-from orchestrator.config.policy import Band, Where
+from orchestrator.config.amperes import TableRule
+from orchestrator.config.policy import Band
 from orchestrator.core.facts import Facts
+from orchestrator.core.memory import Tables
+from orchestrator.core.parts import changed
+from orchestrator.core.rules import Spans
 
 #: A row that has brought the step down more often than this in one charge is not left any more.
 MOST_RETURNS = 2
 
-InForce = tuple[tuple[str, int], ...]  #: the row of each table, and the rules of `where` (`where[1]`)
 Returns = tuple[tuple[str, int], ...]  #: how often each key has brought the step down in this charge
+Values = Mapping[str, float | None]
+
+NONE = Tables()
 
 
 def values(f: Facts) -> dict[str, float | None]:
@@ -24,63 +28,59 @@ def values(f: Facts) -> dict[str, float | None]:
     return {"temperature_c": f.temperature_c, "soc_pct": f.soc, "soh_pct": f.soh, "voltage_v": f.pack_v}
 
 
-def counted(returns: Returns, key: str) -> Returns:
-    """One more time."""
-    times = dict(returns)
-    return tuple((times | {key: times.get(key, 0) + 1}).items())
-
-
-@dataclass(frozen=True, slots=True)
-class _Follower:
-    """Works out the rows of one step."""
-
-    f: Facts
-    before: Mapping[str, int]
-    returns: Mapping[str, int]
-
-    def table(self, table: TableRule, value: float | None) -> int | None:
-        """The row of one table; None outside of it. A value that is not known changes nothing."""
-        was, rows, amps = self.before.get(table.name), table.rows, table.amps
-        if value is None:
-            return was
-        now = _row(rows, value)
-        if now is None or was is None or was >= len(rows) or amps[was] >= amps[now]:
-            return now
-        near = rows[was].from_ - table.inside < value < rows[was].to + table.inside
-        return was if near or self._stays(f"current.{table.name}.rows[{was}]") else now
-
-    def rule(self, number: int, rule: Where, known: Mapping[str, float | None]) -> bool:
-        """Whether a rule of `where` holds; what is not known is taken to be inside."""
+def update(f: Facts) -> Tables:
+    """The rows that are in force by these facts."""
+    memory, rules, before = f.memory, f.rules, f.memory.tables
+    if f.departed or f.battery.boots != memory.battery.boots:
+        return before if before == NONE else NONE
+    returns = before.row_returns if memory.session is not None else ()
+    was, known = dict(before.rows), values(f)
+    now = []
+    for table in rules.tables:
+        name = table.name
+        found = _in_force(table, known[name], was.get(name), returns)
+        if found is not None:
+            now.append((name, found))
+    for number, spans in enumerate(rules.where_spans):
         name = f"where[{number}]"
-        was = name in self.before
-        for quantity, span in ranges(rule).items():
-            value = known[quantity]
-            wider = hysteresis(self.f.rules.policy.current, quantity) if was else 0.0
-            if value is not None and not span.low - wider <= value <= span.high + wider:
-                return was and self._stays(f"current.{name}")
-        return True
-
-    def _stays(self, key: str) -> bool:
-        """Whether it came back too often. A pause is no step, and may come again: it would else be for ever."""
-        return self.returns.get(key, 0) > MOST_RETURNS
+        if _holds(name, spans, known, returns, was=name in was):
+            now.append((name, number))
+    rows = tuple(now)
+    if rows == before.rows and returns == before.row_returns:
+        return before
+    return changed(before, rows=rows, row_returns=returns)
 
 
-def follow_rows(f: Facts) -> None:
-    """Bring the memory's rows up to this step."""
-    memory, current = f.memory, f.rules.policy.current
-    if f.departed or f.battery.boots != memory.boots:
-        memory.rows, memory.row_returns = (), ()
-        return
-    if memory.session is None:
-        memory.row_returns = ()
-    follower, now, known = _Follower(f, dict(memory.rows), dict(memory.row_returns)), {}, values(f)
-    for table in f.rules.tables:
-        if (found := follower.table(table, known[table.name])) is not None:
-            now[table.name] = found
-    for number, rule in enumerate(current.where):
-        if follower.rule(number, rule, known):
-            now[f"where[{number}]"] = number
-    memory.rows = tuple(now.items())
+def _in_force(table: TableRule, value: float | None, was: int | None, returns: Returns) -> int | None:
+    """The row of one table; None outside of it. A value that is not known changes nothing."""
+    rows, amps = table.rows, table.amps
+    if value is None or (was is not None and was < len(rows) and rows[was].from_ <= value < rows[was].to):
+        return was
+    now = _row(rows, value)
+    if now is None or was is None or was >= len(rows) or amps[was] >= amps[now]:
+        return now
+    near = rows[was].from_ - table.inside < value < rows[was].to + table.inside
+    return was if near or _stays(f"current.{table.name}.rows[{was}]", returns) else now
+
+
+def _holds(name: str, spans: Spans, known: Values, returns: Returns, *, was: bool) -> bool:
+    """Whether a rule of `where` holds; what is not known is taken to be inside."""
+    for quantity, span, inside in spans:
+        value, wider = known[quantity], inside if was else 0.0
+        if value is not None and not span.low - wider <= value <= span.high + wider:
+            return was and _stays(f"current.{name}", returns)
+    return True
+
+
+def _stays(key: str, returns: Returns) -> bool:
+    """Whether it came back too often. A pause is no step, and may come again: it would else be for ever."""
+    return dict(returns).get(key, 0) > MOST_RETURNS
+
+
+def lowered(tables: Tables, key: str) -> Tables:
+    """What this key names has brought the step down once more."""
+    times = dict(tables.row_returns)
+    return changed(tables, row_returns=tuple((times | {key: times.get(key, 0) + 1}).items()))
 
 
 def _row(rows: tuple[Band, ...], value: float) -> int | None:

@@ -7,16 +7,29 @@ from orchestrator.config.amperes import (
     DIGITS,
     TableRule,
     TaperRule,
+    hysteresis,
     max_ah,
     max_hours,
+    ranges,
     table_rules,
     taper_of,
     where_a,
 )
-from orchestrator.config.policy import Policy
+from orchestrator.config.policy import Band, Policy, Where
 from orchestrator.config.station import Bay
 from orchestrator.keys import Range
 from orchestrator.model import Cause, ControlMode
+
+Spans = tuple[tuple[str, Range, float], ...]  #: quantity, where a rule holds, and its hysteresis
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """One thing that limits the current."""
+
+    allowed_a: float
+    key: str  #: of policy or station; "fault ID" for a fault
+    row: Band | Where | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +46,10 @@ class Rules:
     top_step: int  #: the highest step within the station's current limit
     tables: tuple[TableRule, ...]  #: what the policy allows by one quantity …
     where_a: tuple[float, ...]  #: … and by several, each rule of its `where`
+    pack_bound: Bound  #: what always limits the current …
+    table_bounds: tuple[tuple[Bound, ...], ...]  #: … what does in each row of each table …
+    where_bounds: tuple[Bound, ...]  #: … and in each rule of `where` …
+    where_spans: tuple[Spans, ...]  #: … with the quantities that it is about
     taper: TaperRule | None  #: when the current counts as tapered off; None: it never does
     max_hours: float  #: a charge that takes longer is a fault
     max_ah: float  #: … and one that takes more
@@ -43,6 +60,7 @@ class Rules:
         policy, limits, charger = bay.policy, bay.limits, bay.charger
         worst_a = tuple(round(amps * (1 + charger.tolerance_pct / 100), DIGITS) for amps in charger.steps_a)
         allowed = [index for index, amps in enumerate(worst_a) if amps <= limits.current_a]
+        tables, allowed_a = table_rules(policy), where_a(policy)
         return cls(
             bay=bay,
             policy=policy,
@@ -55,8 +73,24 @@ class Rules:
             steps_a=charger.steps_a,
             worst_a=worst_a,
             top_step=max(allowed, default=0),
-            tables=table_rules(policy),
-            where_a=where_a(policy),
+            tables=tables,
+            where_a=allowed_a,
+            pack_bound=Bound(policy.pack.current_a, "pack.current_a"),
+            table_bounds=tuple(
+                tuple(
+                    Bound(amps, f"current.{table.name}.rows[{number}]", row)
+                    for number, (amps, row) in enumerate(zip(table.amps, table.rows, strict=True))
+                )
+                for table in tables
+            ),
+            where_bounds=tuple(
+                Bound(amps, f"current.where[{number}]", rule)
+                for number, (amps, rule) in enumerate(zip(allowed_a, policy.current.where, strict=True))
+            ),
+            where_spans=tuple(
+                tuple((name, span, hysteresis(policy.current, name)) for name, span in ranges(rule).items())
+                for rule in policy.current.where
+            ),
             taper=taper_of(policy),
             max_hours=max_hours(policy, worst_a),
             max_ah=max_ah(policy.pack, policy.finish),

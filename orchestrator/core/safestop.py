@@ -13,8 +13,10 @@ old values as soon as it is resumed. So a bay that qualifies for a charge stops 
 """
 
 from orchestrator.core.facts import Facts
-from orchestrator.core.machine import UNVERIFIED
-from orchestrator.model import State
+from orchestrator.core.memory import Stop
+from orchestrator.core.parts import changed
+from orchestrator.core.states import ENERGISED, UNVERIFIED
+from orchestrator.model import Cause, State
 
 #: A stop that is not verified within this is not obeyed (DESIGN §6).
 OBEY_STOP_S = 3.0
@@ -33,20 +35,29 @@ def must_stop(f: Facts, state: State) -> bool:
     return not f.standby or f.unordered
 
 
-def follow_stop(f: Facts, before: State) -> None:
-    """Keep `stopping_s`, `verified_s` and `unverified` of the memory, when the state has just changed."""
-    memory = f.memory
-    if before in UNVERIFIED and memory.state not in UNVERIFIED:
+def update(f: Facts, after: State, cause: Cause) -> Stop:
+    """How the charger was stopped, and whether that is proved, when the state is about to change to `after`."""
+    before, stop = f.memory.state, f.memory.stop
+    if before in UNVERIFIED and after not in UNVERIFIED:
         if f.stopped:
-            memory.verified_s, memory.unverified = f.now_s, False
-        if memory.stopping_s is None and "found_running" in f.raised:  # that was a first stop, too
-            memory.stopping_s = memory.since_s
-    elif before not in UNVERIFIED and memory.state in UNVERIFIED:
-        lasted_s = f.now_s - memory.verified_s if memory.verified_s is not None else LASTS_S
-        runs_again = (f.runs or f.unordered) and lasted_s < LASTS_S and memory.stopping_s is not None
-        memory.returns = memory.returns + 1 if runs_again else 0
-        if not runs_again:
-            memory.stopping_s = f.now_s
+            stop = changed(stop, verified_s=f.now_s, unverified=False)
+        if stop.stopping_s is None and "found_running" in f.raised:  # that was a first stop, too
+            stop = changed(stop, stopping_s=f.memory.since_s)
+    elif before not in UNVERIFIED and after in UNVERIFIED:
+        lasted_s = f.now_s - stop.verified_s if stop.verified_s is not None else LASTS_S
+        runs_again = (f.runs or f.unordered) and lasted_s < LASTS_S and stop.stopping_s is not None
+        returns, stopping_s = (stop.returns + 1, stop.stopping_s) if runs_again else (0, f.now_s)
+        stop = changed(stop, returns=returns, stopping_s=stopping_s)
+    if after in ENERGISED:
+        return changed(stop, unverified=True, stopping_s=None, verified_s=None)
+    return changed(stop, stop_cause=cause) if after is State.STOPPING else stop
+
+
+def failed(stop: Stop, now_s: float, cause: Cause | None) -> Stop:
+    """Our own code has failed: whatever the charger does is unproved. `cause`: this stop begins with it."""
+    if cause is None:
+        return changed(stop, unverified=True)
+    return changed(stop, unverified=True, stopping_s=now_s, stop_cause=cause)
 
 
 def proved_to_last(f: Facts) -> bool:
@@ -68,10 +79,10 @@ def stands_by(f: Facts) -> bool:
 def _runs_again(f: Facts) -> bool:
     """It was stopped before, in vain. One reply alone may be a stray measurement: a second one, or a second return, is
     none."""
-    since_s, stopping_s, reading = f.memory.since_s, f.memory.stopping_s, f.reading
+    since_s, stopping_s, reading = f.memory.since_s, f.memory.stop.stopping_s, f.reading
     if since_s is None or stopping_s is None or f.now_s - stopping_s < OBEY_STOP_S:
         return False
-    return f.memory.returns > 1 or f.unordered or (f.runs and reading is not None and reading.t_s > since_s)
+    return f.memory.stop.returns > 1 or f.unordered or (f.runs and reading is not None and reading.t_s > since_s)
 
 
 def gives_up(f: Facts) -> bool:
@@ -88,6 +99,6 @@ def gives_up(f: Facts) -> bool:
     if f.unordered and f.state_s >= OBEY_STOP_S:
         return True
     if f.reading is None:
-        return memory.unverified and f.state_s >= LOST_S
-    runs_s = memory.runs_s
+        return memory.stop.unverified and f.state_s >= LOST_S
+    runs_s = memory.charger.runs_s
     return (runs_s is not None and f.now_s - runs_s >= OBEY_STOP_S) or f.state_s >= LOST_S + OBEY_STOP_S

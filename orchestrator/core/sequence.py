@@ -7,6 +7,8 @@ may have been the frame that was lost, so the sequence begins again with it.
 """
 
 from orchestrator.core.facts import Facts
+from orchestrator.core.memory import Sequence
+from orchestrator.core.parts import changed
 from orchestrator.model import Action, ChargeMode, ChargerReading, Command, Operation, Setpoint
 
 #: Without a read-back for this long, begin again with the resume.
@@ -17,26 +19,34 @@ RUN = Command(Action.RUN)
 ON_THE_WAY = (ChargeMode.BATTERY_SEARCH, ChargeMode.BATTERY_RECOVERY)
 
 
-def next_order(f: Facts, setpoint: Setpoint) -> Command | None:
-    """The order that leads towards `setpoint`, None when the status shows all of it.
-
-    Keeps `resumed`, `resume_s`, `order`, `order_s` and `tries` of the memory.
-    """
-    memory, reading = f.memory, f.reading
+def next_order(f: Facts, setpoint: Setpoint) -> tuple[Command | None, Sequence]:
+    """The order that leads towards `setpoint`, None when the status shows all of it; and how far the sequence is."""
+    known, reading = f.memory.sequence, f.reading
     if reading is None:
-        return memory.order
+        return known.order, known
     missing = _missing(reading, setpoint, manual=f.rules.manual)
-    if missing != memory.order:
-        memory.order, memory.order_s, memory.tries = missing, f.now_s, 0
+    if missing != known.order:
+        known = changed(known, order=missing, order_s=f.now_s, tries=0)
     if missing is None or _running(reading):
-        return missing
-    if memory.ran:
-        return None  # somebody stopped it: the fault table decides
-    memory.resumed = memory.resumed or _resume_seen(f, reading)
-    tries = int((f.now_s - memory.order_s) / RETRY_S)
-    if tries > memory.tries:
-        memory.tries, memory.resumed, memory.resume_s = tries, False, f.now_s
-    return missing if memory.resumed else RESUME
+        return missing, known
+    if f.memory.stage.ran:
+        return None, known  # somebody stopped it: the fault table decides
+    if not known.resumed and _resume_seen(f, reading):
+        known = changed(known, resumed=True)
+    tries = int((f.now_s - known.order_s) / RETRY_S)
+    if tries > known.tries:
+        known = changed(known, tries=tries, resumed=False, resume_s=f.now_s)
+    return (missing if known.resumed else RESUME), known
+
+
+def begins(known: Sequence, now_s: float) -> Sequence:
+    """Current is to flow, after a rest in which it did not."""
+    return changed(known, resumed=False, resume_s=now_s, order=None)
+
+
+def ends(known: Sequence) -> Sequence:
+    """No current is to flow any more."""
+    return changed(known, order=None) if known.order is not None else known
 
 
 def _running(reading: ChargerReading) -> bool:
@@ -45,7 +55,7 @@ def _running(reading: ChargerReading) -> bool:
 
 def _resume_seen(f: Facts, reading: ChargerReading) -> bool:
     sent = f.charger.sent
-    return sent is not None and sent.command == RESUME and f.memory.resume_s <= sent.t_s < reading.t_s
+    return sent is not None and sent.command == RESUME and f.memory.sequence.resume_s <= sent.t_s < reading.t_s
 
 
 def _missing(reading: ChargerReading, setpoint: Setpoint, *, manual: bool) -> Command | None:

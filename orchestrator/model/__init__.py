@@ -21,7 +21,6 @@ from orchestrator.model.charger import (
     Sent,
 )
 from orchestrator.model.decision import (
-    ENERGISED,
     STANDBY,
     ActiveFault,
     Alarm,
@@ -36,7 +35,6 @@ from orchestrator.model.decision import (
 )
 
 __all__ = [
-    "ENERGISED",
     "STANDBY",
     "STOP",
     "Action",

@@ -58,10 +58,6 @@ class State(StrEnum):
     UNCONTROLLABLE = "UNCONTROLLABLE"
 
 
-#: The states in which the charger is commanded to run.
-ENERGISED = frozenset({State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS, State.CHARGING})
-
-
 class Effect(IntEnum):
     """What a fault does, mildest first; of all that are active the highest wins."""
 

@@ -10,10 +10,10 @@ from orchestrator.config.station import Bay
 from orchestrator.core.failed import carry_on
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
+from orchestrator.core.states import ENERGISED, SETTLED
 from orchestrator.core.step import step
 from orchestrator.interlock import grant
 from orchestrator.model import (
-    ENERGISED,
     STOP,
     Alarm,
     Cause,
@@ -36,10 +36,6 @@ from orchestrator.text.catalogue import say
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
-#: The states that a charger was verified for: it stands by.
-VERIFIED = frozenset(
-    {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.QUALIFYING, State.OFFLINE}
-)
 
 
 class BayRunner:
@@ -81,7 +77,7 @@ class BayRunner:
     def verified(self) -> bool:
         """The charger stands by, by its own word, and nothing is ordered."""
         decision = self.decision
-        return decision is not None and decision.state in VERIFIED and decision.command is None
+        return decision is not None and decision.state in SETTLED and decision.command is None
 
     @property
     def alarm(self) -> Alarm:

@@ -6,6 +6,8 @@ from dataclasses import asdict
 
 from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
+from orchestrator.core.memory import plain as plain_memory
+from orchestrator.core.states import QUIET
 from orchestrator.model import (
     ActiveFault,
     BatteryLink,
@@ -25,8 +27,6 @@ from orchestrator.text.catalogue import say
 
 Line = tuple[str, dict[str, object]]  #: kind, fields
 
-#: States in which every step is the same until something happens.
-QUIET = frozenset({State.IDLE, State.HELD, State.FULL, State.OFFLINE, State.SUSPENDED, State.TRIPPED})
 #: What of a record is said for people, beside its cause.
 TEXTS = frozenset({"reason", "text", "rule", "result"})
 #: What of a snapshot is about this service and its contactor.
@@ -141,7 +141,7 @@ class SnapshotRecorder:
             return None
         fields: dict[str, object] = {"at_s": now_s}
         if self._last is None or self._since_whole >= WHOLE_EVERY:
-            fields |= {"whole": True, **asdict(snapshot), "memory": asdict(memory), "config": self._config}
+            fields |= {"whole": True, **asdict(snapshot), "memory": plain_memory(memory), "config": self._config}
             self._since_whole = 0
         else:
             fields |= _difference(self._last, snapshot)

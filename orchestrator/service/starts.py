@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from math import inf
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses.followed import FIRST_A, OWN_SHARE
-from orchestrator.model import ENERGISED, Cause, Snapshot, State
+from orchestrator.model import Cause, Snapshot, State
 
 #: A turn takes no longer than this: the charger's sequence takes 2 s on a good line, and its first amperes follow.
 TURN_S = 20.0
@@ -68,7 +69,7 @@ class Starts:
         self._seen[name] = Amps(bmu.value if bmu is not None else 0.0, charger.current_a if charger else 0.0)
         turn = self._turn
         if turn is None:
-            if memory.ready and now_s - self._began_s >= self._stagger_s:
+            if memory.stage.ready and now_s - self._began_s >= self._stagger_s:
                 self._turn, self._moves = Turn(name, now_s), ""
         elif turn.name == name:
             self._go_on(turn, now_s, memory)
@@ -81,7 +82,7 @@ class Starts:
             self._moves = self._moved(turn)
             over = memory.witnessed.proved
         else:
-            over = memory.state is not State.QUALIFYING or not memory.ready
+            over = memory.state is not State.QUALIFYING or not memory.stage.ready
         if over:
             self._turn = None
 

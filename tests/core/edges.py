@@ -6,11 +6,11 @@ from typing import Any
 
 from orchestrator.config.policy import Policy
 from orchestrator.core.facts import Facts
-from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.memory import FaultMemory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses.followed import Witnessed
 from orchestrator.model import (
-    ENERGISED,
     BatteryLink,
     BatteryReading,
     ChargeMode,
@@ -27,7 +27,7 @@ from orchestrator.model import (
 )
 from tests.core.bays import POLICY
 from tests.core.said import cause
-from tests.core.world import bay
+from tests.core.world import bay, remembering
 from tests.ids import short, shown
 
 NOW_S = 100_000.0
@@ -85,8 +85,8 @@ class Edge:
         values = self.bmu if self.state in ENERGISED else {"current_a": 0.0, **self.bmu}
         measured = {name: None if x is None else Measurement(x, NOW_S) for name, x in values.items()}
         proof = witnessed() if "stop_sent_s" in self.charger_link else {}
-        memory = Memory(**{"state": self.state, "since_s": ago(self.state_s), "ran": True, "runs_s": ago(50),
-                           **proof, **self.memory})  # fmt: skip
+        begun = {"state": self.state, "since_s": ago(self.state_s), "ran": True, "runs_s": ago(50)}
+        memory = remembering(**{**begun, **proof, **self.memory})
         snapshot = Snapshot(
             charger=replace(READING, **self.charger),
             charger_link=replace(ChargerLink(online=True), **self.charger_link),
@@ -95,7 +95,7 @@ class Edge:
         )
         the_bay = bay(self.policy, self.control)
         the_bay = replace(the_bay, battery=replace(the_bay.battery, tpdo_s=self.tpdo_s))
-        return Facts(NOW_S, replace(snapshot, **self.snapshot), memory, Rules.of(the_bay))
+        return Facts.of(NOW_S, replace(snapshot, **self.snapshot), memory, Rules.of(the_bay))
 
 
 def session(hours: float = 1.0, ah: float = 1.0, soc_start_pct: float | None = 0.0) -> dict[str, Any]:

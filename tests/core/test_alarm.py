@@ -4,12 +4,12 @@ import pytest
 
 from orchestrator.core.alarm import alarm
 from orchestrator.core.faults import FAULTS, Clear, Row
-from orchestrator.core.memory import Memory
 from orchestrator.core.operator import RESET, STOPPED
 from orchestrator.model import ActiveFault, Alarm, Cause, Request, State
 from orchestrator.text.catalogue import advise
 from tests.core.bays import IN, held, idle, running_at_the_start, tripped
 from tests.core.said import reason_of
+from tests.core.world import remembering
 
 ADVICE = [advise(row.id) for row in FAULTS if row.clear is Clear.OPERATOR]
 
@@ -30,13 +30,13 @@ def test_every_state_has_its_level(state: State) -> None:
     [(STOPPED, Alarm.NONE), (RESET, Alarm.NONE), (Cause("past_unknown"), Alarm.ATTENTION)],
 )
 def test_who_holds_a_bay_knows_of_it(hold: Cause, level: Alarm) -> None:
-    assert alarm(Memory(state=State.HELD, hold=hold), ()) is level
-    assert alarm(Memory(state=State.STOPPING, hold=hold), ()) is Alarm.NONE
+    assert alarm(remembering(state=State.HELD, hold=hold), ()) is level
+    assert alarm(remembering(state=State.STOPPING, hold=hold), ()) is Alarm.NONE
 
 
 @pytest.mark.parametrize("row", FAULTS, ids=[row.id for row in FAULTS])
 def test_a_fault_that_waits_for_a_start_wants_attention(row: Row) -> None:
-    level = alarm(Memory(state=State.HELD, hold=STOPPED), (ActiveFault(row.id, row.effect, Cause(row.id), 0.0),))
+    level = alarm(remembering(state=State.HELD, hold=STOPPED), (ActiveFault(row.id, row.effect, Cause(row.id), 0.0),))
     waits = Alarm.ATTENTION if row.clear is Clear.OPERATOR else Alarm.NONE
     assert level is (Alarm.DANGER if row.id == "port_locked" else waits)
 

@@ -7,7 +7,8 @@ import pytest
 
 from orchestrator.core.contactor import closes
 from orchestrator.core.course import QUALIFY_S
-from orchestrator.model import ENERGISED, Action, Alarm, Request, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import Action, Alarm, Request, State
 from tests.core.bays import charging
 from tests.core.said import reason_of
 from tests.core.world import TICK_S, World

@@ -8,9 +8,9 @@ import pytest
 from orchestrator.config.policy import Policy
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED
 from orchestrator.keys import Range
 from orchestrator.model import (
-    ENERGISED,
     STOP,
     Action,
     Alarm,
@@ -201,7 +201,7 @@ def test_full_when_the_charger_says_so(soc_pct: float) -> None:
     at = POLICY.source.at("finish.full.charger")
     assert reason_of(world.decision) == f"full: the charger reports full (mode 5) ({at})"
     world.until(S.FULL, 2)
-    assert world.memory.full_pct == soc_pct
+    assert world.memory.battery.full_pct == soc_pct
 
 
 def test_full_too_early_is_no_full() -> None:
@@ -213,7 +213,7 @@ def test_full_too_early_is_no_full() -> None:
     world.run(2)
     assert world.is_in(S.HELD)
     assert "early_full" in world.raised
-    assert world.memory.full_pct is None
+    assert world.memory.battery.full_pct is None
 
 
 def test_a_standby_that_somebody_orders_is_not_named_full() -> None:

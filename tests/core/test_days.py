@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import pytest
 
-from orchestrator.model import ENERGISED, ControlMode, Request, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import ControlMode, Request, State
 from orchestrator.sim.pack import Pack
 from orchestrator.sim.presets import demo
 from tests.core.said import reason_of

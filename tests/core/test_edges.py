@@ -125,7 +125,7 @@ FINISH = (
     Edge(tapers, False, charger={"current_a": 0.99}, bmu={"voltage_v": 53.6}),
     Edge(tapers, False, charger={"current_a": 0.99}, bmu={"voltage_v": None}),
     Edge(tapers, False, charger={"current_a": 0.99, "t_s": ago(9)}, bmu={"voltage_v": 53.61}),
-    Edge(tapers, False, {"runs_s": None}, charger={"current_a": 0.99}, bmu={"voltage_v": 53.61}),
+    Edge(tapers, False, {}, charger={"operation": Operation.STOPPED, "current_a": 0.49}, bmu={"voltage_v": 53.61}),
     Edge(tapers, False, charger={"current_a": 0.99}, bmu={"voltage_v": 53.61},
          policy=with_full(taper=None)),
 )  # fmt: skip

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.failed import carry_on
-from orchestrator.core.faults import FAULTS, UNSTOPPED, Row
+from orchestrator.core.faults import FAULTS, Row
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED, UNVERIFIED
 from orchestrator.core.step import step
 from orchestrator.model import (
-    ENERGISED,
     STOP,
     Action,
     Alarm,
@@ -136,7 +136,7 @@ def test_a_stop_is_heard_meanwhile_and_nothing_else_is(raises: Switch, state: St
     assert world.ask(Request.RESET) == ""
     world.run(60)
     assert world.is_in(State.HELD)
-    assert world.memory.hold
+    assert world.memory.operator.hold
 
 
 def test_what_was_known_of_the_bay_is_kept(raises: Switch) -> None:
@@ -167,7 +167,7 @@ JUDGED = [row for row in FAULTS if row.id != "internal"]
 
 @pytest.mark.parametrize("row", JUDGED, ids=lambda row: row.id)
 def test_a_rule_that_raises_trips_its_bay_and_takes_no_other_with_it(monkeypatch: pytest.MonkeyPatch, row: Row) -> None:
-    for state in sorted(row.where - UNSTOPPED - {State.TRIPPED}):  # that one has tripped by it already
+    for state in sorted(row.where - UNVERIFIED - {State.TRIPPED}):  # that one has tripped by it already
         world = IN[state]()
         world.tick()
         if not world.is_in(state):

@@ -9,9 +9,10 @@ import pytest
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.faults import FAULTS, ROW, Check, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import measured, pack, paired, standby
 from orchestrator.keys import Range, Source
-from orchestrator.model import ENERGISED, STOP, Effect, Request, State
+from orchestrator.model import STOP, Effect, Request, State
 from orchestrator.text.catalogue import advise
 from tests.core.bays import IN, running_at_the_start
 from tests.core.fault_scenes import SCENES, Scene

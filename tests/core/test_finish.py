@@ -59,8 +59,8 @@ def test_a_taper_is_one_of_one_step() -> None:
     world.run(29)
     world.values["temperature_c"] = 14.0
     world.tick()
-    assert world.memory.step is not None
-    assert world.memory.step.index == 0
+    assert world.memory.stage.step is not None
+    assert world.memory.stage.step.index == 0
     world.amps = 0.9
     world.run(29)
     assert world.is_in(S.CHARGING)
@@ -177,8 +177,8 @@ def test_once_in_so_many_days_it_goes_all_the_way() -> None:
     world.until(S.FULL, 10)
     world.run(60)
     assert world.is_in(S.FULL), "the next one is two weeks away"
-    assert world.memory.full_s is not None
-    assert world.now_s - world.memory.full_s < 120
+    assert world.memory.battery.full_s is not None
+    assert world.now_s - world.memory.battery.full_s < 120
 
 
 def test_the_days_are_counted_over_a_restart_and_over_a_departure() -> None:
@@ -196,7 +196,7 @@ def test_the_days_are_counted_over_a_restart_and_over_a_departure() -> None:
 
 def test_a_battery_that_was_never_charged_here_is_not_due() -> None:
     world = World(bay(long_life())).charging()
-    assert world.memory.full_s is not None
+    assert world.memory.battery.full_s is not None
     for soc_pct in range(55, 81, 5):
         world.values["soc_pct"] = float(soc_pct)
         world.run(1)
@@ -260,5 +260,5 @@ def test_a_charge_that_found_the_pack_full_counts_for_the_days() -> None:
     tapering(world)
     world.values["soc_pct"] = 78.0
     world.until(S.FULL, 130)
-    assert world.memory.full_s is not None
-    assert world.now_s - world.memory.full_s < 10
+    assert world.memory.battery.full_s is not None
+    assert world.now_s - world.memory.battery.full_s < 10

@@ -5,12 +5,12 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core.latches import release
-from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.memory import FaultMemory
 from orchestrator.core.operator import hear
 from orchestrator.model import Action, Cause, Connection, ControlMode, Effect, Request, State
 from tests.core.bays import charging, idle, stopping
 from tests.core.said import cause, reason_of, said, say
-from tests.core.world import TICK_S, World
+from tests.core.world import TICK_S, World, remembering
 
 
 def implausible(world: World, *, seen: bool = True) -> None:
@@ -457,11 +457,12 @@ def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:
 
 def test_an_hour_after_the_first_of_three_there_may_be_a_fourth() -> None:
     latched = {"internal": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
-    memory = Memory(faults=latched, resets=tuple((1000.0 + t_s, "internal") for t_s in (0.0, 10.0, 20.0)))
-    assert "reset again in 59 min" in say(hear(memory, Request.RESET, 1060.0))
-    assert "reset again in 0 min" in say(hear(memory, Request.RESET, 4599.75))
-    assert hear(memory, Request.RESET, 4600.0) is None
-    assert [t_s for t_s, _ in memory.resets] == [1010.0, 1020.0, 4600.0]
+    memory = remembering(faults=latched, resets=tuple((1000.0 + t_s, "internal") for t_s in (0.0, 10.0, 20.0)))
+    assert "reset again in 59 min" in say(hear(memory, Request.RESET, 1060.0).refusal)
+    assert "reset again in 0 min" in say(hear(memory, Request.RESET, 4599.75).refusal)
+    heard = hear(memory, Request.RESET, 4600.0)
+    assert heard.refusal is None
+    assert [t_s for t_s, _ in heard.operator.resets] == [1010.0, 1020.0, 4600.0]
 
 
 def test_only_what_was_latched_counts_as_reset() -> None:
@@ -469,7 +470,7 @@ def test_only_what_was_latched_counts_as_reset() -> None:
     world.charger.run = False
     world.until(State.HELD, 5)
     assert world.ask(Request.RESET) == ""
-    assert world.memory.resets == ()
+    assert world.memory.operator.resets == ()
 
 
 def test_resets_are_counted_for_each_fault() -> None:

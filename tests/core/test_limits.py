@@ -351,7 +351,7 @@ def test_a_new_charge_needs_no_hold() -> None:
 def test_what_is_not_known_is_the_lowest_step() -> None:
     """The fault table ends such a charge in the same step; the limit does not rely on that."""
     world = charging()
-    step, raise_s = choose(Facts(world.now_s, Snapshot(), world.memory, world.rules), None)
+    step, raise_s = choose(Facts.of(world.now_s, Snapshot(), world.memory, world.rules), None)
     at = POLICY.source.at("current.temperature_c")
     assert (step.index, say(step.rule), raise_s) == (0, f"temperature unknown, {at}", None)
 

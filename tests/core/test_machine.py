@@ -8,8 +8,9 @@ import pytest
 
 from orchestrator.core import course, machine
 from orchestrator.core.machine import MACHINE, TABLE, Trigger, fire
+from orchestrator.core.states import ENERGISED
 from orchestrator.errors import RefusedError
-from orchestrator.model import ENERGISED, State
+from orchestrator.model import State
 
 #: What each trigger does in each state: where it leads, `=` it stays, `·` it is refused and the state is kept.
 MATRIX = """

@@ -10,12 +10,13 @@ import pytest
 from orchestrator.core import latches
 from orchestrator.core.course import Course, course
 from orchestrator.core.facts import Facts
+from orchestrator.core.history import entered, update_history
+from orchestrator.core.history.battery import Warmth, thinned
 from orchestrator.core.machine import Trigger
-from orchestrator.core.memory import FaultMemory, Memory, Still
+from orchestrator.core.memory import FaultMemory, Memory, Sequence, Still, value_of
 from orchestrator.core.rules import Rules
 from orchestrator.core.sequence import RESUME, RUN, next_order
 from orchestrator.core.step import step
-from orchestrator.core.track import Warmth, follow, follow_state, thinned
 from orchestrator.model import (
     STOP,
     Cause,
@@ -38,8 +39,12 @@ from tests.core.said import cause, said
 from tests.core.world import bay
 
 
-def goes(f: Facts) -> Course:
+def course_of(f: Facts) -> Course:
     return course(f, latches.shown(f.memory.faults, f.now_s))
+
+
+def goes(f: Facts) -> tuple[Trigger | None, Cause]:
+    return course_of(f)[:2]
 
 
 def holding(**changes: Any) -> dict[str, Any]:
@@ -160,9 +165,8 @@ GOES = (
 @pytest.mark.parametrize(("minutes", "rise_s", "rise_v"), [(5.0, 0.0, 35.0), (4.99, 4.99 * 60, 34.0)])
 def test_a_pack_that_rose_is_looked_at_from_then_on(minutes: float, rise_s: float, rise_v: float) -> None:
     f = Edge(goes, None, marked(minutes, 34.0), PULSE, bmu={"voltage_v": 35.0}).facts
-    goes(f)
-    assert f.memory.session is not None
-    assert (f.memory.session.rise_s, f.memory.session.rise_v) == (rise_s, rise_v)
+    session = course_of(f).changes["session"]
+    assert (session.rise_s, session.rise_v) == (rise_s, rise_v)
 
 
 # --- what is followed from step to step -------------------------------------------------------------------------------
@@ -172,8 +176,7 @@ def followed(name: str) -> Callable[[Facts], object]:
     """What the memory says under this name, once it was brought up to these facts."""
 
     def rule(f: Facts) -> object:
-        follow(f, ago(0.25))
-        return getattr(f.memory, name)
+        return value_of(update_history(f, 0.25).memory, name)
 
     rule.__name__ = name
     return rule
@@ -242,8 +245,7 @@ FOLLOWS = (
 
 def test_the_first_step_lasts_no_time() -> None:
     f = Edge(goes, None, {"session": BEGUN, "counted_t_s": NOW_S}).facts
-    follow(f, None)
-    assert f.memory.session == replace(NOW, energised_s=90.0)
+    assert update_history(f, 0.0).memory.session == replace(NOW, energised_s=90.0)
 
 
 @pytest.mark.parametrize(
@@ -251,18 +253,12 @@ def test_the_first_step_lasts_no_time() -> None:
 )
 def test_a_value_counts_while_it_is_fresh_and_not_from_the_future(t_s: float, value: float | None) -> None:
     battery = replace(BMU, voltage_v=Measurement(48.0, t_s))
-    assert Facts(NOW_S, Snapshot(battery=battery), Memory(), Rules.of(bay())).pack_v == value
+    assert Facts.of(NOW_S, Snapshot(battery=battery), Memory(), Rules.of(bay())).pack_v == value
 
 
 def test_a_fault_of_the_first_moment_is_shown_from_then_on() -> None:
     (fault,) = latches.shown({"soh_low": FaultMemory(raised_s=0.0)}, 9.0)
     assert fault.since_s == 0.0
-
-
-def test_a_copy_of_a_memory_is_its_own() -> None:
-    memory = Memory(faults={"soh_low": FaultMemory()})
-    memory.copy().faults.clear()
-    assert memory.faults
 
 
 @pytest.mark.parametrize(
@@ -281,10 +277,10 @@ def test_temperatures_are_kept_ten_seconds_apart_for_three_minutes(kept: Warmth,
 
 @pytest.mark.parametrize(("charger", "counted_t_s"), [({}, NOW_S), ({"t_s": ago(9)}, None)])
 def test_a_session_counts_from_its_beginning(charger: dict[str, Any], counted_t_s: float | None) -> None:
-    f = Edge(goes, None, bmu={"voltage_v": None}, charger=charger).facts
-    follow_state(f, QUALIFYING)
-    assert f.memory.session == Session(NOW_S, soc_start_pct=50.0, soc_pct=50.0)
-    assert f.memory.counted_t_s == counted_t_s
+    f = Edge(goes, None, state=QUALIFYING, bmu={"voltage_v": None}, charger=charger).facts
+    memory = entered(f, State.CHARGING, cause("begun"))
+    assert memory.session == Session(NOW_S, soc_start_pct=50.0, soc_pct=50.0)
+    assert memory.charger.counted_t_s == counted_t_s
 
 
 @pytest.mark.parametrize(
@@ -296,9 +292,8 @@ def test_a_session_counts_from_its_beginning(charger: dict[str, Any], counted_t_
     ],
 )
 def test_a_rise_counts_from_the_first_precharge_of_a_charge(state: State, before: Session, now: Session) -> None:
-    f = Edge(goes, None, {"session": before}, state, bmu={"voltage_v": 33.0}).facts
-    follow_state(f, QUALIFYING)
-    assert f.memory.session == now
+    f = Edge(goes, None, {"session": before}, QUALIFYING, bmu={"voltage_v": 33.0}).facts
+    assert entered(f, state, cause("begun")).session == now
 
 
 boots = followed("boots")
@@ -352,6 +347,10 @@ LATCHES = (
 
 
 def orders(f: Facts) -> Command | None:
+    return ordered(f)[0]
+
+
+def ordered(f: Facts) -> tuple[Command | None, Sequence]:
     return next_order(f, Setpoint(True, 4, ChargeMode.CHARGE, Precharge.OFF))
 
 
@@ -378,8 +377,9 @@ ORDERS = (
 
 def test_a_new_order_has_not_been_tried() -> None:
     f = Edge(orders, RUN, {**RESUMED, "resumed": True, "order": RESUME, "tries": 4}, charger=STANDS_BY).facts
-    assert orders(f) == RUN
-    assert (f.memory.order, f.memory.order_s, f.memory.tries) == (RUN, NOW_S, 0)
+    order, sequence = ordered(f)
+    assert order == RUN
+    assert (sequence.order, sequence.order_s, sequence.tries) == (RUN, NOW_S, 0)
 
 
 # --- the whole step ---------------------------------------------------------------------------------------------------
@@ -393,7 +393,7 @@ def test_from_stage_to_stage_the_charge_goes_on() -> None:
     memory = {**reached(2), "resumed": True, "session": BEGUN, "last_s": ago(0.25), "counted_t_s": NOW_S}
     decision, after = whole(Edge(goes, None, memory, PULSE, bmu={"voltage_v": 35.1}, charger={"voltage_v": 35.1}))
     assert decision.state is CONTINUOUS
-    assert after.resumed
+    assert after.sequence.resumed
     assert decision.session == replace(NOW, pulse_s=0.25, rise_s=0.0, rise_v=35.1)
 
 

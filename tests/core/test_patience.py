@@ -119,6 +119,6 @@ def test_the_figures_of_a_healthy_pack_agree_all_the_way_up(amps: float, soh_pct
         )  # fmt: skip
         world.tick()
         assert (
-            state_of_charge.figures_disagree(Facts(world.now_s, world.snapshot(None, ""), world.memory, world.rules))
+            state_of_charge.figures_disagree(Facts.of(world.now_s, world.snapshot(None, ""), world.memory, world.rules))
             is None
         )

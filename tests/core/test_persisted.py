@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from orchestrator.config.policy import Policy
 from orchestrator.core.latches import BACKOFF_S
-from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.memory import FaultMemory, Memory, value_of
 from orchestrator.core.operator import MAX_RESETS, STOPPED
-from orchestrator.core.persisted import COUNTERS_S, RUNNING, UNFINISHED, Persisted, PersistedFault, from_first_format
-from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargerLink, Request, Session, State
+from orchestrator.core.persisted import COUNTERS_S, UNFINISHED, Persisted, PersistedFault, from_first_format
+from orchestrator.core.states import ENERGISED, MAY_RUN
+from orchestrator.model import STOP, Action, Alarm, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle
 from tests.core.fault_scenes import SCENES
 from tests.core.said import cause, reason_of, say
@@ -51,7 +52,7 @@ def stopped_meanwhile(world: World) -> None:
 @every_state
 def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None:
     world = IN[state]()
-    ran = state in RUNNING
+    ran = state in MAY_RUN
     assert Persisted.of(world.memory, world.now_s).running is ran
     restarted(world)
     world.deaf.clear()
@@ -71,7 +72,7 @@ def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None
 
 @every_state
 def test_a_charger_that_may_run_and_is_not_heard_is_an_alarm_over_any_number_of_restarts(state: State) -> None:
-    if state not in RUNNING:
+    if state not in MAY_RUN:
         return
     world = IN[state]()
     for _ in range(3):
@@ -96,8 +97,8 @@ def test_a_persons_word_outlives_the_service(request_: Request) -> None:
         restarted(world)
         world.run(60)
         assert not any(decision.state in ENERGISED for decision in world.decisions)
-    assert world.memory.hold == (STOPPED if request_ is Request.STOP else None)
-    assert world.memory.paused is (request_ is Request.PAUSE)
+    assert world.memory.operator.hold == (STOPPED if request_ is Request.STOP else None)
+    assert world.memory.operator.paused is (request_ is Request.PAUSE)
     assert world.ask(Request.START) == ""
     world.until(State.CHARGING, 10)
 
@@ -133,7 +134,7 @@ def out_of_reach(world: World) -> None:
     world.battery_answers = False
     world.run(400)
     world.battery_answers = True
-    world.memory.faults.pop("bmu_silent", None)  # not what is asked here
+    world.forget("bmu_silent")  # not what is asked here
 
 
 def cut_off(world: World) -> None:
@@ -142,7 +143,7 @@ def cut_off(world: World) -> None:
     world.run(10)
     assert world.is_in(State.UNCONTROLLABLE)
     world.charger_answers = True
-    world.memory.faults.pop("charger_silent", None)
+    world.forget("charger_silent")
 
 
 BREAKS: tuple[Callable[[World], None], ...] = (in_order, killed, out_of_reach, cut_off)
@@ -376,7 +377,7 @@ def test_nothing_is_lost_and_nothing_begins_by_itself(acts: list[tuple[int, int,
             world.tick()
         if gap_s is None:
             continue
-        before, now_s, ran = world.memory, world.now_s, world.state in RUNNING
+        before, now_s, ran = world.memory, world.now_s, world.state in MAY_RUN
         restarted(world, gap_s)
         assert_kept(before, now_s, world.memory, world.now_s, gap_s)
         for _ in range(20):
@@ -400,8 +401,9 @@ def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, 
             if then is not None and now is not None:
                 assert after_s - now == pytest.approx(before_s - then + gap_s)
         assert [after_s - t for t in kept.strikes] == pytest.approx([before_s - t + gap_s for t in fault.strikes])
-    assert (after.hold, after.paused, after.full_pct) == (before.hold, before.paused, before.full_pct)
-    assert [name for _, name in after.resets] == [name for _, name in before.resets]
+    for name in ("hold", "paused", "full_pct"):
+        assert value_of(after, name) == value_of(before, name)
+    assert [name for _, name in after.operator.resets] == [name for _, name in before.operator.resets]
     if before.session is not None:
         assert after.session is not None
         aged = after_s - after.session.started_s
@@ -442,7 +444,7 @@ def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
     kept = Persisted(faults={"of_tomorrow": PersistedFault(cause("something"), latched=True, raised=1.0)})
     memory = kept.memory(100.0)
     assert memory.faults == {}
-    assert memory.hold == cause("something")
+    assert memory.operator.hold == cause("something")
 
 
 @pytest.mark.parametrize(
@@ -458,7 +460,7 @@ def test_the_first_format_is_read(name: str, latched: bool, strikes: int) -> Non
 
 
 def test_an_empty_past_is_a_new_bay() -> None:
-    assert Persisted().memory(5.0) == Memory(charge=(0.0, None))
+    assert Persisted().memory(5.0) == Memory()
     assert Persisted.of(Memory(), 5.0) == Persisted()
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.model import ENERGISED, STOP, Action, Alarm, Operation, Request, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import STOP, Action, Alarm, Operation, Request, State
 from tests.core.bays import IN, charging, full, idle, qualifying, running_at_the_start, starting, stopping, suspended
 from tests.core.said import reason_of
 from tests.core.world import TICK_S, World

@@ -7,9 +7,9 @@ import pytest
 
 from orchestrator.core.facts import Facts
 from orchestrator.core.sequence import next_order
+from orchestrator.core.states import ENERGISED
 from orchestrator.devices.schedule import Turn
 from orchestrator.model import (
-    ENERGISED,
     STANDBY,
     STOP,
     Action,
@@ -229,15 +229,15 @@ def test_a_charger_that_was_stopped_by_somebody_is_not_started_again() -> None:
 def test_without_a_reading_the_order_stays() -> None:
     """The fault table ends the charge in the same step; whoever asks meanwhile gets nothing new."""
     world, _ = new_charge()
-    memory = world.memory.copy()
-    facts = Facts(world.now_s + 10, Snapshot(), memory, world.rules)
-    assert next_order(facts, Setpoint(run=True)) == memory.order == limit(4)
+    memory = world.memory
+    facts = Facts.of(world.now_s + 10, Snapshot(), memory, world.rules)
+    assert next_order(facts, Setpoint(run=True))[0] == memory.sequence.order == limit(4)
 
 
 def test_what_a_setpoint_leaves_open_is_not_ordered() -> None:
     world = charging()
-    facts = Facts(world.now_s, world.snapshot(None, ""), world.memory.copy(), world.rules)
-    assert next_order(facts, STANDBY) is None
+    facts = Facts.of(world.now_s, world.snapshot(None, ""), world.memory, world.rules)
+    assert next_order(facts, STANDBY)[0] is None
 
 
 # --- automatic: the rotary switch has set everything ------------------------------------------------------------------
@@ -302,8 +302,8 @@ class Lossy(Site):
     def tick(self, request: Request | None = None) -> None:
         super().tick(request)
         wanted = self.decision.state in ENERGISED
-        before_run = self.memory.order is not None
-        self.ran_unasked |= self.charger.running and wanted and before_run and self.memory.order != RUN
+        before_run = self.memory.sequence.order is not None
+        self.ran_unasked |= self.charger.running and wanted and before_run and self.memory.sequence.order != RUN
 
 
 @pytest.mark.parametrize(("count", "at"), list(product((1, 2, 3), (0, 1, 2, 3, 4, 5, 6))))

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.step import step
 from orchestrator.model import (
-    ENERGISED,
     STANDBY,
     STOP,
     Action,

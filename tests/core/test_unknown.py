@@ -5,7 +5,8 @@ from math import inf, nan
 
 import pytest
 
-from orchestrator.model import ENERGISED, STOP, BatteryReading, Measurement, Request, Snapshot, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import STOP, BatteryReading, Measurement, Request, Snapshot, State
 from tests.core.bays import charging, idle, qualifying
 from tests.core.said import reason_of
 from tests.core.world import TICK_S, World

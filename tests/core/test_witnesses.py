@@ -10,8 +10,9 @@ from orchestrator.config.load import load_policy
 from orchestrator.config.policy import CellType, Policy
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import LASTS_S
+from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import pack as packs
-from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargeMode, Measurement, Operation, Request, State
+from orchestrator.model import STOP, Action, Alarm, ChargeMode, Measurement, Operation, Request, State
 from orchestrator.sim import chemistry
 from tests.core.bays import IN, POLICY, charging, idle, stopping
 from tests.core.edges import Edge
@@ -441,7 +442,7 @@ def test_a_step_that_is_told_anew_is_not_one_that_went_back() -> None:
         world.values["temperature_c"] = celsius
         world.run(61)
     assert "limit_reverted" not in world.raised
-    assert world.memory.reverts == ()
+    assert world.memory.charger.reverts == ()
 
 
 # --- mode 5 -----------------------------------------------------------------------------------------------------------
@@ -456,7 +457,7 @@ def test_a_charger_that_somebody_stopped_is_not_full(soc_pct: float) -> None:
     world.shows.update(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED, current_a=0.0)
     world.until(State.HELD, 3.0)
     assert set(world.raised) - {"soc_jump"} == {"stopped_by_itself"}
-    assert world.memory.full_pct is None
+    assert world.memory.battery.full_pct is None
     world.shows.clear()
     world.run(600, dt_s=1.0)
     assert world.is_in(State.HELD)  # it does not charge again by itself
@@ -517,7 +518,7 @@ def test_facts_without_a_reading_have_no_witness() -> None:
         world = idle()
         snapshot = world.snapshot(None, "")
         battery = replace(snapshot.battery, current_a=value)
-        f = Facts(world.now_s, replace(snapshot, battery=battery), world.memory, world.rules)
+        f = Facts.of(world.now_s, replace(snapshot, battery=battery), world.memory, world.rules)
         assert f.pack_a is None
         assert not f.unordered
 

@@ -11,7 +11,7 @@ from orchestrator.config.load import load_policy
 from orchestrator.config.policy import Pack, Policy
 from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits
 from orchestrator.core.cells import chemistry
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, with_values
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.keys import Range
@@ -123,6 +123,11 @@ def fitting_v(pack: Pack, soc_pct: float, pack_v: float) -> float:
     return cell_v * pack.cells_in_series if cell_v != pack_v / pack.cells_in_series else pack_v
 
 
+def remembering(memory: Memory | None = None, **values: Any) -> Memory:
+    """A memory, or this one, with some values set by their names, in whatever part they are."""
+    return with_values(memory or Memory(), **values)
+
+
 class World:
     """Everything true of one bay; `run` lets time pass in ticks, `decision` is the newest."""
 
@@ -203,6 +208,11 @@ class World:
         decision, self.memory = step(self.now_s, self.snapshot(request, internal), self.memory, self.rules)
         self.decisions.append(decision)
         return decision
+
+    def forget(self, fault: str) -> None:
+        """A fault that is not what a test asks."""
+        faults = {name: kept for name, kept in self.memory.faults.items() if name != fault}
+        self.memory = remembering(self.memory, faults=faults)
 
     def run(self, seconds: float, dt_s: float = TICK_S) -> Decision:
         for _ in range(max(1, round(seconds / dt_s))):

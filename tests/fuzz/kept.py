@@ -31,16 +31,17 @@ def one(data: bytes) -> None:
         for place in PLACES:
             memory = found[place].memory(NOW_S)
             _is_no_free_start(found[place], memory)
-            shown = {"reason": say(memory.hold), "faults": [say(fault.cause) for fault in memory.faults.values()]}
+            causes = [say(fault.cause) for fault in memory.faults.values()]
+            shown = {"reason": say(memory.operator.hold), "faults": causes}
             assert json.loads(reception.encode(shown)) == shown
         assert decode(encode(NOW, loaded.run, loaded.entries), NOW) == (loaded.run, list(loaded.entries))
 
 
 def _is_no_free_start(persisted: Persisted, memory: Memory) -> None:
     """What was latched or held is so again."""
-    assert type(memory.paused) is bool and isinstance(memory.hold, Cause | None)
+    assert type(memory.operator.paused) is bool and isinstance(memory.operator.hold, Cause | None)
     for name in persisted.faults:
-        assert name in memory.faults if name in ROW else memory.hold
+        assert name in memory.faults if name in ROW else memory.operator.hold
     assert not persisted.running or "found_running" in memory.faults
 
 

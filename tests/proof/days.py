@@ -15,7 +15,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from orchestrator.model import ENERGISED, Decision, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import Decision, State
 from orchestrator.sim.can_noise import BUSES
 from tests.proof.play import Player, stage
 from tests.proof.report import say

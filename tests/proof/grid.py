@@ -16,9 +16,9 @@ from unittest.mock import patch
 from orchestrator.config.load import load_policy
 from orchestrator.core import latches, safestop
 from orchestrator.core.faults import FAULTS, Row
+from orchestrator.core.states import SETTLED
 from orchestrator.model import STOP, Action, Alarm, Cause, ControlMode, Effect, Request, State
 from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
-from orchestrator.service.bay import VERIFIED
 from orchestrator.sim.faults import FAULTS as INJECTIONS
 from orchestrator.sim.pack import Pack
 from orchestrator.sim.presets import PACKS
@@ -263,7 +263,7 @@ class Run:
                 and self.rig.bay.charger.ignores_stop
             )
             self.ended.word = "out of control, and said so" if uncontrolled else "stopped, verified"
-            if not (uncontrolled or (decision.state in VERIFIED and not self.rig.bay.charger.running)):
+            if not (uncontrolled or (decision.state in SETTLED and not self.rig.bay.charger.running)):
                 self.wrong.append(f"{decision.state}: {reason_of(decision)}")
         if raised and cell.row.effect >= Effect.STOP:
             self._judge_stop()

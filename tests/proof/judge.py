@@ -17,7 +17,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-from orchestrator.model import ENERGISED, ChargeMode, ControlMode, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import ChargeMode, ControlMode, State
 from orchestrator.sim.charger_frames import Kind
 from tests.proof.claims import Told, claims, record, starts
 from tests.proof.gateway import SMALL_AH, SMALL_RISE_S, STEPS_A, Asked, Gateway, port_name

@@ -26,8 +26,8 @@ from typing import Any
 import can
 import serial
 
+from orchestrator.core.states import SETTLED
 from orchestrator.model import ControlMode, Decision, State
-from orchestrator.service.bay import VERIFIED
 from orchestrator.sim.presets import PACKS
 from tests.proof.play import POLICIES, Player
 from tests.proof.report import say
@@ -190,7 +190,7 @@ class Charge:
     def _settled(self, decision: Decision) -> bool:
         """A stop was verified, or the charge has gone on for long enough."""
         if self.interrupted:
-            return decision.state in VERIFIED and decision.command is None
+            return decision.state in SETTLED and decision.command is None
         return self.world.time.now_s > self._until_s + SEEN_S
 
 

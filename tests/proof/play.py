@@ -14,10 +14,10 @@ from functools import partial
 from orchestrator.config.load import load_policy
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.core.memory import Memory
-from orchestrator.model import ENERGISED, Alarm, ChargeMode, ControlMode, Decision, Request, Snapshot, State
+from orchestrator.core.states import ENERGISED, SETTLED
+from orchestrator.model import Alarm, ChargeMode, ControlMode, Decision, Request, Snapshot, State
 from orchestrator.protocol.charger import STOP_FRAME
 from orchestrator.service.asked import Asked
-from orchestrator.service.bay import VERIFIED
 from orchestrator.sim.can_noise import Bus
 from orchestrator.sim.can_wire import PERFECT
 from orchestrator.sim.faults import FAULTS
@@ -230,7 +230,7 @@ class Player:
             news = [fault.id for fault in decision.faults if fault.since_s >= injected.t_s]
             injected.fault = injected.fault or (news[0] if news else "")
             injected.named = injected.named or decision.alarm is Alarm.DANGER
-            at_rest = decision.state in VERIFIED and snapshot.charger is not None
+            at_rest = decision.state in SETTLED and snapshot.charger is not None
             injected.verified = injected.verified or (at_rest and injected.stop_s is not None)
 
     # --- what must be -------------------------------------------------------------------------------------------------

@@ -18,10 +18,11 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from orchestrator.core.states import ENERGISED
 from orchestrator.demo.stage import Stage
 from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
-from orchestrator.model import ENERGISED, State
+from orchestrator.model import State
 from orchestrator.sim.faults import FAULTS
 from tests.proof.truth import MARGIN_S, SILENT_S, VERIFY_S
 from tests.waiting import wait_until

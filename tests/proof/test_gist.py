@@ -5,16 +5,16 @@ So do batteries that only a table of steps tells apart, wherever no step is chos
 
 import random
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 
 import pytest
 
-from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.core.memory import FaultMemory, Memory, with_values
 from orchestrator.core.operator import STOPPED
+from orchestrator.core.states import AT_WORK
 from orchestrator.model import Cause, ControlMode, State
 from orchestrator.workbench.prove.explore import Place, Walk
 from orchestrator.workbench.prove.gist import Gist, gist, outline
-from orchestrator.workbench.prove.inputs import AT_WORK, StationInputs
+from orchestrator.workbench.prove.inputs import StationInputs
 from orchestrator.workbench.prove.story import BEGIN_S, TICK_S, Move, Taken
 from tests.proof.exploring import POLICIES, rules, small, walk_on
 
@@ -27,25 +27,25 @@ def latched(memory: Memory) -> bool:
 
 
 def pause_behind_a_hold(memory: Memory) -> Memory | None:
-    return replace(memory, paused=not memory.paused) if memory.hold else None
+    return with_values(memory, paused=not memory.operator.paused) if memory.operator.hold else None
 
 
 def hold_behind_a_latch(memory: Memory) -> Memory | None:
-    return replace(memory, hold=None if memory.hold else STOPPED) if latched(memory) else None
+    return with_values(memory, hold=None if memory.operator.hold else STOPPED) if latched(memory) else None
 
 
 def pause_behind_a_latch(memory: Memory) -> Memory | None:
-    return replace(memory, paused=not memory.paused) if latched(memory) else None
+    return with_values(memory, paused=not memory.operator.paused) if latched(memory) else None
 
 
 def that_it_ran_while_it_stops(memory: Memory) -> Memory | None:
     stops = memory.state in (State.STOPPING, State.UNCONTROLLABLE)
-    return replace(memory, unverified=not memory.unverified) if stops else None
+    return with_values(memory, unverified=not memory.stop.unverified) if stops else None
 
 
 def resume_of_what_runs(memory: Memory) -> Memory | None:
-    runs = memory.state is State.CHARGING and memory.ran
-    return replace(memory, resumed=not memory.resumed) if runs else None
+    runs = memory.state is State.CHARGING and memory.stage.ran
+    return with_values(memory, resumed=not memory.sequence.resumed) if runs else None
 
 
 def warning_at_rest(memory: Memory) -> Memory | None:
@@ -53,7 +53,7 @@ def warning_at_rest(memory: Memory) -> Memory | None:
     if memory.state in AT_WORK or "noisy_line" in memory.faults:
         return None
     noisy = FaultMemory(raised_s=memory.last_s, clean_s=memory.last_s, cause=Cause("noisy_line"))
-    return replace(memory, faults={**memory.faults, "noisy_line": noisy})
+    return with_values(memory, faults={**memory.faults, "noisy_line": noisy})
 
 
 CHANGES: Mapping[str, Change] = {

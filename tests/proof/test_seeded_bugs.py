@@ -11,11 +11,14 @@ from orchestrator import model
 from orchestrator.core import course as course_module
 from orchestrator.core import latches, machine, operator, safestop
 from orchestrator.core import step as step_module
+from orchestrator.core.course import Course
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.machine import Trigger
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, with_values
+from orchestrator.core.operator import Heard
 from orchestrator.core.persisted import Persisted
+from orchestrator.core.resting import resting_place
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause, ChargeMode, Effect, Precharge, Request, State
 from orchestrator.workbench.prove.endings import ENDINGS
@@ -56,24 +59,27 @@ def latches_wear_off(patch: Patch) -> None:
 
 
 def trip_is_no_latch(patch: Patch) -> None:
-    place = course_module._resting_place
+    place = resting_place
 
     def forgets(f: Facts, faults: Any) -> Any:
         tripped = f.memory.state is State.TRIPPED and f.state_s > 60
         return place(f, tuple(x for x in faults if x.effect is not Effect.TRIP) if tripped else faults)
 
-    patch.setattr(course_module, "_resting_place", forgets)
+    patch.setattr(course_module, "resting_place", forgets)
 
 
 def stop_is_not_heard(patch: Patch) -> None:
     hear = operator.hear
-    patch.setattr(step_module, "hear", lambda m, asked, *more: None if asked is Request.STOP else hear(m, asked, *more))
+
+    def deaf(memory: Memory, asked: Request, *more: Any) -> Heard:
+        return Heard(memory.operator, memory.faults) if asked is Request.STOP else hear(memory, asked, *more)
+
+    patch.setattr(step_module, "hear", deaf)
 
 
 def reset_starts(patch: Patch) -> None:
-    def reset(memory: Memory, now_s: float) -> Cause | None:
-        memory.hold = None
-        return operator._start(memory, now_s)
+    def reset(memory: Memory, now_s: float) -> Heard:
+        return operator._start(with_values(memory, hold=None), now_s)
 
     hear = operator.hear
     patch.setattr(
@@ -106,13 +112,13 @@ def silent_alarm(patch: Patch) -> None:
 
 
 def a_hold_wears_off(patch: Patch) -> None:
-    place = course_module._resting_place
+    place = resting_place
 
     def forgets(f: Facts, faults: Any) -> Any:
         held = f.memory.state is State.HELD and f.state_s > 60
         return place(f, tuple(x for x in faults if x.effect is not Effect.STOP) if held else faults)
 
-    patch.setattr(course_module, "_resting_place", forgets)
+    patch.setattr(course_module, "resting_place", forgets)
 
 
 def never_gives_up(patch: Patch) -> None:
@@ -127,7 +133,7 @@ def absent_battery_is_waited_for(patch: Patch) -> None:
     stopping = course_module._stopping
     patch.setattr(
         course_module, "_stopping",
-        lambda f, faults: (None, f.memory.cause) if f.departed and f.state_s < 60 else stopping(f, faults),
+        lambda f, faults: Course(None, f.memory.cause) if f.departed and f.state_s < 60 else stopping(f, faults),
     )  # fmt: skip
 
 

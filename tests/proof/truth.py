@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from orchestrator.core.rules import Rules
-from orchestrator.model import ENERGISED, STOP, Alarm, ChargeMode, Decision, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import STOP, Alarm, ChargeMode, Decision, State
 from orchestrator.sim.charger_frames import Kind
 from orchestrator.sim.pack import Readout
 from tests.proof.virtual_rig import VirtualRig

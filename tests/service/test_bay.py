@@ -7,7 +7,7 @@ from typing import NoReturn
 
 import pytest
 
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, with_values
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
@@ -195,8 +195,7 @@ def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, mo
     def intending(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
         told.append(snapshot.running_kept)
         decision, after = step(now_s, snapshot, memory, rules)
-        after.intends = True
-        return replace(decision, command=None), after
+        return replace(decision, command=None), with_values(after, intends=True)
 
     bench.step(3)
     monkeypatch.setattr(bay_module, "step", intending)

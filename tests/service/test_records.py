@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.states import QUIET
 from orchestrator.model import (
     STOP,
     Action,
@@ -33,7 +34,7 @@ from orchestrator.model import (
     State,
     Step,
 )
-from orchestrator.service.records import QUIET, WHOLE_EVERY, SnapshotRecorder, decision_lines
+from orchestrator.service.records import WHOLE_EVERY, SnapshotRecorder, decision_lines
 from tests.core.bays import charging
 from tests.core.said import cause, reason_of
 from tests.service.bench import Bench, the_bay

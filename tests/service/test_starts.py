@@ -20,8 +20,9 @@ from orchestrator.model import (
 )
 from orchestrator.service.starts import TURN_S, Starts
 from orchestrator.text.catalogue import say
+from tests.core.world import remembering
 
-READY = Memory(state=State.QUALIFYING, ready=True)
+READY = remembering(state=State.QUALIFYING, ready=True)
 BEGUN = Memory(state=State.CHARGING)
 PROVED = Memory(state=State.CHARGING, witnessed=Witnessed(proved=True))
 READING = ChargerReading(

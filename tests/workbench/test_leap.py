@@ -8,13 +8,14 @@ import pytest
 
 from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Ask, Defect, Sensor, SensorFault
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, names, paths, value_of, with_values
+from orchestrator.core.parts import Kind
 from orchestrator.core.step import step
 from orchestrator.model import Decision, Request, State
 from orchestrator.workbench.processes import cores
 from orchestrator.workbench.simulate import simulation
 from orchestrator.workbench.simulate.devices import TICK_S
-from orchestrator.workbench.simulate.leap import EVENTFUL, SUMS, outline
+from orchestrator.workbench.simulate.leap import outline
 from orchestrator.workbench.simulate.simulation import Run, Simulation, simulate
 from tests.workbench.scenarios import battery, scenario
 
@@ -108,17 +109,25 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
     assert leapt.session.charged_ah == pytest.approx(ticked.session.charged_ah, abs=14 * TICK_S / 3600)
     assert leapt.session.charged_wh == pytest.approx(ticked.session.charged_wh, rel=1e-3)
     assert leapt.session.energised_s == ticked.session.energised_s
-    assert [t_s for t_s, _ in leapt.warmth] == [t_s for t_s, _ in ticked.warmth]
-    assert [c for _, c in leapt.warmth] == pytest.approx([c for _, c in ticked.warmth], abs=0.1)
-    assert (leapt.sample, leapt.counted_t_s, leapt.last_s) == (ticked.sample, ticked.counted_t_s, ticked.last_s)
+    assert [t_s for t_s, _ in leapt.battery.warmth] == [t_s for t_s, _ in ticked.battery.warmth]
+    assert [c for _, c in leapt.battery.warmth] == pytest.approx([c for _, c in ticked.battery.warmth], abs=0.1)
+    for name in ("sample", "counted_t_s", "last_s"):
+        assert value_of(leapt, name) == value_of(ticked, name)
     assert outline(Decision(State.CHARGING, Memory().cause), leapt) == outline(
         Decision(State.CHARGING, Memory().cause), ticked
     )
 
 
-def test_an_outline_has_all_of_the_memory_that_is_no_measurement() -> None:
-    """A field that is new in the memory must be told here or there."""
-    told = {*EVENTFUL, *SUMS, *outline.__code__.co_names} & set(vars(Memory()))
-    measured = {"state", "cause", "faults", "session", "counted_t_s", "last_s", "resume_s", "order_s", "tries", "step",
-                "sample", "sample_before", "warmth", "limit_s", "charge", "peak", "still", "looked_s"}  # fmt: skip
-    assert told | measured == set(vars(Memory()))
+@pytest.mark.parametrize("name", names())
+def test_an_outline_has_what_is_an_event_and_nothing_else(name: str) -> None:
+    """What a field is, it says itself; of a total that there is anything."""
+    if name in ("faults", "session", "witnessed", "state"):
+        return
+    memory = with_values(Memory(), search_s=1.0, wake_s=1.0, idle_s=1.0)
+    decision = Decision(State.CHARGING, Memory().cause)
+    kinds = [kind for kind in Kind if any(path.rpartition(".")[2] == name for path in paths(kind))]
+    for value, same in (("another", kinds != [Kind.EVENT]), (0.0, kinds == [Kind.MEASURED])):
+        if kinds == [Kind.TOTAL] and value == "another":
+            continue
+        if value_of(memory, name) != value:
+            assert (outline(decision, with_values(memory, **{name: value})) == outline(decision, memory)) is same

@@ -7,7 +7,8 @@ import pytest
 from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Ask, Defect, Sensor, SensorFault, Visit, Weather
 from orchestrator.config.shipped import shipped_names
-from orchestrator.model import ENERGISED, Request, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import Request, State
 from orchestrator.workbench.simulate.simulation import Run, UnsuitableError, simulate
 from tests.workbench.scenarios import battery, scenario
 

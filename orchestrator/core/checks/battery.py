@@ -84,7 +84,7 @@ def not_operational(f: Facts) -> Cause | None:
 
 def bmu_rebooted(f: Facts) -> Cause | None:
     """FAULTS B7."""
-    return Cause("bmu_rebooted") if f.battery.boots != f.memory.boots else None
+    return Cause("bmu_rebooted") if f.battery.boots != f.memory.battery.boots else None
 
 
 def status_trip(f: Facts) -> Cause | None:
@@ -141,9 +141,9 @@ def under_temperature(f: Facts) -> Cause | None:
 
 def runaway(f: Facts) -> Cause | None:
     """FAULTS B12."""
-    if f.temperature_c is None or not f.memory.warmth:
+    if f.temperature_c is None or not f.memory.battery.warmth:
         return None
-    t_s, then_c = f.memory.warmth[0]
+    t_s, then_c = f.memory.battery.warmth[0]
     lasted_s = f.now_s - t_s
     if lasted_s < WARMING_S:
         return None
@@ -162,9 +162,9 @@ def temperature_invalid(f: Facts) -> Cause | None:
     wrong = f.battery.implausible.get("temperature_c")
     if wrong:
         return Cause.of("temperature_implausible", problem=wrong)
-    if f.memory.sample is None or f.memory.sample_before is None:
+    if f.memory.battery.sample is None or f.memory.battery.sample_before is None:
         return None
-    (before_s, before_c), (newest_s, newest_c) = f.memory.sample_before, f.memory.sample
+    (before_s, before_c), (newest_s, newest_c) = f.memory.battery.sample_before, f.memory.battery.sample
     passed_s = newest_s - before_s
     if abs(newest_c - before_c) <= JUMP_K * max(passed_s, 1.0):
         return None

@@ -2,6 +2,7 @@
 
 from orchestrator.core import limits
 from orchestrator.core.facts import Facts
+from orchestrator.core.states import PRECHARGING
 from orchestrator.model import Cause, State
 
 #: A charge that begins at this SOC or less may take all that the policy allows; from a higher one it needs less.
@@ -11,7 +12,7 @@ SOC_ERROR_PCT = 20.0
 def precharge_no_rise(f: Facts) -> Cause | None:
     """FAULTS C15."""
     rule, session = f.rules.policy.precharge, f.memory.session
-    if rule is None or f.pack_v is None or f.memory.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS):
+    if rule is None or f.pack_v is None or f.memory.state not in PRECHARGING:
         return None
     if session is None or session.rise_v is None:
         return None

@@ -71,14 +71,15 @@ def did_not_stop(cause: Cause, lasted_s: float) -> Cause:
 
 def will_not_start(f: Facts) -> Cause | None:
     """FAULTS C7."""
-    if f.memory.order is None or f.memory.order.action not in (Action.RUN, Action.RESUME) or not f.energised:
+    order = f.memory.sequence.order
+    if order is None or order.action not in (Action.RUN, Action.RESUME) or not f.energised:
         return None
     return _unconfirmed("will_not_start", f, Action.RUN.value, None)
 
 
 def stopped_by_itself(f: Facts) -> Cause | None:
     """FAULTS C4: an emergency stop past this service looks like this, too; it is not for us to start again."""
-    if f.reading is None or not f.energised or not f.memory.ran:
+    if f.reading is None or not f.energised or not f.memory.stage.ran:
         return None
     if f.reading.operation is not Operation.STOPPED:
         return None
@@ -91,7 +92,7 @@ def stopped_by_itself(f: Facts) -> Cause | None:
 
 def limit_reverted(f: Facts) -> Cause | None:
     """FAULTS C28: settings that it confirms and then drops."""
-    step, reverts = f.memory.step, f.memory.reverts
+    step, reverts = f.memory.stage.step, f.memory.charger.reverts
     recent = [t_s for t_s in reverts if f.now_s - t_s < REVERTS_S]
     if step is None or len(recent) < MAX_REVERTS:
         return None
@@ -100,7 +101,7 @@ def limit_reverted(f: Facts) -> Cause | None:
 
 def above_step(f: Facts) -> Cause | None:
     """FAULTS C28: what flows is held against what was commanded, whatever the charger shows as its setting."""
-    step = f.memory.step
+    step = f.memory.stage.step
     if f.memory.state is not State.CHARGING or step is None or f.amps is None or not f.rules.manual:
         return None
     allowed_a = step.current_a * f.rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
@@ -126,12 +127,12 @@ def line_taken_over(f: Facts) -> Cause | None:
 
 def loose_plug(f: Facts) -> Cause | None:
     """FAULTS C13: it left in mid-charge and was back within a minute."""
-    return Cause("loose_plug") if f.memory.returned_s == f.now_s else None
+    return Cause("loose_plug") if f.memory.battery.returned_s == f.now_s else None
 
 
 def setting_not_obeyed(f: Facts) -> Cause | None:
     """FAULTS C9, C16."""
-    order = f.memory.order
+    order = f.memory.sequence.order
     if order is None or order.action in (Action.RUN, Action.RESUME, Action.STOP) or not f.energised:
         return None
     if order.action is Action.SET_LIMIT:  # said as people count steps
@@ -145,7 +146,7 @@ def contactor_lost(f: Facts) -> Cause | None:
 
 
 def _unconfirmed(id_: str, f: Facts, order: str, value: int | None) -> Cause | None:
-    waited_s = f.now_s - f.memory.order_s
+    waited_s = f.now_s - f.memory.sequence.order_s
     if waited_s < OBEY_S:
         return None
     held = Cause.of("held_back", refused=f.charger.refused) if f.charger.refused else None
@@ -159,7 +160,7 @@ def over_current(f: Facts) -> Cause | None:
         return None
     limit_a = rules.bay.limits.current_a
     if rules.manual and reading.current_limit is not None:
-        limit_a = min(limit_a, max(rules.steps_a[step] for step in _steps_in_force(f, reading.current_limit)))
+        limit_a = min(limit_a, max([rules.steps_a[step] for step in _steps_in_force(f, reading.current_limit)]))
     allowed_a = limit_a * rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
     if reading.current_a <= allowed_a:
         return None
@@ -168,8 +169,8 @@ def over_current(f: Facts) -> Cause | None:
 
 def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
     """The step that the charger shows, and for a moment the one before: its current follows later than its status."""
-    before = f.memory.limit_before
-    return (shown,) if before is None or f.now_s - f.memory.limit_s > FOLLOWS_S else (shown, before)
+    before = f.memory.charger.limit_before
+    return (shown,) if before is None or f.now_s - f.memory.charger.limit_s > FOLLOWS_S else (shown, before)
 
 
 def early_full(f: Facts) -> Cause | None:
@@ -181,7 +182,7 @@ def early_full(f: Facts) -> Cause | None:
 
 def open_circuit(f: Facts) -> Cause | None:
     """FAULTS C13."""
-    idle_s = f.memory.idle_s
+    idle_s = f.memory.charger.idle_s
     if idle_s <= IDLE_MAX_S or f.soc is None or f.soc >= NEARLY_FULL_PCT:
         return None
     return Cause.of("open_circuit", idle_s=idle_s, soc_pct=f.soc)
@@ -189,12 +190,12 @@ def open_circuit(f: Facts) -> Cause | None:
 
 def no_battery(f: Facts) -> Cause | None:
     """FAULTS C14."""
-    return _too_long("no_battery", f.memory.search_s, SEARCH_MAX_S)
+    return _too_long("no_battery", f.memory.charger.search_s, SEARCH_MAX_S)
 
 
 def wakes_too_long(f: Facts) -> Cause | None:
     """FAULTS C15, the charger's own recovery and precharge."""
-    return _too_long("wakes_too_long", f.memory.wake_s, WAKE_MAX_S)
+    return _too_long("wakes_too_long", f.memory.charger.wake_s, WAKE_MAX_S)
 
 
 def _too_long(id_: str, lasted_s: float, limit_s: float) -> Cause | None:

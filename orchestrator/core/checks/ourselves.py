@@ -12,9 +12,10 @@ SUSPENDED_S = 2.0
 
 def internal(f: Facts) -> Cause | None:
     """FAULTS G5, P11."""
+    if not f.snapshot.internal and not f.broken:
+        return None
     said = Cause.of("internal_error", error=f.snapshot.internal)
-    whats = (said, *f.broken) if f.snapshot.internal else tuple(f.broken)
-    return Cause.of("internal", whats=whats) if whats else None
+    return Cause.of("internal", whats=(said, *f.broken) if f.snapshot.internal else f.broken)
 
 
 def late(f: Facts) -> Cause | None:

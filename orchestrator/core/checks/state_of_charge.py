@@ -25,13 +25,13 @@ DOUBTS = ("soc_jump", "soc_falls", "figures_disagree")
 
 def soc_jump(f: Facts) -> Cause | None:
     """FAULTS B17."""
-    step = f.memory.charge_step
+    step = f.memory.battery.charge_step
     return step[1] if step is not None and f.now_s - step[0] < STEP_NEWS_S else None
 
 
 def soc_falls(f: Facts) -> Cause | None:
     """FAULTS B17."""
-    peak = f.memory.peak
+    peak = f.memory.battery.peak
     if peak is None or f.soc is None or f.now_s - peak[0] < FALLING_S or peak[1] - f.soc < FALLING_PCT:
         return None
     return Cause.of("soc_falls", peak_pct=peak[1], soc_pct=f.soc, passed_min=(f.now_s - peak[0]) / 60)
@@ -70,7 +70,7 @@ def soc_not_believed(f: Facts) -> Cause | None:
 
 def battery_exchanged(f: Facts) -> Cause | None:
     """FAULTS B18: the charger never saw the battery leave, and the BMU that answers again tells of another one."""
-    exchange = f.memory.exchange
+    exchange = f.memory.battery.exchange
     if exchange is None or f.now_s - exchange[0] >= EXCHANGE_NEWS_S:
         return None
     return Cause.of("battery_exchanged", what=exchange[1])

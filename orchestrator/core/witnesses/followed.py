@@ -1,10 +1,14 @@
 """What is followed of both witnesses from step to step."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING
 
 from orchestrator.core.drain import drained
+from orchestrator.core.parts import changed, event, measured
+from orchestrator.core.states import ENERGISED, RESTING
 from orchestrator.core.witnesses.standby import FROZEN, UNORDERED_MOST_S, sees_current
+from orchestrator.model import BatteryReading
 
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
@@ -15,6 +19,10 @@ TRAIL_S, TRAIL_EVERY_S = 10.0, 0.5
 FIRST_A = 0.5
 #: The BMU must see this share of it, on top of what flowed before.
 OWN_SHARE = 0.5
+
+
+#: All that a BMU says.
+WORDS = attrgetter(*BatteryReading.__slots__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,34 +48,32 @@ class Frozen:
 
 @dataclass(frozen=True, slots=True)
 class Witnessed:
-    """Made anew by every step."""
+    """What both have shown until now."""
 
-    stop_s: float | None = None  #: when the first whole stop of the present state was handed to the port
-    proof: tuple[float, ...] = ()  #: when the first and the newest of the status replies since then were asked for that
-    #: showed standby, without a break
-    sees: bool = False  #: the BMU sees a charging current that nobody ordered …
-    unordered_s: float = 0.0  #: … and for how long it has; drains
-    trail: tuple[Sample, ...] = ()  #: of the last seconds under current, oldest first
-    frozen: Frozen | None = None
-    before_a: float = 0.0  #: what the BMU saw before this charge began
-    proved: bool = False  #: the BMU has seen the charge begin
-    alone_s: float = 0.0  #: for how long the charger has delivered without that; drains
+    stop_s: float | None = event(None)  #: when the first whole stop of the present state was handed to the port
+    proof: tuple[float, ...] = measured(())  #: when the first and the newest of the status replies since then were
+    #: asked for that showed standby, without a break
+    sees: bool = measured(default=False, tells=RESTING)  #: the BMU sees a charging current that nobody ordered …
+    unordered_s: float = measured(0.0)  #: … and for how long it has; drains
+    trail: tuple[Sample, ...] = measured(())  #: of the last seconds under current, oldest first
+    frozen: Frozen | None = measured(None)
+    before_a: float = measured(0.0)  #: what the BMU saw before this charge began
+    proved: bool = event(default=False, tells=ENERGISED)  #: the BMU has seen the charge begin
+    alone_s: float = measured(0.0)  #: for how long the charger has delivered without that; drains
 
 
 def follow(f: "Facts", passed_s: float) -> Witnessed:
     """What is known after this step's facts; `passed_s` since the step before."""
-    known = f.memory.witnessed
-    stop_s = _stop_s(f)
+    before = f.memory.witnessed
+    stop_s, known = _stop_s(f), _first_amperes(f, before, passed_s)
+    proof = _proof(f, stop_s, before.proof if stop_s == before.stop_s else ())
     sees = sees_current(f) and not f.energised
-    return replace(
-        _first_amperes(f, known, passed_s),
-        stop_s=stop_s,
-        proof=_proof(f, stop_s, known.proof if stop_s == known.stop_s else ()),
-        sees=sees,
-        unordered_s=0.0 if f.energised else _unordered_s(known, passed_s, sees=sees),
-        trail=_trail(f, known.trail),
-        frozen=_frozen(f, known.frozen),
-    )
+    unordered_s = 0.0 if f.energised else _unordered_s(before, passed_s, sees=sees)
+    trail, frozen = _trail(f, before.trail), _frozen(f, before.frozen)
+    now = (stop_s, proof, sees, unordered_s, trail, frozen)
+    if now == (known.stop_s, known.proof, known.sees, known.unordered_s, known.trail, known.frozen):
+        return known
+    return changed(known, stop_s=stop_s, proof=proof, sees=sees, unordered_s=unordered_s, trail=trail, frozen=frozen)
 
 
 def _unordered_s(known: Witnessed, passed_s: float, *, sees: bool) -> float:
@@ -106,9 +112,7 @@ def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
 def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
     """Watched while a charge goes in; what was found frozen stays so, at rest too, until a word changes."""
     session, battery = f.memory.session, f.snapshot.battery
-    words = tuple(
-        value.value if (value := getattr(battery, name)) is not None else None for name in type(battery).__slots__
-    )
+    words = tuple([word.value if word is not None else None for word in WORDS(battery)])
     if frozen is not None and frozen.words == words:
         return frozen if f.energised or FROZEN in f.raised else None
     if f.volts is None or session is None or not f.energised or f.pack_v is None:
@@ -118,9 +122,12 @@ def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
 
 def _first_amperes(f: "Facts", known: Witnessed, passed_s: float) -> Witnessed:
     if not f.energised:
-        return replace(known, before_a=f.pack_a or 0.0, proved=False, alone_s=0.0)
+        before_a = f.pack_a or 0.0
+        if (known.before_a, known.proved, known.alone_s) == (before_a, False, 0.0):
+            return known
+        return changed(known, before_a=before_a, proved=False, alone_s=0.0)
     if known.proved or f.amps is None or f.pack_a is None:
         return known
     flows = f.amps >= FIRST_A
     proved = flows and f.pack_a - known.before_a >= OWN_SHARE * f.amps
-    return replace(known, proved=proved, alone_s=drained(known.alone_s, passed_s, holds=flows and not proved))
+    return changed(known, proved=proved, alone_s=drained(known.alone_s, passed_s, holds=flows and not proved))

@@ -49,7 +49,7 @@ def amps_disagree(f: Facts) -> Cause | None:
     tolerance_a = max(f.rules.policy.faults.amps_differ_a, f.rules.policy.faults.amps_differ_pct / 100 * amps)
     if abs(amps - pack_a) <= tolerance_a:
         return None
-    step, wrong = f.memory.step, None
+    step, wrong = f.memory.stage.step, None
     if step is not None:
         charger_fits, bmu_fits = (abs(seen_a - step.current_a) <= tolerance_a for seen_a in (amps, pack_a))
         wrong = _likelier_wrong(charger_fits, bmu_fits, Cause.of("by_step", step_a=step.current_a))
@@ -80,7 +80,7 @@ def _likelier_wrong(charger_fits: bool, bmu_fits: bool, by: Cause) -> Cause | No
 def charger_frozen(f: Facts) -> Cause | None:
     """FAULTS C20: its values stand still, and the battery's do not. Alone the one proves nothing: a good supply on a
     flat cell may show the same digits for minutes."""
-    still = f.memory.still
+    still = f.memory.charger.still
     if still is None or f.now_s - still.t_s < STILL_S or f.pack_v is None or f.pack_a is None:
         return None
     moved_v, moved_a = abs(f.pack_v - still.pack_v), abs(f.pack_a - still.pack_a)
@@ -94,7 +94,7 @@ def charger_frozen(f: Facts) -> Cause | None:
 
 def charger_frozen_at_rest(f: Facts) -> Cause | None:
     """FAULTS C31."""
-    still = f.memory.still
+    still = f.memory.charger.still
     if still is None or not f.standby or not f.connected or f.now_s - still.t_s < STILL_S or f.pack_v is None:
         return None
     moved_v = abs(f.pack_v - still.pack_v)
@@ -119,6 +119,6 @@ def bmu_frozen(f: Facts) -> Cause | None:
 
 def back_feed(f: Facts) -> Cause | None:
     """FAULTS C12."""
-    if f.memory.runs_s is None or f.pack_a is None or f.pack_a >= -BACK_FEED_A:
+    if f.memory.charger.runs_s is None or f.pack_a is None or f.pack_a >= -BACK_FEED_A:
         return None
     return Cause.of("back_feed", discharge_a=-f.pack_a)

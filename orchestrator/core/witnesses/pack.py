@@ -42,9 +42,12 @@ def collapsed(f: Facts) -> Cause | None:
     floor_v, key = (rule.below_v, "precharge.below_v") if rule is not None else (pack.voltage_v.low, "pack.voltage_v")
     if f.rules.manual and f.pack_v < floor_v * (1 - MARGIN) and f.volts < floor_v:
         return f.rules.by_policy("pack_sunk", key, pack_v=f.pack_v, floor_v=floor_v)
+    pack_v = f.pack_v
     for sample in f.memory.witnessed.trail:
-        fell_v, charger_fell_v = sample.pack_v - f.pack_v, sample.charger_v - f.volts
-        both_fell = fell_v > FALL * sample.pack_v and charger_fell_v > SEEN_BY_BOTH * fell_v
+        fell_v = sample.pack_v - pack_v
+        if fell_v <= FALL * sample.pack_v:
+            continue
+        both_fell = sample.charger_v - f.volts > SEEN_BY_BOTH * fell_v
         if both_fell and f.pack_a >= SAME_CURRENT * sample.pack_a:
             passed_s = f.now_s - sample.t_s
             return Cause.of("pack_fell", before_v=sample.pack_v, pack_v=f.pack_v, passed_s=passed_s, pack_a=f.pack_a)

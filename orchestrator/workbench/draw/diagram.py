@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from orchestrator.config.amperes import max_ah, taper_of
 from orchestrator.config.policy import Policy
-from orchestrator.core.machine import ENERGISED_STAGES, RESTING, TABLE, UNVERIFIED, Trigger
+from orchestrator.core.machine import TABLE, Trigger
+from orchestrator.core.states import ENERGISED, PRECHARGING, RESTING, UNVERIFIED, ordered
 from orchestrator.model import State
 
 Says = Callable[[Policy], Iterator[tuple[str, str]]]  #: when, and the key of the policy that sets it
@@ -45,17 +46,16 @@ class Diagram:
 
 
 GROUPS = (
-    Group("UNVERIFIED", UNVERIFIED, ("told to stop, not yet verified",)),
-    Group("RESTING", RESTING, ("stands by, verified",)),
-    Group("ENERGISED", ENERGISED_STAGES, ("current flows",)),
+    Group("UNVERIFIED", ordered(UNVERIFIED), ("told to stop, not yet verified",)),
+    Group("RESTING", ordered(RESTING), ("stands by, verified",)),
+    Group("ENERGISED", ordered(ENERGISED), ("current flows",)),
 )
 GROUP_OF = {state: group.name for group in GROUPS for state in group.states}
-PRECHARGE = (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS)
 
 
 def diagram(policy: Policy | None = None) -> Diagram:
     """The machine; with a policy, without the states that it does not use, and with its thresholds."""
-    used = [state for state in State if policy is None or policy.precharge is not None or state not in PRECHARGE]
+    used = [state for state in State if policy is None or policy.precharge is not None or state not in PRECHARGING]
     inside: dict[str, list[str]] = {group.name: [] for group in GROUPS}
     arrows: dict[tuple[str, str], list[str]] = {}
     links = list(_links(used))

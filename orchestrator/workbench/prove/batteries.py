@@ -54,7 +54,7 @@ class Shown:
             }
         )
         link: dict[str, Any] = {
-            "online": True, "boots": memory.boots, "heartbeat_s": HEARTBEAT_S, "heartbeat_t_s": now_s - FRESH_S,
+            "online": True, "boots": memory.battery.boots, "heartbeat_s": HEARTBEAT_S, "heartbeat_t_s": now_s - FRESH_S,
             **self.link(now_s, memory),
         }  # fmt: skip
         return (reading if link.pop("speaks", True) else BatteryReading()), BatteryLink(**link)
@@ -65,7 +65,7 @@ def _fixed(**link: Any) -> Callable[[float, Memory], Link]:  # noqa: ANN401 - fi
 
 
 def _booted(now_s: float, memory: Memory) -> Link:
-    return {"boots": memory.boots + 1, "boot_t_s": now_s - 0.1, "heartbeat_s": None, "speaks": False}
+    return {"boots": memory.battery.boots + 1, "boot_t_s": now_s - 0.1, "heartbeat_s": None, "speaks": False}
 
 
 def _heartbeat_lost(now_s: float, _memory: Memory) -> Link:

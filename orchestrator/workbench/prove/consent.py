@@ -8,12 +8,9 @@ from collections.abc import Iterator
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
-from orchestrator.model import ENERGISED, Alarm, Cause, Request, State
+from orchestrator.core.states import ENERGISED, READY, UNSEEN, UNVERIFIED
+from orchestrator.model import Alarm, Cause, Request, State
 from orchestrator.workbench.prove.story import Taken
-
-UNPROVED = frozenset({State.STARTING, State.STOPPING, State.UNCONTROLLABLE})
-#: States in which no person need act before a charge.
-READY = frozenset({State.IDLE, State.QUALIFYING, State.FULL, State.SUSPENDED}) | ENERGISED
 
 
 def operator_stops(taken: Taken) -> str | None:
@@ -27,9 +24,9 @@ def operator_stops(taken: Taken) -> str | None:
 def held_until_started(taken: Taken) -> str | None:
     """What an operator stopped, only an operator starts."""
     before, after = taken.before, taken.after
-    if before.hold and not after.hold and taken.snapshot.request is not Request.START:
+    if before.operator.hold and not after.operator.hold and taken.snapshot.request is not Request.START:
         return "the hold was lifted without a start"
-    return "runs in spite of a hold" if after.hold and after.state in ENERGISED else None
+    return "runs in spite of a hold" if after.operator.hold and after.state in ENERGISED else None
 
 
 def _waiting(memory: Memory) -> set[str]:
@@ -50,7 +47,7 @@ def waits_for_a_start(taken: Taken) -> str | None:
     left = {name for name in gone if ROW[name].departs and not taken.snapshot.battery_link.online}
     if gone > left and asked not in (Request.START, Request.RESET):
         return f"{min(gone - left)} has gone without a person"
-    waits = bool(after.hold or _waiting(after))
+    waits = bool(after.operator.hold or _waiting(after))
     if waits and after.state in READY:
         return f"{after.state}, though a person must start"
     if before.state is State.HELD and after.state in READY and not (asked is Request.START or left):
@@ -78,7 +75,7 @@ def tripped_until_reset(taken: Taken) -> str | None:
     """TRIPPED is left by a person's reset, or to stop a charger that runs."""
     if taken.before.state is not State.TRIPPED or taken.after.state in (State.TRIPPED, State.STOPPING):
         return None
-    if taken.move.restart and taken.after.state in UNPROVED:
+    if taken.move.restart and taken.after.state in UNVERIFIED:
         return None  # the stop is verified anew; what has latched is looked after by its own property
     return None if taken.snapshot.request is Request.RESET else f"left for {taken.after.state} without a reset"
 
@@ -94,7 +91,7 @@ def latched_until_reset(taken: Taken) -> str | None:
 
 def a_death_in_mid_charge_holds(taken: Taken) -> str | None:
     """A charge that nobody ended waits for a person."""
-    ran = taken.before.state in ENERGISED or taken.before.unverified
+    ran = taken.before.state in ENERGISED or taken.before.stop.unverified
     if not taken.move.restart or not ran:
         return None
     return None if "found_running" in taken.after.faults else f"{taken.after.state} without a fault that waits"
@@ -106,7 +103,7 @@ def alarmed(taken: Taken) -> str | None:
     And of one that stands by until a person has seen to a fault; but not of what an operator has stopped.
     """
     after, alarm = taken.after, taken.decision.alarm
-    left = after.unverified and after.state in (State.STARTING, State.OFFLINE)
+    left = after.stop.unverified and after.state in UNSEEN
     shared = bool(taken.snapshot.charger_link.locked_by) or "port_locked" in after.faults
     if after.state is State.UNCONTROLLABLE or left:
         right = alarm is Alarm.DANGER

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
-from orchestrator.model import ENERGISED, STOP, Request, State
-from orchestrator.workbench.prove.properties import STANDBY
+from orchestrator.core.states import AT_REST, ENERGISED
+from orchestrator.model import STOP, Request, State
 from orchestrator.workbench.prove.story import TICK_S, Taken
 
 #: What backoffs, hysteresis and the qualification take together, at most.
@@ -38,7 +38,7 @@ class Ending:
 
 
 def _stands_by(taken: Taken) -> bool:
-    return taken.after.state in STANDBY and taken.decision.command is None
+    return taken.after.state in AT_REST and taken.decision.command is None
 
 
 def _uncontrollable(taken: Taken) -> bool:
@@ -62,7 +62,7 @@ def _wakes(taken: Taken) -> bool:
 def _runs(taken: Taken, state: State) -> bool:
     """Long enough for any fault to show."""
     since_s = taken.after.since_s or taken.now_s
-    runs = taken.after.state is state and taken.after.ran and taken.now_s - since_s > STEADY_S
+    runs = taken.after.state is state and taken.after.stage.ran and taken.now_s - since_s > STEADY_S
     return runs or _exchanged(taken)
 
 
@@ -83,12 +83,13 @@ def _ended(taken: Taken) -> bool:
 def _free(memory: Memory) -> bool:
     """No person must act before the bay charges (again), and it is not charging."""
     waits = any(fault.latched or ROW[name].clear is Clear.OPERATOR for name, fault in memory.faults.items())
-    return memory.state not in (*ENERGISED, State.TRIPPED) and not (waits or memory.hold or memory.paused)
+    asked = memory.operator.hold or memory.operator.paused
+    return memory.state not in (*ENERGISED, State.TRIPPED) and not (waits or asked)
 
 
 def _charging(memory: Memory) -> bool:
     """With nothing ordered that is not seen yet: no charger leaves an order alone for `SLOWLY_S`."""
-    return memory.state is State.CHARGING and memory.ran and memory.order is None
+    return memory.state is State.CHARGING and memory.stage.ran and memory.sequence.order is None
 
 
 def _energised(memory: Memory) -> bool:

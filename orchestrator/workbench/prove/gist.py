@@ -7,17 +7,16 @@ takes memories as they come, changes what is left out, and looks that each input
 """
 
 from collections.abc import Callable, Mapping
+from operator import attrgetter
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import release
-from orchestrator.core.machine import UNVERIFIED
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, telling
+from orchestrator.core.states import ENERGISED, RESTING, UNPROVED, UNVERIFIED
 from orchestrator.core.witnesses.standby import UNORDERED_S
-from orchestrator.model import ENERGISED, Effect, State
+from orchestrator.model import Command, Effect, State
 
 Gist = tuple[object, ...]
-#: In these standby comes first. What clears by itself decides only then, and until then it may come and go.
-UNPROVED = frozenset({*UNVERIFIED, State.OFFLINE})
 
 
 def outline(memory: Memory) -> Gist:
@@ -30,7 +29,7 @@ def outline(memory: Memory) -> Gist:
     if memory.state in ENERGISED:  # a precharge is on the lowest step anyhow
         return (memory.state,)
     waits = any(ROW[name].clear is Clear.OPERATOR for name, _ in faults)
-    asked = "start" if memory.hold else (memory.paused, waits)
+    asked = "start" if memory.operator.hold else (memory.operator.paused, waits)
     if memory.state in UNPROVED:
         return memory.state, asked
     bars = any(ROW[name].effect >= Effect.NO_START and ROW[name].clear is not Clear.OPERATOR for name, _ in faults)
@@ -39,8 +38,16 @@ def outline(memory: Memory) -> Gist:
 
 def gist(memory: Memory) -> Gist:
     """Equal for two memories from which a bay can come to the same, as far as it is explored here."""
-    more = TELLS.get(memory.state, _at_rest)
-    return *outline(memory), memory.session is not None, memory.full_pct is not None, *more(memory)
+    state = memory.state
+    told = [_told(value) for value in TELLS[state](memory)]
+    return *outline(memory), memory.session is not None, *told, *[derived(memory) for derived in DERIVED.get(state, ())]
+
+
+def _told(value: object) -> object:
+    """What of a value decides: which order it is, what is true or not; of all others that they are there."""
+    if isinstance(value, Command):
+        return value.action
+    return value if isinstance(value, bool) else value is not None
 
 
 def details(memory: Memory) -> Gist:
@@ -52,27 +59,9 @@ def details(memory: Memory) -> Gist:
     return *gist(memory), faults
 
 
-def _at_rest(memory: Memory) -> Gist:
-    """The current that nobody ordered: whether it is there, and whether it has been for long enough to count."""
-    witnessed = memory.witnessed
-    return memory.unverified, witnessed.sees, witnessed.unordered_s >= UNORDERED_S
-
-
-def _offline(memory: Memory) -> Gist:
-    return *_at_rest(memory), _proof_began(memory)
-
-
-def _qualifying(memory: Memory) -> Gist:
-    return *_offline(memory), memory.qualified_s is not None, memory.intends
-
-
-def _starting(memory: Memory) -> Gist:
-    return memory.unverified, _proof_began(memory)
-
-
-def _stopping(memory: Memory) -> Gist:
-    """Whether it ran is known from the state itself, and forgotten with it."""
-    return (_proof_began(memory),)
+def _unordered(memory: Memory) -> bool:
+    """The current that nobody ordered has been there for long enough to count."""
+    return memory.witnessed.unordered_s >= UNORDERED_S
 
 
 def _proof_began(memory: Memory) -> bool:
@@ -81,24 +70,25 @@ def _proof_began(memory: Memory) -> bool:
     return bool(proof) and stop_s is not None and since_s is not None and stop_s >= since_s
 
 
-def _tripped(memory: Memory) -> Gist:
-    """Whether a reset would be granted now."""
+def _may_be_reset(memory: Memory) -> bool:
+    """A reset would be granted now."""
     _, reasons = release(memory.faults, memory.last_s or 0.0, by_reset=True)
-    return memory.unverified, not reasons
+    return not reasons
 
 
-def _energised(memory: Memory) -> Gist:
-    resumed = memory.resumed or (memory.ran and memory.state is State.CHARGING)  # the last stage needs it no more
-    return resumed, memory.ran, memory.order and memory.order.action, memory.witnessed.proved
+def _resumed(memory: Memory) -> bool:
+    """The last stage needs it no more, once it runs."""
+    return memory.sequence.resumed or (memory.stage.ran and memory.state is State.CHARGING)
 
 
-#: What else decides, by state; elsewhere the bay is at rest.
-TELLS: Mapping[State, Callable[[Memory], Gist]] = {
-    State.STARTING: _starting,
-    State.OFFLINE: _offline,
-    State.QUALIFYING: _qualifying,
-    **dict.fromkeys(ENERGISED, _energised),
-    State.STOPPING: _stopping,
-    State.UNCONTROLLABLE: _stopping,
-    State.TRIPPED: _tripped,
+#: The fields that tell, by state (`core/memory.py`) …
+TELLS = {state: attrgetter("state", *telling(state)) for state in State}
+#: … and what is worked out of several. In a stop under way, whether it ran is known from the state itself.
+DERIVED: Mapping[State, tuple[Callable[[Memory], bool], ...]] = {
+    **dict.fromkeys(RESTING, (_unordered,)),
+    State.OFFLINE: (_unordered, _proof_began),
+    State.QUALIFYING: (_unordered, _proof_began),
+    **dict.fromkeys(ENERGISED, (_resumed,)),
+    **dict.fromkeys(UNVERIFIED, (_proof_began,)),
+    State.TRIPPED: (_may_be_reset,),
 }

@@ -11,8 +11,8 @@ from typing import Any
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import AT_WORK, ENERGISED
 from orchestrator.model import (
-    ENERGISED,
     Action,
     ChargeMode,
     ChargerLink,
@@ -35,7 +35,6 @@ SENT_AGE_S, READ_AGE_S, OLD_S = 0.1, 0.05, 30.0
 #: Of two timers that are no farther apart than this, a jump past the longer one is past both.
 ALIKE = 1.1
 #: Where the tables of steps are looked at, or may be at the end of the step.
-AT_WORK = ENERGISED | {State.QUALIFYING}
 #: What flows in precharge.
 PRECHARGE_A = 1.0
 #: What a charger shows in each stage.
@@ -180,7 +179,7 @@ class StationInputs:
 
     def _obedient(self, shown: Shown, now_s: float, memory: Memory) -> Said:
         """A charger that has just done what the last step ordered."""
-        order = memory.order
+        order = memory.sequence.order
         values = {
             "voltage_v": shown.volts + shown.differs_v if shown.connected else 0.0,
             "control_mode": self.rules.bay.charger.control, "operation": Operation.STOPPED, "current_limit": 0,
@@ -191,7 +190,7 @@ class StationInputs:
         limit_a = self.rules.steps_a[int(values["current_limit"])] * shown.takes
         charging = values["charge_mode"] is ChargeMode.CHARGE
         flows_a = 0.0 if not values["operation"] else limit_a if charging else min(PRECHARGE_A, limit_a)
-        sent = order if memory.resumed and order is not None else Command(Action.RESUME)
+        sent = order if memory.sequence.resumed and order is not None else Command(Action.RESUME)
         return Said(
             {**values, "current_a": flows_a, "full_a": limit_a, "age_s": READ_AGE_S},
             {"online": True, "sent": Sent(sent, now_s - SENT_AGE_S), "stop_sent_s": now_s - SENT_AGE_S},
@@ -204,12 +203,12 @@ SEQUENCE = (Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE, Action.RUN)
 
 def _setpoint(memory: Memory, *, manual: bool) -> dict[str, Any]:
     """What an obedient charger shows of the setpoint: all of it up to the present order."""
-    action = memory.order.action if memory.order is not None else Action.RUN
-    running = memory.ran or action is Action.RUN or (action is Action.RESUME and not manual)
+    action = memory.sequence.order.action if memory.sequence.order is not None else Action.RUN
+    running = memory.stage.ran or action is Action.RUN or (action is Action.RESUME and not manual)
     done = len(SEQUENCE) if running or not manual else SEQUENCE.index(action)
     shows: dict[str, Any] = {"operation": Operation(int(running)), "charge_mode": ChargeMode.CHARGE}
     if manual:
-        shows["current_limit"] = memory.step.index if memory.step is not None else 0
+        shows["current_limit"] = memory.stage.step.index if memory.stage.step is not None else 0
         shows["charge_mode"] = STAGES[memory.state][0] if done >= 1 else ChargeMode.FULL
         shows["precharge"] = STAGES[memory.state][1] if done >= SEQUENCE.index(Action.SET_PRECHARGE) else Precharge.OFF
     return shows

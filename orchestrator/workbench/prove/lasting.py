@@ -123,7 +123,7 @@ def _circles(walk: Walk, surroundings: Surroundings, places: Sequence[Place]) ->
 
 def lasting(walk: Walk, place: Place, first: Move) -> Iterator[Taken]:
     """What comes of it when the surroundings of a move last: steps until nothing has changed for a long time."""
-    move, order = first, place.memory.order
+    move, order = first, place.memory.sequence.order
     rungs = _ladder()
     while True:
         taken = walk.take(place, move)

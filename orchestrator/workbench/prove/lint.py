@@ -11,7 +11,7 @@ from orchestrator.config.policy import Band, CellType
 from orchestrator.config.rules import Problems, Rule, problems
 from orchestrator.core.cells import CHEMISTRIES, EMPTY_PCT
 from orchestrator.core.checks.battery import HEAT_HYSTERESIS_K
-from orchestrator.core.course import RECHARGE_DROP_PCT
+from orchestrator.core.resting import RECHARGE_DROP_PCT
 from orchestrator.keys import Range
 from orchestrator.workbench.baylint import station_lint
 

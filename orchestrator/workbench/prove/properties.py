@@ -7,9 +7,9 @@ predicates, so that a mistake in one of those does not hide here.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from orchestrator.model import ENERGISED, STOP, Action, Decision, Effect, Operation, State
+from orchestrator.core.states import AT_REST, ENERGISED, PRECHARGING, UNVERIFIED
+from orchestrator.model import STOP, Action, Decision, Effect, Operation, State
 from orchestrator.workbench.prove.consent import (
-    UNPROVED,
     a_death_in_mid_charge_holds,
     alarmed,
     held_until_started,
@@ -31,8 +31,6 @@ VERIFY_S = 3.0
 FAST, SLOW = ("voltage_v", "current_a", "status", "temperature_c"), ("soc_pct", "soh_pct")
 
 RUNS = frozenset({Action.RESUME, Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE, Action.RUN})
-#: States of verified standby.
-STANDBY = frozenset({State.IDLE, State.HELD, State.QUALIFYING, State.FULL, State.SUSPENDED, State.TRIPPED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +95,7 @@ def rest_is_verified(taken: Taken) -> str | None:
     And only if the BMU sees no current. A stop that is repeated meanwhile takes no proof away.
     """
     found = taken.before.state is not State.STARTING and taken.after.state is State.OFFLINE  # it was there
-    if taken.before.state not in UNPROVED or not (found or taken.after.state in STANDBY) or taken.move.restart:
+    if taken.before.state not in UNVERIFIED or not (found or taken.after.state in AT_REST) or taken.move.restart:
         return None
     amps = taken.snapshot.battery.current_a
     if amps is not None and taken.now_s - amps.t_s <= FAST_S and amps.value > BMU_SEES_A:
@@ -139,7 +137,7 @@ def within_temperature(taken: Taken) -> str | None:
 
 def unproved_stops(taken: Taken) -> str | None:
     """In states that wait for a verified standby, stop is the standing order."""
-    if taken.after.state in UNPROVED and taken.decision.command != STOP:
+    if taken.after.state in UNVERIFIED and taken.decision.command != STOP:
         return f"the order in {taken.after.state} is {taken.decision.command}"
     return None
 
@@ -150,7 +148,7 @@ def unordered_current_stops(taken: Taken) -> str | None:
     if amps is None or amps.value <= BMU_SEES_A or taken.now_s - amps.t_s > FAST_S or taken.move.restart:
         return None
     since_s = before.witnessed.unordered_s  # of sights one after another, by the core's own count
-    if taken.after.state in STANDBY and since_s >= UNORDERED_S and taken.decision.command != STOP:
+    if taken.after.state in AT_REST and since_s >= UNORDERED_S and taken.decision.command != STOP:
         return f"{taken.after.state} without a stop, and the BMU has seen {amps.value:.1f} A for {since_s:.1f} s"
     return None
 
@@ -178,7 +176,7 @@ def stops_in_time(taken: Taken) -> str | None:
 def precharge_ends(taken: Taken) -> str | None:
     """A stage of precharge never takes longer than its policy allows, all pauses and restarts left out."""
     rule, session = taken.rules.policy.precharge, taken.after.session
-    if taken.after.state not in (State.PRECHARGE_PULSE, State.PRECHARGE_CONTINUOUS):
+    if taken.after.state not in PRECHARGING:
         return None
     if rule is None or session is None:
         return "precharge without a rule for it, or outside of a charge"

@@ -6,10 +6,10 @@ anew, the whole memory that all steps before have led to.
 
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import zip_longest
 
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, names, value_of
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.model import Decision
@@ -53,9 +53,10 @@ def again(steps: Iterable[Recorded]) -> Iterator[Again]:
 
 def _differs(ours: Memory, recorded: Memory) -> str:
     """The first value of the memory that is not the recorded one."""
-    for name in (one.name for one in fields(Memory)):
-        if getattr(ours, name) != getattr(recorded, name):
-            return f"memory.{name} was {getattr(recorded, name)!r} and is {getattr(ours, name)!r}"
+    for name in names():
+        now, was = value_of(ours, name), value_of(recorded, name)
+        if now != was:
+            return f"memory.{name} was {was!r} and is {now!r}"
     return ""
 
 

@@ -9,16 +9,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from orchestrator.config.policy import Policy
-from orchestrator.core.machine import RESTING
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, by_policy, value_of, with_values
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import RESTING
 from orchestrator.core.step import step
 from orchestrator.model import Decision, Snapshot, State, Step
 from orchestrator.text.catalogue import say
 from orchestrator.workbench.replay.again import Again
-
-#: What a policy alone keeps from step to step: its own debounces and holds.
-OWN = ("faults", "step", "raise_s", "taper_s", "reached_s", "rows", "row_returns")
 
 
 @dataclass(slots=True)
@@ -73,12 +70,12 @@ class Comparison:
             return
         own = None if parted or self._own is None else self._own
         given = (
-            replace(one.memory, rows=(), row_returns=())
+            with_values(one.memory, rows=(), row_returns=())
             if own is None
-            else replace(one.memory, **{name: getattr(own, name) for name in OWN})
+            else with_values(one.memory, **{name: value_of(own, name) for name in by_policy()})
         )
         rules = self._other(one.rules)
-        snapshot = _as_told(one.recorded.snapshot, one.memory.step, given.step, rules)
+        snapshot = _as_told(one.recorded.snapshot, one.memory.stage.step, given.stage.step, rules)
         decision, self._own = step(one.recorded.at_s, snapshot, given, rules)
         if decision.state is one.decision.state and _step(decision) == _step(one.decision):
             self._open = None

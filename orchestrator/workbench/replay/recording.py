@@ -20,7 +20,7 @@ from cattrs.errors import BaseValidationError
 
 from orchestrator.config.plainfile import check_plain
 from orchestrator.config.station import Bay
-from orchestrator.core.memory import Memory
+from orchestrator.core.memory import Memory, in_parts
 from orchestrator.core.rules import Rules
 from orchestrator.errors import ConfigError, Finding
 from orchestrator.model import Cause, Snapshot
@@ -144,7 +144,7 @@ class _Reader:
             if "cause" not in line["memory"]:
                 raise _OlderError
             plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
-            memory = _CONVERTER.structure(line["memory"], Memory)
+            memory = _CONVERTER.structure(in_parts(line["memory"]), Memory)
             if "chemistry" not in line["config"]["policy"]["pack"]:
                 raise ValueError(
                     "its policy is of the first edition, which spoke of steps: replay it with that version"

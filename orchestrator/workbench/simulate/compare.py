@@ -2,14 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
+from orchestrator.core.states import PASSING
 from orchestrator.model import State
 from orchestrator.workbench.simulate.trail import Span
 
 #: A difference in time of less than this is none.
 SAME_S = 60.0
-
-#: States that last a moment are what comes before them.
-PASSING = frozenset({State.STARTING, State.QUALIFYING, State.STOPPING})
 
 
 def differences(all_spans: Sequence[Sequence[Span]]) -> list[tuple[float, float]]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from orchestrator.config.scenario import Cell, Scenario, Visit
-from orchestrator.model import ENERGISED, State
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import State
 from orchestrator.workbench.simulate.simulation import Run
 from orchestrator.workbench.simulate.trail import Moment, Span
 

@@ -9,41 +9,36 @@ minutes) is brought up to the tick before the last one, from what the plant did 
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 
-from orchestrator.core.memory import Memory
-from orchestrator.core.track import thinned
-from orchestrator.model import ENERGISED, Decision
+from orchestrator.core.history.battery import thinned
+from orchestrator.core.memory import RECORDS, FaultMemory, Memory, paths, with_values
+from orchestrator.core.parts import Kind
+from orchestrator.core.states import ENERGISED
+from orchestrator.model import Decision, Session
 
 Outline = tuple[object, ...]
 
 
-#: What the memory carries that changes only when something happens.
-EVENTFUL = (
-    "since_s", "resets", "hold", "paused", "stop_cause", "full_pct", "boots", "resumed", "ran", "shown", "order",
-    "limit", "limit_before", "closed", "charge_step", "exchange", "reached_s", "raise_s", "taper_s", "qualified_s",
-    "runs_s", "stopping_s", "verified_s", "returns", "unverified", "left_s", "left_as", "returned_s", "reverts",
-    "confirmed", "ready", "intends", "rows", "row_returns", "full_s",
-)  # fmt: skip
-#: What it sums up, as long as there is anything to sum up.
-SUMS = ("idle_s", "search_s", "wake_s")
+#: What the memory carries that changes only when something happens …
+EVENTS = attrgetter(*paths(Kind.EVENT))
+#: … and what it sums up, as long as there is anything to sum up.
+TOTALS = attrgetter(*paths(Kind.TOTAL))
+FAULT_EVENTS, SESSION_EVENTS = (attrgetter(*RECORDS[record][Kind.EVENT]) for record in (FaultMemory, Session))
 
 
 def outline(decision: Decision, memory: Memory) -> Outline:
     """All that changes only when something happens; equal outlines, and nothing has happened in between."""
-    witnessed, session = memory.witnessed, memory.session
     return (
         decision.state,
         decision.command,
         decision.setpoint,
         decision.step,
         decision.alarm,
-        decision.closed,
-        *(getattr(memory, name) for name in EVENTFUL),
-        *(getattr(memory, name) > 0 for name in SUMS),
-        (session.rise_v, session.full) if session is not None else None,
-        witnessed.stop_s,
-        witnessed.proved,
-        tuple((name, f.present, f.raised_s, f.clean_s, f.latched, f.strikes) for name, f in memory.faults.items()),
+        EVENTS(memory),
+        tuple(value > 0 for value in TOTALS(memory)),
+        SESSION_EVENTS(memory.session) if memory.session is not None else None,
+        tuple((name, FAULT_EVENTS(fault)) for name, fault in memory.faults.items()),
     )
 
 
@@ -55,14 +50,14 @@ def brought_up(
     `before_s` is the last of them; `temperatures` are what the BMU told, (t_s, °C), every time one was due to be kept
     and at `before_s`, or none where it told nothing; `charged_ah`, `charged_wh` were delivered meanwhile.
     """
-    memory = memory.copy()
+    warmth, newest = memory.battery.warmth, memory.battery.sample
     for sample in temperatures:
-        memory.warmth = thinned(memory.warmth, sample)
-        memory.sample = sample
+        warmth, newest = thinned(warmth, sample), sample
+    memory = with_values(memory, warmth=warmth, sample=newest)
     session = memory.session
-    if session is not None:
-        memory.counted_t_s = before_s
-        if memory.state in ENERGISED:
-            charged_ah, charged_wh = session.charged_ah + charged_ah, session.charged_wh + charged_wh
-            memory.session = replace(session, charged_ah=charged_ah, charged_wh=charged_wh)
-    return memory
+    if session is None:
+        return memory
+    if memory.state in ENERGISED:
+        charged_ah, charged_wh = session.charged_ah + charged_ah, session.charged_wh + charged_wh
+        session = replace(session, charged_ah=charged_ah, charged_wh=charged_wh)
+    return with_values(memory, counted_t_s=before_s, session=session)

@@ -8,10 +8,10 @@ from operator import itemgetter
 from orchestrator.config.policy import Policy
 from orchestrator.config.scenario import Ask, Scenario, SensorFault, Visit
 from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig
+from orchestrator.core.history.battery import WARMTH_EVERY_S
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.core.track import WARMTH_EVERY_S
 from orchestrator.errors import OrchestratorError
 from orchestrator.model import ControlMode, Decision, Request, State
 from orchestrator.protocol.objects import ObjectMap
@@ -182,7 +182,7 @@ class Simulation:
 
     def _skip(self, ticks: int, plant: Plant, devices: Devices) -> Memory:
         """Let the plant go on for so many ticks without a step; the memory as steps would have left it."""
-        memory, warmth = self._memory, self._memory.warmth
+        memory, warmth = self._memory, self._memory.battery.warmth
         end_s = (self._tick + ticks) * TICK_S
         before_ah, before_wh = plant.charged_ah, plant.charged_wh
         temperatures = []

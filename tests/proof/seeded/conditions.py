@@ -30,7 +30,7 @@ CONDITIONS: tuple[Seed, ...] = (
         "comes and goes",
         "a battery that leaves and comes back is charged again each time",
         ("loose plug",),
-        (f"{CORE}track.py", "f.now_s if gap_s < LOOSE_PLUG_S and not _is_another(f) else None", "None"),
+        (f"{CORE}history/battery.py", "f.now_s - known.left_s < LOOSE_PLUG_S and not _is_another(f)", "False"),
     ),
     scene(
         "another kind of pack is charged",

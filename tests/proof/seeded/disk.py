@@ -12,7 +12,7 @@ DISK: tuple[Seed, ...] = (
         ("charging, then no power",),
         (
             f"{CORE}persisted.py",
-            "running=memory.state in RUNNING or memory.intends or memory.unverified,",
+            "running=memory.state in MAY_RUN or memory.stage.intends or memory.stop.unverified,",
             "running=False,",
         ),
         (
@@ -94,7 +94,7 @@ DISK: tuple[Seed, ...] = (
         "disk",
         "an operator's stop is forgotten with a restart",
         ("stopped, then no power",),
-        (f"{CORE}persisted.py", "            hold=memory.hold,\n", '            hold="",\n'),
+        (f"{CORE}persisted.py", "            hold=memory.operator.hold,\n", '            hold="",\n'),
     ),
     scene(
         "latches are not kept",

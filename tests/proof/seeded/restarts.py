@@ -21,7 +21,7 @@ RESTARTS: tuple[Seed, ...] = (
         ("tests/core/test_safestop.py::test_a_charger_that_ran_at_the_start_has_been_stopped_once_already",),
         (
             f"{CORE}safestop.py",
-            '        if memory.stopping_s is None and "found_running" in f.raised:',
+            '        if stop.stopping_s is None and "found_running" in f.raised:',
             "        if False:",
         ),
     ),
@@ -33,8 +33,8 @@ RESTARTS: tuple[Seed, ...] = (
         (
             f"{CORE}persisted.py",
             "            session=replace(session, started_s=now_s - session.started_s) if session is not "
-            "None else None,\n            full_pct=memory.full_pct,",
-            "            full_pct=memory.full_pct,",
+            "None else None,\n            full_pct=memory.battery.full_pct,",
+            "            full_pct=memory.battery.full_pct,",
         ),
     ),
     scene(
@@ -43,9 +43,14 @@ RESTARTS: tuple[Seed, ...] = (
         "the limits of a charge begin anew when its BMU was silent for a while",
         ("ampere-hours over silences",),
         (
-            f"{CORE}step.py",
-            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})",
-            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED, State.OFFLINE, State.SUSPENDED})",
+            f"{CORE}states.py",
+            "K.UNSEEN, K.RESTING, K.SETTLED, K.QUIET})",
+            "K.UNSEEN, K.RESTING, K.SETTLED, K.QUIET, K.SESSION_ENDS})",
+        ),
+        (
+            f"{CORE}states.py",
+            "    S.SUSPENDED: frozenset({",
+            "    S.SUSPENDED: frozenset({K.SESSION_ENDS, ",
         ),
     ),
     scene(
@@ -78,6 +83,10 @@ RESTARTS: tuple[Seed, ...] = (
         "restart",
         "a restart allows three more resets",
         ("tests/core/test_persisted.py",),
-        (f"{CORE}persisted.py", "            resets=tuple((now_s - t_s, name) for t_s, name in memory.resets),\n", ""),
+        (
+            f"{CORE}persisted.py",
+            "            resets=tuple((now_s - t_s, name) for t_s, name in memory.operator.resets),\n",
+            "",
+        ),
     ),
 )

@@ -24,7 +24,13 @@ WITNESSES: tuple[Seed, ...] = (
             f"{SERVICE}bay.py",
             "        self._ending = why\n",
             "        self._ending = why\n        if self._memory is not None:\n"
-            '            self._memory.hold = self._memory.hold or Cause.of("service_ends", why=why)\n',
+            '            hold = self._memory.operator.hold or Cause.of("service_ends", why=why)\n'
+            "            self._memory = with_values(self._memory, hold=hold)\n",
+        ),
+        (
+            f"{SERVICE}bay.py",
+            "from orchestrator.core.memory import Memory\n",
+            "from orchestrator.core.memory import Memory, with_values\n",
         ),
     ),
     part(

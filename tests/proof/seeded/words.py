@@ -19,11 +19,15 @@ WORDS: tuple[Seed, ...] = (
         "words",
         "a charger that ran when the service died and is not heard is no alarm",
         ("cut off and not heard, then killed",),
-        (f"{CORE}alarm.py", "    unknown = memory.unverified and", "    unknown = False and"),
-        (f"{CORE}safestop.py", "        return memory.unverified and f.state_s >= LOST_S\n", "        return False\n"),
+        (f"{CORE}alarm.py", "    unknown = memory.stop.unverified and", "    unknown = False and"),
+        (
+            f"{CORE}safestop.py",
+            "        return memory.stop.unverified and f.state_s >= LOST_S\n",
+            "        return False\n",
+        ),
         (
             f"{CORE}course.py",
-            "if state is State.STARTING and not memory.unverified and not f.charger.online",
+            "if state is State.STARTING and not memory.stop.unverified and not f.charger.online",
             "if state is State.STARTING and not f.charger.online",
         ),
     ),

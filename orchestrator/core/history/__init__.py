@@ -1,0 +1,53 @@
+"""What has to be followed from one decision to the next, each part of the memory by its own module."""
+
+from orchestrator.core import rows, safestop, sequence
+from orchestrator.core.facts import Facts
+from orchestrator.core.history import battery, charger, session, stage
+from orchestrator.core.memory import Memory
+from orchestrator.core.parts import changed
+from orchestrator.core.states import ENERGISED
+from orchestrator.core.witnesses import followed
+from orchestrator.model import Cause, State
+
+
+def update_history(f: Facts, passed_s: float) -> Facts:
+    """The facts with a memory that is brought up to them; `passed_s` is the time since the decision before."""
+    before = f.memory
+    after = f.with_memory(
+        changed(
+            before,
+            charger=charger.update(f, passed_s),
+            stage=stage.update(f),
+            witnessed=followed.follow(f, passed_s),
+            tables=rows.update(f),
+            battery=battery.update(f),
+        )
+    )
+    open_charge = session.update(after, passed_s, before.charger.counted_t_s)
+    if open_charge is None:
+        return after
+    return after.with_memory(changed(after.memory, session=open_charge))
+
+
+def entered(f: Facts, state: State, cause: Cause) -> Memory:
+    """The memory when `state` has just been entered, for this cause: what it counts from."""
+    memory, before = f.memory, f.memory.state
+    begun = changed(
+        memory,
+        state=state,
+        since_s=f.now_s,
+        stage=stage.EMPTY,
+        stop=safestop.update(f, state, cause),
+        charger=charger.told_anew(memory.charger),
+    )
+    if state not in ENERGISED:
+        return changed(begun, sequence=sequence.ends(memory.sequence))
+    begun = changed(begun, session=session.begins(f, state, before))
+    if before in ENERGISED:
+        return begun
+    return changed(
+        begun,
+        charger=charger.begins(f, begun.charger),
+        sequence=sequence.begins(memory.sequence, f.now_s),
+        battery=battery.begins(memory.battery),
+    )

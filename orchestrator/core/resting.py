@@ -1,0 +1,151 @@
+"""Where a bay belongs whose charger stands by, verified: one row for each reason to rest, the first that holds wins."""
+
+from collections.abc import Callable
+
+from orchestrator.core import latches
+from orchestrator.core.facts import Facts
+from orchestrator.core.faults import ROW, Clear
+from orchestrator.core.finish import full_due, goes_on, target
+from orchestrator.core.machine import Trigger
+from orchestrator.core.outofcontrol import problem
+from orchestrator.model import ActiveFault, Cause, Effect, State
+
+Faults = tuple[ActiveFault, ...]
+Found = tuple[Trigger, Cause] | None
+
+#: A battery that is to be charged all the way once in so many days, and has this much, is as good as full.
+FULL_DUE_PCT = 98.0
+#: A full battery must have lost this much before it is charged again, however high the policy's threshold.
+RECHARGE_DROP_PCT = 3.0
+
+
+def resting_place(f: Facts, faults: Faults) -> tuple[Trigger, Cause]:
+    """The trigger that leads to where the bay belongs (perhaps it is there), and why."""
+    return next(found for find in PLACES if (found := find(f, faults)) is not None)
+
+
+def _trips(f: Facts, faults: Faults) -> Found:
+    worst = faults[0] if faults else None
+    if worst is None or worst.effect is not Effect.TRIP or (_lost(f) and f.memory.state is not State.TRIPPED):
+        return None
+    return Trigger.TRIP, _then(worst.cause, latches.goes_on(f))
+
+
+def _lost(f: Facts) -> bool:
+    return not f.charger.online or f.reading is None
+
+
+def _loses(f: Facts, _faults: Faults) -> Found:
+    return (Trigger.LOSE, offline(f)) if _lost(f) else None
+
+
+def _waits(f: Facts, faults: Faults) -> Found:
+    waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
+    return (Trigger.HOLD, waits.cause.with_(how=_start(f))) if waits is not None else None  # its advice ends with that
+
+
+def _holds(f: Facts, _faults: Faults) -> Found:
+    hold = f.memory.operator.hold
+    return (Trigger.HOLD, held(f, hold)) if hold is not None else None
+
+
+def _ends(f: Facts, _faults: Faults) -> Found:
+    why = ending(f)
+    if why is None:
+        return None
+    return (Trigger.REST if f.memory.session is None else Trigger.SUSPEND), why  # the charge goes on after it
+
+
+def _pauses(f: Facts, _faults: Faults) -> Found:
+    return (Trigger.SUSPEND, Cause("operator_pause", advice="start")) if f.memory.operator.paused else None
+
+
+def _absent(f: Facts, _faults: Faults) -> Found:
+    if f.battery.online and not f.silent:
+        return None
+    if f.departed:
+        return Trigger.REST, Cause("battery_absent")
+    id_ = "bmu_just_booted" if f.just_booted else "bmu_does_not_answer"
+    what = Cause.of(id_, node_id=f.rules.bay.battery.node_id)
+    if f.battery.problem:
+        what = Cause.of("bmu_problem", problem=f.battery.problem)
+    return Trigger.LOSE, Cause.of("battery_not_heard", charger_v=f.volts or 0.0, what=what)
+
+
+def _charged(f: Facts, _faults: Faults) -> Found:
+    wanted, why = _wanted(f)
+    if wanted:
+        return None
+    if f.memory.battery.full_pct is not None:
+        return Trigger.FILL, why
+    return (Trigger.REST, why) if f.soc is not None else None
+
+
+def _barred(f: Facts, faults: Faults) -> Found:
+    worst = faults[0] if faults else None
+    if worst is None or worst.effect < Effect.NO_START:
+        return None
+    return Trigger.SUSPEND, _then(worst.cause, latches.goes_on(f))
+
+
+def _remains(f: Facts, _faults: Faults) -> Found:
+    wanted, why = _wanted(f)
+    return (Trigger.QUALIFY if wanted else Trigger.REST), why
+
+
+#: The reasons to rest. Each says where to, or None where it does not hold; each stands where it stands for a reason.
+PLACES: tuple[Callable[[Facts, Faults], Found], ...] = (
+    _trips,  # a person must look before anything else; a trip that was not verified loses the charger first
+    _loses,  # every place below promises a standby that was verified: first the line
+    _waits,  # a fault that a person ends: its advice is the more urgent one, and the same start ends a hold, too
+    _holds,  # what a person has stopped, nobody and nothing else goes on with
+    _ends,  # no charge begins that the service's end would stop; a pause comes back after it
+    _pauses,  # the operator's word stands before what the battery wants
+    _absent,  # nothing below can be judged without a battery
+    _charged,  # a battery that wants nothing waits for nothing, faults or not
+    _barred,  # it goes on by itself, once nothing keeps it from charging
+    _remains,  # what the battery wants
+)
+
+
+def _then(cause: Cause, then: Cause | None) -> Cause:
+    return cause.with_(then=then) if then is not None else cause
+
+
+def held(f: Facts, hold: Cause) -> Cause:
+    """Why a person must start, and how."""
+    return hold.with_(then=Cause.of("to_go_on", how=_start(f)))
+
+
+def _start(f: Facts) -> Cause:
+    return Cause.of("start_bay", bay=f.rules.bay.name)
+
+
+def _wanted(f: Facts) -> tuple[bool, Cause]:
+    """Whether the battery wants to be charged, and why (not)."""
+    policy, full_pct = f.rules.policy, f.memory.battery.full_pct
+    if f.soc is None:
+        return False, Cause("soc_unknown")
+    if full_pct is None and f.memory.session is not None:  # what was interrupted is brought to its end
+        if unfinished := goes_on(f):
+            return True, unfinished
+        threshold, key = target(f)
+    elif full_pct is None:
+        key, threshold = "start.soc_below_pct", policy.start.soc_below_pct
+    elif full_due(f):  # it is full by its target only
+        key, threshold = "finish.full_every_days", FULL_DUE_PCT
+    else:  # it may have been full by taper at less than the policy's SOC: it must have fallen since
+        key, threshold = "recharge.soc_below_pct", min(policy.recharge.soc_below_pct, full_pct - RECHARGE_DROP_PCT)
+    below = f.soc < threshold
+    id_ = "soc_below" if below else "soc_not_below"
+    return below, f.rules.by_policy(id_, key, soc_pct=f.soc, threshold_pct=threshold)
+
+
+def ending(f: Facts) -> Cause | None:
+    """The service is about to end, and why."""
+    return Cause.of("service_ends", why=f.snapshot.ending) if f.snapshot.ending else None
+
+
+def offline(f: Facts) -> Cause:
+    """The charger is not heard."""
+    return problem(f, "charger_offline")

@@ -1,0 +1,74 @@
+"""Which states belong together, and why: one table, and a set of states for each of its columns.
+
+Theory of operation. Whoever treats several states alike names a class of this table instead of listing states. A new
+state is one row here; a reader sees at a glance what every rule of the product takes it for.
+"""
+
+from collections.abc import Mapping
+from enum import Enum, auto
+
+from orchestrator.model import State
+
+
+class Kind(Enum):
+    """What states can have in common."""
+
+    ENERGISED = auto()  #: the charger is told to run: current flows, and everything supervises it
+    PRECHARGING = auto()  #: … gently, to wake a deeply discharged pack, on the lowest step
+    AT_WORK = auto()  #: a charge has been started: energised, or about to be
+    UNVERIFIED = auto()  #: a stop is under way, and nothing has proved it yet
+    UNSEEN = auto()  #: the charger is heard for the first time, or again: what it did meanwhile, nobody saw
+    AT_REST = auto()  #: the charger was verified to stand by, and was not told to run since
+    RESTING = auto()  #: from here a bay goes where the facts lead, without a stop first
+    SETTLED = (
+        auto()
+    )  #: entered after a verified standby, or after a charger that could not be heard: nothing is pending
+    QUIET = auto()  #: every decision is the same until something happens
+    STARTABLE = auto()  #: a battery that wants to be charged is qualified from here
+    READY = auto()  #: goes on by itself: no person is waited for
+    OBEYS = auto()  #: the charger is known to do as it is told: the contactor may be closed
+    MAY_RUN = auto()  #: a charger may be delivering current: after a restart a person must look
+    SESSION_ENDS = auto()  #: after these a charge is over; a pause, a restart and a silent device do not end it
+    ALIKE = auto()  #: at rest, waiting for a person or not: from one to the other a charge has come no farther
+    PASSING = auto()  #: left again within seconds, whatever the surroundings
+
+
+S, K = State, Kind
+
+TABLE: Mapping[State, frozenset[Kind]] = {
+    S.STARTING: frozenset({K.UNVERIFIED, K.UNSEEN, K.PASSING}),
+    S.OFFLINE: frozenset({K.UNSEEN, K.RESTING, K.SETTLED, K.QUIET}),
+    S.IDLE: frozenset({
+        K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS, K.SESSION_ENDS, K.ALIKE,
+    }),
+    S.HELD: frozenset({
+        K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.OBEYS, K.SESSION_ENDS, K.ALIKE,
+    }),
+    S.QUALIFYING: frozenset({K.AT_WORK, K.AT_REST, K.RESTING, K.SETTLED, K.READY, K.OBEYS, K.PASSING}),
+    S.PRECHARGE_PULSE: frozenset({K.ENERGISED, K.PRECHARGING, K.AT_WORK, K.READY, K.OBEYS, K.MAY_RUN}),
+    S.PRECHARGE_CONTINUOUS: frozenset({K.ENERGISED, K.PRECHARGING, K.AT_WORK, K.READY, K.OBEYS, K.MAY_RUN}),
+    S.CHARGING: frozenset({K.ENERGISED, K.AT_WORK, K.READY, K.OBEYS, K.MAY_RUN}),
+    S.FULL: frozenset({K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS, K.SESSION_ENDS}),
+    S.SUSPENDED: frozenset({K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS}),
+    S.STOPPING: frozenset({K.UNVERIFIED, K.MAY_RUN, K.PASSING}),
+    S.TRIPPED: frozenset({K.AT_REST, K.SETTLED, K.QUIET, K.SESSION_ENDS}),
+    S.UNCONTROLLABLE: frozenset({K.UNVERIFIED, K.MAY_RUN}),
+}  # fmt: skip
+
+
+def _of(kind: Kind) -> frozenset[State]:
+    return frozenset(state for state, kinds in TABLE.items() if kind in kinds)
+
+
+def ordered(states: frozenset[State]) -> tuple[State, ...]:
+    """In the order in which a bay usually goes through them."""
+    return tuple(state for state in State if state in states)
+
+
+ENERGISED, PRECHARGING, AT_WORK = _of(K.ENERGISED), _of(K.PRECHARGING), _of(K.AT_WORK)
+UNVERIFIED, UNSEEN = _of(K.UNVERIFIED), _of(K.UNSEEN)
+AT_REST, RESTING, SETTLED, QUIET = _of(K.AT_REST), _of(K.RESTING), _of(K.SETTLED), _of(K.QUIET)
+STARTABLE, READY, OBEYS, MAY_RUN = _of(K.STARTABLE), _of(K.READY), _of(K.OBEYS), _of(K.MAY_RUN)
+SESSION_ENDS, ALIKE, PASSING = _of(K.SESSION_ENDS), _of(K.ALIKE), _of(K.PASSING)
+#: In these standby comes first: what else there is decides only then.
+UNPROVED = UNVERIFIED | {State.OFFLINE}
