@@ -23,7 +23,7 @@ from orchestrator.model import ActiveFault, Cause, Effect, State
 Faults = tuple[ActiveFault, ...]
 
 
-class Course(NamedTuple):
+class Next(NamedTuple):
     """Where a bay goes next."""
 
     trigger: Trigger | None  #: None: it stays
@@ -46,7 +46,7 @@ LEADS = {
 }
 
 
-def course(f: Facts, faults: Faults) -> Course:
+def course(f: Facts, faults: Faults) -> Next:
     """The trigger for now (None: stay) and why the bay is, or goes, where it is."""
     state = f.memory.state
     if state in ENERGISED:
@@ -56,20 +56,20 @@ def course(f: Facts, faults: Faults) -> Course:
     return _stopping(f, faults)
 
 
-def _energised(f: Facts, faults: Faults) -> Course:
+def _energised(f: Facts, faults: Faults) -> Next:
     if faults and faults[0].effect >= Effect.PAUSE:
-        return Course(Trigger.STOP, faults[0].cause)
+        return Next(Trigger.STOP, faults[0].cause)
     asked = f.memory.operator.hold or ending(f) or (Cause("operator_pause") if f.memory.operator.paused else None)
     if asked is not None:
-        return Course(Trigger.STOP, asked)
+        return Next(Trigger.STOP, asked)
     if f.memory.state is State.CHARGING:
         full = finished(f)
         if full is not None:
             session = f.memory.session
             known = battery.charged_full(f, all_the_way=goes_full(f) or bool(session is not None and session.full))
             cause = Cause.of("full", key=full.key, place=full.place, what=full)
-            return Course(Trigger.STOP, cause, {"battery": known})
-        return Course(None, _charging(f, faults))
+            return Next(Trigger.STOP, cause, {"battery": known})
+        return Next(None, _charging(f, faults))
     return _precharging(f)
 
 
@@ -95,11 +95,11 @@ def _holds(f: Facts) -> Cause | None:
     return f.rules.by_policy("held_at_the_top", "finish.hold_min", left_min=left_min)
 
 
-def _precharging(f: Facts) -> Course:
+def _precharging(f: Facts) -> Next:
     memory, rule, by_policy = f.memory, f.rules.policy.precharge, f.rules.by_policy
     session = memory.session
     if rule is None or session is None or f.pack_v is None:  # unknown means no, whoever lets it come to this
-        return Course(Trigger.STOP, Cause("precharge_impossible"))
+        return Next(Trigger.STOP, Cause("precharge_impossible"))
     pulse = memory.state is State.PRECHARGE_PULSE
     target_v = rule.pulse.until_v if pulse else rule.below_v
     now = stage.reaches(f, memory.stage, holds=f.pack_v >= target_v)
@@ -109,81 +109,81 @@ def _precharging(f: Facts) -> Course:
     reached = now.reached_s is not None and f.now_s - now.reached_s >= REACHED_S
     if pulse and reached:
         why = by_policy("pack_reached", "precharge.pulse.until_v", target_v=target_v)
-        return Course(Trigger.CONTINUE, why, changes)
+        return Next(Trigger.CONTINUE, why, changes)
     if pulse and session.pulse_s >= rule.pulse.max_min * 60:
         why = by_policy("pulses_over", "precharge.pulse.max_min", limit_min=rule.pulse.max_min)
-        return Course(Trigger.CONTINUE, why, changes)
+        return Next(Trigger.CONTINUE, why, changes)
     if reached:
         why = by_policy("pack_reached", "precharge.below_v", target_v=target_v)
-        return Course(Trigger.CHARGE, why, changes)
+        return Next(Trigger.CHARGE, why, changes)
     kind = "pulse" if pulse else "continuous"
-    return Course(None, by_policy(f"precharging_{kind}", f"precharge.{kind}", below_v=rule.below_v), changes)
+    return Next(None, by_policy(f"precharging_{kind}", f"precharge.{kind}", below_v=rule.below_v), changes)
 
 
-def _stopping(f: Facts, faults: Faults) -> Course:
+def _stopping(f: Facts, faults: Faults) -> Next:
     state, memory = f.memory.state, f.memory
     if verified(f):
         return _rest(f, faults)
     if gives_up(f):
-        return Course(Trigger.GIVE_UP, out_of_control(f))
+        return Next(Trigger.GIVE_UP, out_of_control(f))
     if state is State.UNCONTROLLABLE:
-        return Course(None, out_of_control(f))
+        return Next(None, out_of_control(f))
     if state is State.STARTING and not memory.stop.unverified and not f.charger.online and f.state_s >= LOST_S:
-        return Course(Trigger.LOSE, offline(f))
-    return Course(None, memory.cause)
+        return Next(Trigger.LOSE, offline(f))
+    return Next(None, memory.cause)
 
 
-def _resting(f: Facts, faults: Faults) -> Course:
+def _resting(f: Facts, faults: Faults) -> Next:
     fresh = next((x for x in faults if x.since_s == f.now_s and x.effect >= Effect.STOP), None)
     if fresh is not None and f.charger.online:
-        return Course(Trigger.STOP, fresh.cause)
+        return Next(Trigger.STOP, fresh.cause)
     if f.runs:
-        return Course(Trigger.STOP, Cause("runs_uncommanded"))
+        return Next(Trigger.STOP, Cause("runs_uncommanded"))
     if f.unordered:
-        return Course(Trigger.STOP, current_without_order(f) or f.memory.cause)
+        return Next(Trigger.STOP, current_without_order(f) or f.memory.cause)
     if f.memory.state is State.OFFLINE and not f.stopped:
         answers = f.charger.online and f.reading is not None
-        return Course(None, Cause("stopped_first") if answers else offline(f))
+        return Next(None, Cause("stopped_first") if answers else offline(f))
     return _rest(f, faults)
 
 
-def _rest(f: Facts, faults: Faults) -> Course:
+def _rest(f: Facts, faults: Faults) -> Next:
     """Where a bay whose charger stands by belongs."""
     trigger, why = resting_place(f, faults)
     state = f.memory.state
     if state is State.TRIPPED:
         if trigger is Trigger.TRIP:
-            return Course(None, why)
-        return Course(Trigger.RESET, held(f, RESET))
+            return Next(None, why)
+        return Next(Trigger.RESET, held(f, RESET))
     if state is State.QUALIFYING and trigger is Trigger.QUALIFY:
         return _qualifying(f)
     if trigger is Trigger.QUALIFY and state not in STARTABLE:
-        return Course((Trigger.REST if f.memory.session is None else Trigger.SUSPEND), why)
-    return Course((None if LEADS.get(trigger) is state else trigger), why)
+        return Next((Trigger.REST if f.memory.session is None else Trigger.SUSPEND), why)
+    return Next((None if LEADS.get(trigger) is state else trigger), why)
 
 
-def _qualifying(f: Facts) -> Course:
+def _qualifying(f: Facts) -> Next:
     known = f.memory.stage
     not_yet = Cause.of("waits_for_values", missing=f.missing) if not f.present else None
     if not f.connected:
         not_yet = not_yet or Cause("waits_for_contactor")
     if not_yet is not None:
-        return Course(None, not_yet, {"stage": stage.not_qualified(known)})
+        return Next(None, not_yet, {"stage": stage.not_qualified(known)})
     known = stage.qualifies(f, known)
     if not _qualified(f, known.qualified_s):
-        return Course(None, Cause("checking"), {"stage": known})
+        return Next(None, Cause("checking"), {"stage": known})
     waits = f.snapshot.waits
     changes = {"stage": stage.is_ready(known, intends=waits is None)}
     if waits is not None:
-        return Course(None, waits, changes)
+        return Next(None, waits, changes)
     if not f.snapshot.running_kept:
-        return Course(None, Cause("writing_down"), changes)
+        return Next(None, Cause("writing_down"), changes)
     rule = f.rules.policy.precharge
     if f.rules.manual and rule is not None and f.pack_v is not None and f.pack_v < rule.below_v:
         below = f.rules.by_policy("needs_pulses", "precharge.below_v", pack_v=f.pack_v, below_v=rule.below_v)
-        return Course(Trigger.PULSE, below, changes)
+        return Next(Trigger.PULSE, below, changes)
     why = Cause.of("qualified", pack_v=f.pack_v, soc_pct=f.soc, pack_c=f.temperature_c)
-    return Course(Trigger.CHARGE, why, changes)
+    return Next(Trigger.CHARGE, why, changes)
 
 
 def _qualified(f: Facts, since_s: float | None) -> bool:

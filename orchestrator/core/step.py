@@ -3,8 +3,6 @@
 facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the order.
 """
 
-from functools import cache
-
 from orchestrator.core import latches, limits, rows
 from orchestrator.core.alarm import alarm
 from orchestrator.core.contactor import closes
@@ -144,13 +142,8 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoin
                 tables=rows.lowered(memory.tables, chosen.key) if lower else memory.tables,
             )
         )
-    return f, _told(memory.state, chosen.index), chosen
-
-
-@cache  # one for each stage and step
-def _told(state: State, index: int) -> Setpoint:
-    mode, precharge = SETPOINTS[state]
-    return Setpoint(run=True, current_limit=index, charge_mode=mode, precharge=precharge)
+    mode, precharge = SETPOINTS[memory.state]
+    return f, Setpoint(run=True, current_limit=chosen.index, charge_mode=mode, precharge=precharge), chosen
 
 
 def _order(f: Facts, setpoint: Setpoint, faults: tuple[ActiveFault, ...]) -> tuple[Command | None, Sequence]:

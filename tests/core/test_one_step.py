@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from orchestrator.core import latches
-from orchestrator.core.course import Course, course
+from orchestrator.core.course import Next, course
 from orchestrator.core.facts import Facts
 from orchestrator.core.history import entered, update_history
 from orchestrator.core.history.battery import Warmth, thinned
@@ -39,7 +39,7 @@ from tests.core.said import cause, said
 from tests.core.world import bay
 
 
-def course_of(f: Facts) -> Course:
+def course_of(f: Facts) -> Next:
     return course(f, latches.shown(f.memory.faults, f.now_s))
 
 

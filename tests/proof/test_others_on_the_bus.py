@@ -22,7 +22,7 @@ START_S, END_S = 6.0, 40.0
 
 
 @dataclass
-class Course:
+class Next:
     """What became of one bay."""
 
     states: list[State] = field(default_factory=list)
@@ -32,9 +32,9 @@ class Course:
     reads_s: float = 0.0  #: the oldest that volts were while current flowed
 
 
-def played(come: Callable[[World], object], *, end_s: float = END_S, main_loop: bool = True, **battery: Any) -> Course:
+def played(come: Callable[[World], object], *, end_s: float = END_S, main_loop: bool = True, **battery: Any) -> Next:
     """A bay that charges from the beginning; `come(world)` happens at START_S."""
-    course, pack = Course(), PACKS["demo"]()
+    course, pack = Next(), PACKS["demo"]()
     pack.set_soc(30.0)
     the_station = station([ControlMode.MANUAL], [POLICIES["demo"]], **battery)
     with world(the_station, [Nature(pack, main_loop=main_loop, speed=0.1)], end_s=end_s + 60.0) as made:

@@ -11,7 +11,7 @@ from orchestrator import model
 from orchestrator.core import course as course_module
 from orchestrator.core import latches, machine, operator, safestop
 from orchestrator.core import step as step_module
-from orchestrator.core.course import Course
+from orchestrator.core.course import Next
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.machine import Trigger
@@ -133,7 +133,7 @@ def absent_battery_is_waited_for(patch: Patch) -> None:
     stopping = course_module._stopping
     patch.setattr(
         course_module, "_stopping",
-        lambda f, faults: Course(None, f.memory.cause) if f.departed and f.state_s < 60 else stopping(f, faults),
+        lambda f, faults: Next(None, f.memory.cause) if f.departed and f.state_s < 60 else stopping(f, faults),
     )  # fmt: skip
 
 
