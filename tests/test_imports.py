@@ -293,7 +293,6 @@ SILENT = ("core",)
 WORD, WORDS = re.compile("[a-z]{2,}"), 3
 #: (module, the beginning of what is still said there)
 SAID = frozenset({
-    ("core.limits", ""),  # what binds the current: key and place are data, the sentence is English still
     ("core.machine", " is not possible in "),  # an error of the program, for who mends it
 })  # fmt: skip
 

@@ -68,7 +68,6 @@ TEXTS: Mapping[str, str] = {
     "full_by_all": "{whats:and}",
     "rises": "a higher step is allowed, and taken after {hold_s:g} s{at}",
     "charges_by_itself": "the charger charges by itself (automatic mode)",
-    "limit": "{text}",
     "precharge_step": "precharge is always on the lowest step",
     # before a charge
     "checking": "checking charger and battery before a charge",

@@ -68,7 +68,6 @@ TEXTS: Mapping[str, str] = {
     "full_by_all": "{whats:and}",
     "rises": "더 높은 단계가 허용되어 {hold_s:g} s 후에 적용됩니다{at}",
     "charges_by_itself": "충전기가 스스로 충전합니다(자동 모드)",
-    "limit": "{text}",
     "precharge_step": "프리차지는 항상 가장 낮은 단계로 합니다",
     # before a charge
     "checking": "충전 전에 충전기와 배터리를 확인하고 있습니다",
