@@ -5,6 +5,10 @@ by itself, a refusal is answered.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from orchestrator.model import Cause
 
 
 class OrchestratorError(Exception):
@@ -33,7 +37,15 @@ class ConfigError(OrchestratorError):
         self.findings = findings
 
 
-class LinkError(OrchestratorError):
+class CauseError(OrchestratorError):
+    """One that is told as data: its sentence is made at the edge, in the language of who reads it."""
+
+    def __init__(self, cause: "Cause") -> None:
+        super().__init__(f"{cause.id} ({', '.join(f'{name}={value}' for name, value in cause.params)})")
+        self.cause = cause
+
+
+class LinkError(CauseError):
     """A port or a bus cannot be used now: unplugged, stalled, busy, down. It may come back."""
 
 
@@ -59,3 +71,7 @@ class ServiceError(OrchestratorError):
 
 class NoServiceError(ServiceError):
     """The service cannot be reached: whatever is to be done must be done without it."""
+
+
+class RequestError(CauseError):
+    """A request to the running service is not understood, or cannot be done."""

@@ -18,9 +18,9 @@ ROOT = Path(__file__).resolve().parent.parent / PACKAGE
 
 #: Part of the package → the parts, or single modules of them, that it may import besides itself.
 EDGES: dict[str, tuple[str, ...]] = {
-    "errors": (),
     "keys": (),
     "model": (),
+    "errors": ("model",),
     # Core makes causes; sentences are made of them at the edges only.
     "text": ("model",),
     "protocol": ("errors", "keys", "model"),
@@ -35,7 +35,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol",
         "text",
     ),
-    "commissioning": ("config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile"),
+    "commissioning": (
+        "config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile", "text",
+    ),
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
     "sim": ("model", "protocol.objects"),
     # What it checks and tries is the core itself, on the models of the emulators, without any line between them.

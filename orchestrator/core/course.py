@@ -68,7 +68,7 @@ def _energised(f: Facts, faults: Faults) -> Course:
 
 
 def _ending(f: Facts) -> Cause | None:
-    return Cause.of("service_ends", why=f.snapshot.ending) if f.snapshot.ending else None
+    return Cause.of("service_ends", why=f.snapshot.ending) if f.snapshot.ending is not None else None
 
 
 def _charging(f: Facts, faults: Faults) -> Cause:
@@ -213,9 +213,7 @@ def _absent(f: Facts) -> tuple[Trigger, Cause] | None:
         return None
     if not f.departed:
         id_ = "bmu_just_booted" if f.just_booted else "bmu_does_not_answer"
-        what = Cause.of(id_, node_id=f.rules.bay.battery.node_id)
-        if f.battery.problem:
-            what = Cause.of("bmu_problem", problem=f.battery.problem)
+        what = f.battery.problem or Cause.of(id_, node_id=f.rules.bay.battery.node_id)
         return Trigger.LOSE, Cause.of("battery_not_heard", charger_v=f.volts or 0.0, what=what)
     return Trigger.REST, Cause("battery_absent")
 

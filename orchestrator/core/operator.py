@@ -23,12 +23,12 @@ OWN = frozenset({STOPPED, RESET})
 OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 
-def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Cause | None:
+def hear(memory: Memory, request: Request, now_s: float, unkept: Cause | None = None) -> Cause | None:
     """Change the memory as the operator asks; None when it was done, else why not.
 
     What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
     """
-    if unkept and request in (Request.START, Request.RESET):
+    if unkept is not None and request in (Request.START, Request.RESET):
         return Cause.of("not_done", problem=unkept)
     return VERBS[request](memory, now_s)
 

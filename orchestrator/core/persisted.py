@@ -11,7 +11,7 @@ from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.model import ENERGISED, Cause, Session, State
-from orchestrator.model.cause import together
+from orchestrator.model.cause import said, together
 
 #: In these a charger may be delivering current.
 RUNNING = ENERGISED | {State.STOPPING, State.UNCONTROLLABLE}
@@ -165,6 +165,4 @@ def from_first_format(name: str, text: str) -> PersistedFault:
     row = ROW.get(name)
     backoff = row is not None and row.clear is Clear.BACKOFF  # it would not have been kept with fewer strikes
     strikes = (0.0,) * (len(BACKOFF_S) + 1) if backoff else ()
-    return PersistedFault(
-        Cause.of("said", text=text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes
-    )
+    return PersistedFault(said(text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes)

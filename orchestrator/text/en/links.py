@@ -45,7 +45,7 @@ TEXTS: Mapping[str, str] = {
     "evidence_old": "{order:word}: the readings that it rests on are {age_s:.1f} s too old",
     "above_station_v": "{order:word}: {voltage_v:g} V is above the station's {limit_v:g} V",
     "outside_station_c": "{order:word}: {pack_c:g} °C is outside the station's {low_c:g} … {high_c:g} °C",
-    "step_unknown": "{order:word}: what the charger's current limit {step} means is not known",
+    "step_unknown": "{order:word}: what the charger's current limit {step:d} means is not known",
     "above_station_a": "{order:word}: step {step} is {step_a:g} A, above the station's {limit_a:g} A",
     # a contactor's GPIO line
     "gpio_missing": "{chip} line {line}: no such GPIO chip: check the name in the station file (gpiodetect lists them)",

@@ -41,7 +41,7 @@ TEXTS: Mapping[str, str] = {
     "evidence_old": "{order:word}: 근거가 되는 값이 {age_s:.1f} s만큼 오래되었습니다",
     "above_station_v": "{order:word}: {voltage_v:g} V는 스테이션의 한계 {limit_v:g} V를 넘습니다",
     "outside_station_c": "{order:word}: {pack_c:g} °C는 스테이션의 범위 {low_c:g} … {high_c:g} °C를 벗어납니다",
-    "step_unknown": "{order:word}: 충전기의 전류 제한 {step}의 의미를 알 수 없습니다",
+    "step_unknown": "{order:word}: 충전기의 전류 제한 {step:d}의 의미를 알 수 없습니다",
     "above_station_a": "{order:word}: 단계 {step}은(는) {step_a:g} A로 스테이션의 한계 {limit_a:g} A를 넘습니다",
     # a contactor's GPIO line
     "gpio_missing": "{chip} 라인 {line}: GPIO 칩이 없습니다: 스테이션 파일의 이름을 확인하십시오(gpiodetect로 확인)",
