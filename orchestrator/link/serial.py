@@ -21,7 +21,8 @@ from serial.rs485 import RS485Settings
 
 from orchestrator.errors import LinkError
 from orchestrator.lastresort import line_settings
-from orchestrator.lastresort.port_owner import holder
+from orchestrator.lastresort.port_owner import Holder, holder
+from orchestrator.model import Cause
 
 BAUD = 19200  #: 8 data bits, no parity, 1 stop bit, no flow control (protocol 2/2, §2.2.2)
 BYTE_S = 10 / BAUD  #: start bit, 8 data bits, stop bit: 0.52 ms
@@ -31,35 +32,24 @@ _READ_SIZE = 4096  #: more than a line can bring in several slots
 #: What pyserial 3.5 raises when a port is unplugged, closed, odd or not there (SerialException is an OSError).
 _FAILURES = (OSError, termios.error, TypeError, ValueError)
 
-_MISSING = "no such port: check that the adapter is plugged in, and the name (ls -l /dev/serial/by-path)"
-_GONE = "the adapter was unplugged or lost its power, or another program reads this port; plug it in again"
-_BUSY = "in use: another program holds it, or two bays name the same port; close the other one (lsof shows it)"
-_FORBIDDEN = "permission denied: add the user that runs this to the group dialout, then log in again"
-_NO_PORT = "it is no serial port: check the name in the station file (ls -l /dev/serial/by-path)"
-_STUBBORN = f"its driver does not take the charger's settings, {BAUD} baud 8N1; use another adapter"
 _ESSENTIAL = ("baud", "data bits", "parity")  #: else no charger understands a word
-_STALLED = f"stalled, it took nothing for {WRITE_TIMEOUT_S:g} s; unplug the adapter and plug it in again"
-_TAKEN = (
-    "another program has opened it for itself alone (TIOCEXCL), so that nobody else can stop this charger: end that "
-    "program{who}, or cut the charger's mains"
-)
-_FULL = "too many open files: raise the limit of the service (LimitNOFILE)"
+_GONE = "port_gone"
 
-#: What a person has to know and do, by what the kernel says.
-_SENTENCES = {
-    errno.ENOENT: _MISSING,
-    errno.EACCES: _FORBIDDEN,
-    errno.EPERM: _FORBIDDEN,
-    errno.EAGAIN: _BUSY,  # its lock (flock) is taken
-    errno.EBUSY: _TAKEN,
+#: The cause, by what the kernel says; each says what to do.
+_CAUSES = {
+    errno.ENOENT: "port_missing",
+    errno.EACCES: "port_forbidden",
+    errno.EPERM: "port_forbidden",
+    errno.EAGAIN: "port_busy",  # its lock (flock) is taken
+    errno.EBUSY: "port_taken",
     errno.EIO: _GONE,
     errno.ENXIO: _GONE,
     errno.ENODEV: _GONE,
-    errno.ENOTTY: _NO_PORT,
-    errno.EINVAL: _NO_PORT,
-    errno.EISDIR: _NO_PORT,
-    errno.EMFILE: _FULL,
-    errno.ENFILE: _FULL,
+    errno.ENOTTY: "port_not_serial",
+    errno.EINVAL: "port_not_serial",
+    errno.EISDIR: "port_not_serial",
+    errno.EMFILE: "port_too_many_files",
+    errno.ENFILE: "port_too_many_files",
 }
 
 
@@ -75,10 +65,11 @@ class SerialLine:
         self._writable = select.poll()
         self._writable.register(self._fd, select.POLLOUT)
         self._tolerated = ""
-        self.restore()  # pyserial does not set all of it; output may be suspended, say
-        self._tolerated = self.restore()  # what the driver does not take is nobody else's doing
+        self._restore()  # pyserial does not set all of it; output may be suspended, say
+        self._tolerated = self._restore()  # what the driver does not take is nobody else's doing
         if any(word in self._tolerated for word in _ESSENTIAL):
-            raise LinkError(f"{self._path}: {_STUBBORN} ({self._tolerated})")
+            found = tuple(self._tolerated.split(", "))
+            raise LinkError(Cause.of("port_stubborn", port=self._path, baud=BAUD, found=found))
 
     @classmethod
     def open(cls, path: str, *, kernel_rs485: bool = False) -> Self:
@@ -100,25 +91,25 @@ class SerialLine:
                 port.rs485_mode = RS485Settings()
             except _FAILURES as error:
                 port.close()
-                raise LinkError(
-                    f"{path}: its driver cannot switch the direction of an RS-485 line (rs485: kernel); "
-                    "use an adapter that switches by itself, with rs485: off"
-                ) from error
+                raise LinkError(Cause.of("port_not_rs485", port=path)) from error
         try:
             return cls(port, locked=locked)
         except LinkError:
             port.close()
             raise
 
-    def restore(self) -> str:
-        """Set the port up again if another program has changed it; what was found, in words, "" where all was well."""
+    def restore(self) -> Cause | None:
+        """Set the port up again if another program has changed it; what was found, None where all was well."""
+        return _settings(self._restore())
+
+    def _restore(self) -> str:
         try:
             return line_settings.restore(self._port.fileno(), self._tolerated)
         except _FAILURES as error:
             raise self._failed(error) from error
 
-    def locked_by(self) -> str:
-        """Which program holds the port's lock instead of us, "" once it is ours: it is asked for again each time."""
+    def locked_by(self) -> Cause | None:
+        """Which program holds the port's lock instead of us, None once it is ours: it is asked for again each time."""
         try:
             fd = self._port.fileno()
             line_settings.share(fd)
@@ -126,10 +117,10 @@ class SerialLine:
                 fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._locked = True
         except BlockingIOError:
-            return str(holder(self._path, (os.getpid(), os.getppid())))
+            return _program(holder(self._path, (os.getpid(), os.getppid())))
         except _FAILURES as error:
             raise self._failed(error) from error
-        return ""
+        return None
 
     def write(self, data: bytes) -> None:
         """Hand `data` to the port; it is on the wire `BYTE_S` a byte later. LinkError if the line takes nothing."""
@@ -140,7 +131,7 @@ class SerialLine:
                 raise serial.SerialTimeoutException
         except (serial.SerialTimeoutException, BlockingIOError) as error:
             self._forget_output()
-            raise LinkError(f"{self._path}: {_STALLED}") from error
+            raise LinkError(Cause.of("port_stalled", port=self._path, limit_s=WRITE_TIMEOUT_S)) from error
         except _FAILURES as error:
             raise self._failed(error) from error
 
@@ -186,7 +177,7 @@ class SerialLine:
             return  # then there is no port left that could send it
 
     def _failed(self, error: Exception) -> LinkError:
-        return LinkError(f"{self._path}: {_sentence(error, self._path, otherwise=_GONE)}")
+        return LinkError(_cause(error, self._path, otherwise=_GONE))
 
 
 def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
@@ -204,7 +195,7 @@ def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
                 raise
             port.open()
     except _FAILURES as error:
-        raise LinkError(f"{path}: {_sentence(error, path, otherwise='cannot be opened')}") from error
+        raise LinkError(_cause(error, path, otherwise="port_failed")) from error
     return port
 
 
@@ -223,19 +214,33 @@ def _taken_back(path: str) -> bool:
             os.close(fd)
 
 
-def _sentence(error: BaseException, path: str, *, otherwise: str) -> str:
-    """The words for an error, by its errno."""
+def _cause(error: BaseException, path: str, *, otherwise: str) -> Cause:
+    """What has gone wrong, by its errno; `otherwise`: by what pyserial has said."""
     number = _number(error)
     if number is None:
-        return f"{otherwise} ({error})"
-    sentence = _SENTENCES.get(number) or f"{otherwise} ({os.strerror(number)})"
-    return sentence.format(who=_who(path)) if "{who}" in sentence else sentence
+        return Cause.of(otherwise, port=path, error=str(error))
+    id_ = _CAUSES.get(number, otherwise)
+    if id_ == "port_taken":
+        found = holder(path, (os.getpid(),))
+        return Cause.of(id_, port=path, program=_program(found) if found.pid else None)
+    return Cause.of(id_, port=path, error=errno.errorcode.get(number, str(number)))
 
 
-def _who(path: str) -> str:
-    """ " gpsd (pid 812)", "" where that cannot be told."""
-    found = holder(path, (os.getpid(),))
-    return f" {found}" if found.pid else ""
+def _program(found: Holder) -> Cause:
+    return Cause.of("program", name=found.name, pid=found.pid) if found.pid else Cause("program_unknown")
+
+
+def _settings(found: str) -> Cause | None:
+    """What `line_settings` has found: speeds and disciplines with their numbers, all else by its word."""
+    return Cause.of("settings_found", found=tuple(map(_setting, found.split(", ")))) if found else None
+
+
+def _setting(word: str) -> str | Cause:
+    first, _, last = word.partition(" ")
+    if last == "baud" and first.isdecimal():
+        return Cause.of("baud", baud=int(first))
+    number = word.removeprefix("line discipline ")
+    return Cause.of("line_discipline", number=int(number)) if number != word else word
 
 
 def _number(error: BaseException) -> int | None:

@@ -15,7 +15,7 @@ TEXTS: Mapping[str, str] = {
     "port_forbidden": "{port}: permission denied: add the user that runs this to the group dialout, then log in again",
     "port_not_serial": "{port}: it is no serial port: check the name in the station file (ls -l /dev/serial/by-path)",
     "port_stubborn": "{port}: its driver does not take the charger's settings, {baud} baud 8N1; use another adapter "
-    "({found})",
+    "({found:word})",
     "port_stalled": "{port}: stalled, it took nothing for {limit_s:g} s; unplug the adapter and plug it in again",
     "port_taken": "{port}: another program has opened it for itself alone (TIOCEXCL), so that nobody else can stop this "
     "charger: end that program, or cut the charger's mains{program:after}",

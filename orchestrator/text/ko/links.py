@@ -13,7 +13,7 @@ TEXTS: Mapping[str, str] = {
     "port_forbidden": "{port}: 권한이 없습니다: 실행 사용자를 dialout 그룹에 추가한 뒤 다시 로그인하십시오",
     "port_not_serial": "{port}: 시리얼 포트가 아닙니다: 스테이션 파일의 이름을 확인하십시오(ls -l /dev/serial/by-path)",
     "port_stubborn": "{port}: 드라이버가 충전기의 설정({baud} baud 8N1)을 받아들이지 않습니다. 다른 어댑터를 "
-    "사용하십시오({found})",
+    "사용하십시오({found:word})",
     "port_stalled": "{port}: {limit_s:g} s 동안 아무것도 받아들이지 않습니다. 어댑터를 뽑았다가 다시 꽂으십시오",
     "port_taken": "{port}: 다른 프로그램이 이 포트를 독점으로 열어(TIOCEXCL) 아무도 이 충전기를 정지할 수 없습니다: 그 "
     "프로그램을 종료하거나 충전기의 주전원을 차단하십시오{program:after}",
