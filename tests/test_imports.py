@@ -33,7 +33,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol",
-        "text",
+        "show", "text",
     ),
     "commissioning": (
         "config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile", "text",
@@ -87,7 +87,9 @@ CLOCKS = frozenset({
     "time_ns",
 })  # fmt: skip
 
-MAX_FILE_LINES = 300
+MAX_FILE_LINES = 250
+#: Longer for the time being, until they are cut.
+LONGER: dict[str, int] = {"core.course": 280, "core.track": 270}
 MAX_FUNCTION_LINES = 40
 
 
@@ -195,8 +197,9 @@ def light_packages(module: Module) -> Iterator[str]:
 def sizes(module: Module) -> Iterator[str]:
     """Files and functions that fit into a head."""
     lines = module.source.count("\n")
-    if lines > MAX_FILE_LINES:
-        yield f"{module.name}: {lines} lines, allowed are {MAX_FILE_LINES}"
+    allowed = LONGER.get(module.name, MAX_FILE_LINES)
+    if lines > allowed:
+        yield f"{module.name}: {lines} lines, allowed are {allowed}"
     for node in module.nodes():
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             length = (node.end_lineno or node.lineno) - node.lineno + 1
@@ -263,7 +266,7 @@ BROKEN: tuple[tuple[Rule, str, str], ...] = (
     (clocks, "config.load", "from datetime import datetime"),
     (light_packages, "config", "from orchestrator.config.load import load"),
     (light_packages, "", "import orchestrator.cli"),
-    (sizes, "core.step", "x = 1\n" * 301),
+    (sizes, "core.step", "x = 1\n" * 251),
     (sizes, "core.step", "def f():\n" + "    x = 1\n" * 40),
 )
 

@@ -14,7 +14,8 @@ import pytest
 
 from orchestrator.config.station import ChargerConfig, Limits
 from orchestrator.devices import line_quality
-from orchestrator.devices.charger import LOOK_S, REOPEN_S, ChargerPort, Line
+from orchestrator.devices.charger import LOOK_S, REOPEN_S, ChargerPort
+from orchestrator.devices.charger_line import ChargerLine
 from orchestrator.errors import LinkError
 from orchestrator.interlock import Grant
 from orchestrator.keys import Range
@@ -55,7 +56,7 @@ def good(seconds: float = 60.0) -> Grant:
 class Bench:
     """One running port."""
 
-    def __init__(self, path: str, control: ControlMode, open_line: Callable[[], Line] | None = None) -> None:
+    def __init__(self, path: str, control: ControlMode, open_line: Callable[[], ChargerLine] | None = None) -> None:
         self.seen: list[tuple[ChargerReading | None, ChargerLink]] = []
         self.upset: Exception | None = None
         config = ChargerConfig(port=path, control=control, steps_a=(2.0, 5.0, 8.0, 11.0, 14.0))
@@ -105,7 +106,7 @@ class Bench:
 
 @contextmanager
 def running(
-    path: str, control: ControlMode = ControlMode.MANUAL, open_line: Callable[[], Line] | None = None
+    path: str, control: ControlMode = ControlMode.MANUAL, open_line: Callable[[], ChargerLine] | None = None
 ) -> Iterator[Bench]:
     bench = Bench(path, control, open_line)
     bench.port.start()
@@ -482,7 +483,7 @@ def test_a_port_that_appears_later_works(tmp_path: Path) -> None:
 def test_opening_is_tried_once_a_second(pty: Pty, charger: FakeCharger) -> None:
     tried_s: list[float] = []
 
-    def open_line() -> Line:
+    def open_line() -> ChargerLine:
         tried_s.append(time.monotonic())
         return SerialLine.open(pty.path)
 
@@ -505,7 +506,7 @@ def test_a_port_that_fails_after_a_while_is_opened_at_once_and_its_charger_stopp
 ) -> None:
     lines: list[SerialLine] = []
 
-    def open_line() -> Line:
+    def open_line() -> ChargerLine:
         lines.append(SerialLine.open(pty.path))
         return lines[-1]
 
@@ -642,7 +643,7 @@ def test_an_exception_that_comes_again_each_time_never_ends_the_stops_nor_floods
 def test_an_exception_while_opening_is_told_and_tried_again(pty: Pty, charger: FakeCharger) -> None:
     failures = [RuntimeError("not yet")]
 
-    def open_line() -> Line:
+    def open_line() -> ChargerLine:
         if failures:
             raise failures.pop()
         return SerialLine.open(pty.path)

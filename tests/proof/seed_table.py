@@ -74,7 +74,7 @@ LINES: tuple[Seed, ...] = (
         "the guardian and estop do not look at the line's settings",
         ("another speed, then killed",),
         (
-            f"{LASTRESORT}lastline.py",
+            f"{LASTRESORT}lastport.py",
             "return self._fd is not None and bool(line_settings.restore(self._fd))",
             "return False",
         ),
@@ -741,7 +741,7 @@ WORDS: tuple[Seed, ...] = (
         "orchestrator stop ends with 0 whatever becomes of the stop",
         ("tests/whole/test_operator.py::test_a_stop_that_is_not_obeyed_begins_with_what_to_do",),
         (
-            "orchestrator/cli.py",
+            f"{SERVICE}verbs.py",
             "        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), ",
             "        unverified, then = dict[str, str](), ",
         ),
@@ -815,7 +815,7 @@ BUS: tuple[Seed, ...] = (
         "bus",
         "can_filters in the station file are refused, whatever they let through",
         ("tests/config",),
-        ("orchestrator/config/station_rules.py", "        if passed is None:\n", "        if True:\n"),
+        ("orchestrator/config/can_rules.py", "        if passed is None:\n", "        if True:\n"),
     ),
     part(
         "the kernel filters nothing",
