@@ -66,7 +66,11 @@ class RefusedError(OrchestratorError):
 
 
 class ServiceError(OrchestratorError):
-    """The service cannot be reached or answered with an error."""
+    """The service cannot be reached or answered with an error; `told` is that as data, where the service said so."""
+
+    def __init__(self, text: str, told: object = None) -> None:
+        super().__init__(text)
+        self.told = told
 
 
 class NoServiceError(ServiceError):
@@ -75,3 +79,7 @@ class NoServiceError(ServiceError):
 
 class RequestError(CauseError):
     """A request to the running service is not understood, or cannot be done."""
+
+
+class StartError(CauseError):
+    """The service cannot run here: what it needs is another's, or too little."""

@@ -16,7 +16,7 @@ NOT_OURS = (Verdict.THEIRS, Verdict.FRAGMENT, Verdict.UNCLEAR)
 class NodeHealth:
     """Counts what is odd about a node."""
 
-    __slots__ = ("_babbling", "_doubled", "_frames", "_last", "_why", "_strays", "_window_s")
+    __slots__ = ("_babbling", "_doubled", "_frames", "_last", "_strays", "_why", "_window_s")
 
     def __init__(self) -> None:
         self._frames = 0

@@ -180,5 +180,14 @@ def _new_values(old: BatteryReading, new: BatteryReading) -> dict[str, object]:
 
 
 def _plain(record: ChargerReading | BatteryLink | Measurement | None) -> dict[str, object] | None:
-    """A record without records in it. Twenty times as fast as `asdict`, and this is done for every reading."""
-    return {name: getattr(record, name) for name in record.__slots__} if record is not None else None
+    """A record without records in it but causes. Twenty times as fast as `asdict`, and this is done for every reading."""
+    return {name: _bare(getattr(record, name)) for name in record.__slots__} if record is not None else None
+
+
+def _bare(value: object) -> object:
+    """A value with the causes in it, one or a tuple or mapping of them, as JSON has them."""
+    if isinstance(value, Cause):
+        return plain(value)
+    if isinstance(value, tuple):
+        return [_bare(one) for one in value]
+    return {name: _bare(one) for name, one in value.items()} if isinstance(value, Mapping) else value

@@ -79,7 +79,7 @@ TEXTS: Mapping[str, str] = {
     "can_stalled": "the adapter takes nothing any more: unplug it and plug it in again ({error})",
     "can_not_understood": "{error}: check the bus's settings in the station file, and that the interface's driver is "
     "installed",
-    "can_internal": "internal error: {error}",
+    "can_internal": "CAN bus {bus}: internal error: {error}",
     "can_bus_off": "the controller is bus-off; check cable, terminators and bit rate. It recovers by itself only with "
     "{command}",
     "can_passive": "the controller is error-passive: check cable, terminators and bit rate",

@@ -11,7 +11,7 @@ TEXTS: Mapping[str, str] = {
     "ending": "{why}: stopping every bay",
     "ended": "ended: {verdicts:then}",
     "ended_well": "ended: every charger stands by, verified",
-    "not_verified": "NOT verified: {chargers}",
+    "not_verified": "NOT verified: {chargers:word}",
     "not_written": "NOT kept: {problem}",
     # its disk
     "would_forget": "a restart would forget what changes: {problem}",
@@ -36,6 +36,11 @@ TEXTS: Mapping[str, str] = {
     "socket_taken": "control socket: {socket} is another program's by now: end that, or restart this service",
     "socket_lost": "control socket: {socket} was removed by somebody: {error}",
     "socket_again": "control socket: {socket} was removed by somebody; it is there again",
+    "socket_occupied": "{socket} is there already and is no socket: give this station another control.socket",
+    "socket_answered": "another service answers on {socket}: stop it first, or give this station another control.socket",
+    "socket_failed": "the control socket {socket} cannot be opened: {error:word}",
+    "files_limited": "at most {limit} files may be open at once, and this station needs {needed}: raise LimitNOFILE= of "
+    "the unit, or ulimit -n",
     # chargers that no bay has any more
     "stray": "{bay} on {port}",
     "stray_found": "{bay} on {port}: the station file has no bay on this port, but its charger may be running: stopping it",
@@ -43,7 +48,7 @@ TEXTS: Mapping[str, str] = {
     "stray_runs": "{bay} on {port}: its charger runs again: stopping it",
     "stray_dropped": "{bay} on {port}: dropped by the operator: its charger is gone for good",
     "stray_answers": "{bay} on {port}: its charger answers, so it is not gone: it is being stopped",
-    "stray_unknown": "{port}: no charger without a bay is waited for there (waited for: {ports})",
+    "stray_unknown": "{port}: no charger without a bay is waited for there (waited for: {ports:word})",
     "stray_none": "{port}: no charger without a bay is waited for there, or anywhere else",
     # a changed policy
     "reload": "{bay}: reload: {what}",

@@ -118,7 +118,7 @@ TEXTS: Mapping[str, str] = {
     "bay_moved_port": "{bay}은(는) 지난 실행 때 {old_port}에 있었고 지금은 {port}에 있습니다: 배선을 확인하십시오",
     "bay_moved_bmu": "{bay}의 BMU는 지난 실행 때 {old_can}의 노드 0x{old_node_id:02X}였고 지금은 {can}의 노드 0x{node_id:02X}입니다: "
     "배선을 확인하십시오",
-    "state_unreadable": "{file}을(를) 읽을 수 없습니다({error}): 어떤 장애가 래치되어 있었는지 알 수 없습니다",
+    "state_unreadable": "{file}을(를) 읽을 수 없습니다({error:word}): 어떤 장애가 래치되어 있었는지 알 수 없습니다",
     "state_lost": "이 서비스가 여기서 실행된 적이 있는데 {file}이(가) 없습니다: 어떤 장애가 래치되어 있었는지 알 수 없습니다",
     "state_disk_silent": "{directory}의 디스크가 응답하지 않습니다: 어떤 장애가 래치되어 있었는지 알 수 없습니다",
 }

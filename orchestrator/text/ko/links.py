@@ -73,7 +73,7 @@ TEXTS: Mapping[str, str] = {
     "can_needs_msgpack": "udp_multicast에는 msgpack이 필요합니다: pip install msgpack ({error})",
     "can_stalled": "어댑터가 더 이상 아무것도 받아들이지 않습니다: 뽑았다가 다시 꽂으십시오({error})",
     "can_not_understood": "{error}: 스테이션 파일의 버스 설정과 인터페이스 드라이버의 설치를 확인하십시오",
-    "can_internal": "내부 에러: {error}",
+    "can_internal": "CAN 버스 {bus}: 내부 에러: {error}",
     "can_bus_off": "컨트롤러가 bus-off입니다. 케이블, 종단 저항, 비트 레이트를 확인하십시오. 다음 설정에서만 스스로 "
     "복구합니다: {command}",
     "can_passive": "컨트롤러가 error-passive입니다: 케이블, 종단 저항, 비트 레이트를 확인하십시오",

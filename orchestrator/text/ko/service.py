@@ -11,7 +11,7 @@ TEXTS: Mapping[str, str] = {
     "ending": "{why}: 모든 베이를 정지하고 있습니다",
     "ended": "종료했습니다: {verdicts:then}",
     "ended_well": "종료했습니다: 모든 충전기의 대기 상태를 확인했습니다",
-    "not_verified": "대기 상태가 확인되지 않은 충전기: {chargers}",
+    "not_verified": "대기 상태가 확인되지 않은 충전기: {chargers:word}",
     "not_written": "저장되지 않았습니다: {problem}",
     # its disk
     "would_forget": "재시작하면 변경 내용을 잃습니다: {problem}",
@@ -37,6 +37,12 @@ TEXTS: Mapping[str, str] = {
     "재시작하십시오",
     "socket_lost": "제어 소켓: {socket}이(가) 삭제되었습니다: {error}",
     "socket_again": "제어 소켓: {socket}이(가) 삭제되어 다시 만들었습니다",
+    "socket_occupied": "{socket}이(가) 이미 있고 소켓이 아닙니다: 이 스테이션에 다른 control.socket을 지정하십시오",
+    "socket_answered": "다른 서비스가 {socket}에서 응답합니다: 먼저 그 서비스를 정지하거나 이 스테이션에 다른 "
+    "control.socket을 지정하십시오",
+    "socket_failed": "제어 소켓 {socket}을(를) 열 수 없습니다: {error:word}",
+    "files_limited": "동시에 열 수 있는 파일이 최대 {limit}개인데 이 스테이션에는 {needed}개가 필요합니다: unit의 "
+    "LimitNOFILE= 또는 ulimit -n을 올리십시오",
     # chargers that no bay has any more
     "stray": "{port}의 {bay}",
     "stray_found": "{port}의 {bay}: 스테이션 파일에 이 포트의 베이가 없으나 충전기가 동작 중일 수 있어 정지하고 있습니다",
@@ -44,7 +50,7 @@ TEXTS: Mapping[str, str] = {
     "stray_runs": "{port}의 {bay}: 충전기가 다시 동작하여 정지하고 있습니다",
     "stray_dropped": "{port}의 {bay}: 작업자가 제외했습니다. 이 충전기는 완전히 철거되었습니다",
     "stray_answers": "{port}의 {bay}: 충전기가 응답하므로 철거되지 않았습니다. 정지하고 있습니다",
-    "stray_unknown": "{port}: 여기에는 확인을 기다리는, 베이 없는 충전기가 없습니다(기다리는 곳: {ports})",
+    "stray_unknown": "{port}: 여기에는 확인을 기다리는, 베이 없는 충전기가 없습니다(기다리는 곳: {ports:word})",
     "stray_none": "{port}: 여기에도 다른 곳에도 확인을 기다리는, 베이 없는 충전기가 없습니다",
     # a changed policy
     "reload": "{bay}: 다시 읽기: {what}",
