@@ -71,9 +71,7 @@ class BayRunner:
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # nobody to wait for
-        self._written: tuple[Cause | None, bool] | None = (
-            None  # of the contactor: its problem, and whether it is closed
-        )
+        self._written: tuple[Cause | None, bool] | None = None  # of the contactor: problem, closed
         self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
         self._requests = Requests()
         self._internal = ""

@@ -27,7 +27,7 @@ class GuardianLink:
         self._gone: Cause | None = None
 
     def beat(self, now_s: float, *, well: bool) -> Cause | None:
-        """Say that every loop has turned, if that is so. Why the guardian can no more be relied on, None while it can."""
+        """Say that every loop has turned, if that is so. Why the guardian cannot be relied on any more."""
         self._heard_s = now_s if self._heard_s is None or self._answered() else self._heard_s
         if well:
             self._send(BEAT)

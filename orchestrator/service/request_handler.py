@@ -63,7 +63,7 @@ class RequestHandler:
 
         def results() -> Answer | None:
             if self._store.kept_revision >= revision:
-                return {"results": {what: ""}}
+                return self._results({what: None})
             if self._clock() < end_s:
                 return None
             problem = self._store.unkept(self._clock()) or Cause("not_taken")
@@ -97,6 +97,7 @@ class RequestHandler:
 
     def _results(self, answers: Mapping[str, Cause | None]) -> Answer:
         return {
+            "language": self._language,
             "results": {name: say(answer, self._language) for name, answer in answers.items()},
             "causes": {name: plain(answer) for name, answer in answers.items() if answer is not None},
         }

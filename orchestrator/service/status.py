@@ -89,6 +89,7 @@ def station_status(
     """
     return {
         "station": station.station,
+        "language": station.language.value,
         "alarm": _level(alarm),
         "bays": bays,
         "strays": list(strays),
