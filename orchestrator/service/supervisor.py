@@ -60,7 +60,7 @@ class Supervisor:
         self._wake: SimpleQueue[int | None] = SimpleQueue()
         self._ending: Cause | None = None
         boot, kept = boot_id(), station.journal
-        self._console = Console()
+        self._console = Console(language=self._language)
         self._journal = Journal(kept.directory, kept.max_mb, monotonic, time, boot=boot, say=self._say)
         places = [Place.of(bay) for bay in station.bays]
         self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_kept=self._on_kept)

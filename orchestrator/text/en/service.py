@@ -28,6 +28,7 @@ TEXTS: Mapping[str, str] = {
     "journal_again": "the journal is being written again",
     # what it says on standard error
     "service_begins": "{station}: {bays} bays, control socket {socket}",
+    "lines_left_out": "({lines} lines are left out here: nobody has read them in time)",
     "bay_begins": "{bay}: {state}: {reason}",
     "bay_goes": "{bay}: {before} → {state}: {reason}",
     "bay_internal": "{bay}: internal error, stopping: {error}",

@@ -28,6 +28,7 @@ TEXTS: Mapping[str, str] = {
     "journal_again": "저널이 다시 기록되고 있습니다",
     # what it says on standard error
     "service_begins": "{station}: 베이 {bays}개, 제어 소켓 {socket}",
+    "lines_left_out": "(제때 읽지 않아 {lines}줄을 생략했습니다)",
     "bay_begins": "{bay}: {state}: {reason}",
     "bay_goes": "{bay}: {before} → {state}: {reason}",
     "bay_internal": "{bay}: 내부 에러로 정지하고 있습니다: {error}",
