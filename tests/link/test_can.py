@@ -382,7 +382,7 @@ def test_an_echo_that_was_lost_does_not_hide_another_masters_frame(udp: dict[str
     bus.open()
     bus._echo.sent(0x610, OTHER_READ)  # the bus lost it
     bus.send(0x610, READ)
-    listen(bus, lambda: not bus._echo, "our own echo")
+    listen(bus, lambda: not bus._echo._sent, "our own echo")
     with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
         other.send(message(0x610, OTHER_READ))
         listen(bus, lambda: heard, "the other's request")
