@@ -297,7 +297,7 @@ def test_what_is_allowed_is_not_complained_about(name: str, source: str) -> None
 SILENT = (
     "core", "devices", "interlock", "link", "model", "protocol.sdo", "protocol.words", "service", "show",
 )  # fmt: skip
-WORD, WORDS = re.compile("[a-z]{2,}"), 3
+WORD, WORDS = re.compile("[('\"]?[A-Za-z]?[a-z]+['a-z]*[.,;:)'\"]*"), 3
 #: Errors of the program, of files and of the command line are for who mends them, and in English.
 DIAGNOSTICS = frozenset({"ValueError", "RefusedError", "UsageError", "SerialException", "NoServiceError"})
 #: Calls of argparse: what `--help` prints.
@@ -314,6 +314,8 @@ SAID = frozenset({
     *(("service.verbs", said) for said in (  # the command line, and a service that cannot be reached
         "let a bay charge", "stop charging", "clear latched faults", "orchestrator: ", "; to stop chargers without",
     )),
+    ("link.gpio", "used by "),  # what `probe` shows of a line
+    ("service.bay", " in "),  # where an exception of our own was raised
     ("service.where", ""),  # the same
 })  # fmt: skip
 
@@ -331,7 +333,7 @@ def sentences(module: Module) -> Iterator[str]:
         text = " ".join(texts(node))
         said = any(module.name == name and text.startswith(begins) for name, begins in SAID)
         enough = WORDS - isinstance(node, ast.JoinedStr)  # a value is as good as a word
-        if sum(bool(WORD.search(word)) for word in text.split()) >= enough and not said:
+        if sum(bool(WORD.fullmatch(word)) for word in text.split()) >= enough and not said:
             yield f"{module.name}:{getattr(node, 'lineno', 0)}: says {text!r}"
 
 

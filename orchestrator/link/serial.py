@@ -21,7 +21,8 @@ from serial.rs485 import RS485Settings
 
 from orchestrator.errors import LinkError
 from orchestrator.lastresort import line_settings
-from orchestrator.lastresort.port_owner import Holder, holder
+from orchestrator.lastresort.port_owner import holder
+from orchestrator.link.port_cause import GONE, errno_of, port_cause, program, settings_found
 from orchestrator.model import Cause
 
 BAUD = 19200  #: 8 data bits, no parity, 1 stop bit, no flow control (protocol 2/2, §2.2.2)
@@ -33,24 +34,6 @@ _READ_SIZE = 4096  #: more than a line can bring in several slots
 _FAILURES = (OSError, termios.error, TypeError, ValueError)
 
 _ESSENTIAL = ("baud", "data bits", "parity")  #: else no charger understands a word
-_GONE = "port_gone"
-
-#: The cause, by what the kernel says; each says what to do.
-_CAUSES = {
-    errno.ENOENT: "port_missing",
-    errno.EACCES: "port_forbidden",
-    errno.EPERM: "port_forbidden",
-    errno.EAGAIN: "port_busy",  # its lock (flock) is taken
-    errno.EBUSY: "port_taken",
-    errno.EIO: _GONE,
-    errno.ENXIO: _GONE,
-    errno.ENODEV: _GONE,
-    errno.ENOTTY: "port_not_serial",
-    errno.EINVAL: "port_not_serial",
-    errno.EISDIR: "port_not_serial",
-    errno.EMFILE: "port_too_many_files",
-    errno.ENFILE: "port_too_many_files",
-}
 
 
 class SerialLine:
@@ -83,7 +66,7 @@ class SerialLine:
         try:
             port = _open(path, exclusive=True)
         except LinkError as error:
-            if error.__cause__ is None or _number(error.__cause__) != errno.EAGAIN or holder(path).ours:
+            if error.__cause__ is None or errno_of(error.__cause__) != errno.EAGAIN or holder(path).ours:
                 raise
             locked, port = False, _open(path, exclusive=None)
         if kernel_rs485:
@@ -100,7 +83,7 @@ class SerialLine:
 
     def restore(self) -> Cause | None:
         """Set the port up again if another program has changed it; what was found, None where all was well."""
-        return _settings(self._restore())
+        return settings_found(self._restore())
 
     def _restore(self) -> str:
         try:
@@ -117,7 +100,7 @@ class SerialLine:
                 fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._locked = True
         except BlockingIOError:
-            return _program(holder(self._path, (os.getpid(), os.getppid())))
+            return program(holder(self._path, (os.getpid(), os.getppid())))
         except _FAILURES as error:
             raise self._failed(error) from error
         return None
@@ -177,7 +160,7 @@ class SerialLine:
             return  # then there is no port left that could send it
 
     def _failed(self, error: Exception) -> LinkError:
-        return LinkError(_cause(error, self._path, otherwise=_GONE))
+        return LinkError(port_cause(error, self._path, otherwise=GONE))
 
 
 def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
@@ -195,7 +178,7 @@ def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
                 raise
             port.open()
     except _FAILURES as error:
-        raise LinkError(_cause(error, path, otherwise="port_failed")) from error
+        raise LinkError(port_cause(error, path, otherwise="port_failed")) from error
     return port
 
 
@@ -212,43 +195,3 @@ def _taken_back(path: str) -> bool:
     finally:
         with suppress(OSError):
             os.close(fd)
-
-
-def _cause(error: BaseException, path: str, *, otherwise: str) -> Cause:
-    """What has gone wrong, by its errno; `otherwise`: by what pyserial has said."""
-    number = _number(error)
-    if number is None:
-        return Cause.of(otherwise, port=path, error=str(error))
-    id_ = _CAUSES.get(number, otherwise)
-    if id_ == "port_taken":
-        found = holder(path, (os.getpid(),))
-        return Cause.of(id_, port=path, program=_program(found) if found.pid else None)
-    return Cause.of(id_, port=path, error=errno.errorcode.get(number, str(number)))
-
-
-def _program(found: Holder) -> Cause:
-    return Cause.of("program", name=found.name, pid=found.pid) if found.pid else Cause("program_unknown")
-
-
-def _settings(found: str) -> Cause | None:
-    """What `line_settings` has found: speeds and disciplines with their numbers, all else by its word."""
-    return Cause.of("settings_found", found=tuple(map(_setting, found.split(", ")))) if found else None
-
-
-def _setting(word: str) -> str | Cause:
-    first, _, last = word.partition(" ")
-    if last == "baud" and first.isdecimal():
-        return Cause.of("baud", baud=int(first))
-    number = word.removeprefix("line discipline ")
-    return Cause.of("line_discipline", number=int(number)) if number != word else word
-
-
-def _number(error: BaseException) -> int | None:
-    """An error's errno: often pyserial keeps that only in the error's cause or first argument."""
-    cause: BaseException | None = error
-    while cause is not None:
-        number = getattr(cause, "errno", None) or (cause.args[0] if cause.args else None)
-        if isinstance(number, int):
-            return number
-        cause = cause.__context__
-    return None
