@@ -8,6 +8,7 @@ from orchestrator.errors import OrchestratorError, ProtocolError
 from orchestrator.model import (
     STOP,
     Action,
+    Cause,
     ChargeMode,
     ChargerReading,
     Command,
@@ -210,7 +211,9 @@ def test_all_sixteen_kinds_fill_the_largest_frame_with_the_void_ones_last() -> N
     values = parse_values(reply(*range(1, 17)), 0xFF, 0xFF)
     assert (reply_bytes(0xFF, 0xFF), len(STATUS_VALUES)) == (41, 16)
     assert [values[f"void_{bits}"] for bits in ("2000", "4000", "8000", "0020", "0040", "0080")] == [*range(11, 17)]
-    assert say(values["operation"]) == "operation 6 (documented: 0, 1)"
+    operation = values["operation"]
+    assert isinstance(operation, Cause)
+    assert say(operation) == "operation 6 (documented: 0, 1)"
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import LinkError
-from orchestrator.model import STOP, Request, State
+from orchestrator.model import STOP, Cause, Request, State
 from orchestrator.service import bay as bay_module
 from orchestrator.service.contactor import CLOSING_S, REOPEN_S, Contactor
 from orchestrator.service.guarded import GuardedOutput
+from tests.core.said import cause, say
 from tests.service.bench import Bench
 
 GONE = "/dev/gpiochip0 line 17: gone"
@@ -26,14 +27,14 @@ class Line:
 
     def take(self) -> "Line":
         if self.broken:
-            raise LinkError(GONE)
+            raise LinkError(cause(GONE))
         assert not self.held
         self.held, self.closed, self.taken = True, False, self.taken + 1
         return self
 
     def drive(self, *, closed: bool) -> None:
         if self.broken:
-            raise LinkError(GONE)
+            raise LinkError(cause(GONE))
         self.closed = closed
 
     def fileno(self) -> int:
@@ -86,12 +87,12 @@ def test_a_line_that_fails_is_given_back_and_taken_anew_every_second(contactor: 
     contactor.drive(0.0, closed=True)
     line.broken = True
     contactor.drive(0.1, closed=True)
-    assert (contactor.problem, contactor.closed_s, line.held) == (GONE, None, False)
+    assert (say(contactor.problem), contactor.closed_s, line.held) == (GONE, None, False)
     line.broken = False
     contactor.drive(0.0 + REOPEN_S, closed=True)
-    assert (contactor.problem, line.taken) == (GONE, 1)
+    assert (say(contactor.problem), line.taken) == (GONE, 1)
     contactor.drive(0.1 + REOPEN_S, closed=False)
-    assert (contactor.problem, contactor.closed_s, line.taken) == ("", None, 2)
+    assert (say(contactor.problem), contactor.closed_s, line.taken) == ("", None, 2)
 
 
 def test_at_the_end_it_is_opened_before_the_line_is_given_back(contactor: Contactor, line: Line) -> None:
@@ -128,7 +129,7 @@ def test_it_closes_when_standby_is_verified_and_opens_at_the_end(bench: Bench, l
     assert (line.taken, line.closed) == (1, False)
     bench.charging()
     assert line.closed
-    bench.bay.end("SIGTERM")
+    bench.bay.end(Cause.of("signal", name="SIGTERM"))
     bench.step(10)
     assert bench.bay.verified
     bench.bay.isolate()

@@ -15,6 +15,7 @@ from orchestrator.lastresort.asking import ask
 from orchestrator.service import control as control_module
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.socketfile import is_alive
+from tests.core.said import into
 from tests.service.control_bench import answer, answered_soon, closing_all, listening
 from tests.waiting import wait_until
 
@@ -107,7 +108,7 @@ def test_a_name_that_somebody_removes_comes_back(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(control_module, "NAME_S", 0.05)
     said: list[str] = []
     path = tmp_path / "control.sock"
-    control = ControlSocket(path, answer, time.monotonic, said.append)
+    control = ControlSocket(path, answer, time.monotonic, into(said))
     control.start()
     try:
         path.unlink()
@@ -126,7 +127,7 @@ def test_a_name_that_is_anothers_by_now_is_left_to_him_and_that_is_said_once(
     monkeypatch.setattr(control_module, "NAME_S", 0.02)
     said: list[str] = []
     path = tmp_path / "control.sock"
-    control = ControlSocket(path, answer, time.monotonic, said.append)
+    control = ControlSocket(path, answer, time.monotonic, into(said))
     control.start()
     try:
         (tmp_path / "other").touch()

@@ -18,6 +18,7 @@ from orchestrator.model import Measurement
 from orchestrator.protocol.words import Decoded
 from orchestrator.service.control import ControlSocket
 from orchestrator.sim.client import PlantProcess
+from tests.core.said import cause
 from tests.link.strangers import holding
 from tests.sim.wires import on_bus, udp_keys
 from tests.whole.station import Document, orchestrator, station_document
@@ -299,7 +300,9 @@ def test_objects_that_were_not_answered_leave_gaps() -> None:
     ("page_v", "said"), [(48.1, ""), (47.0, ""), (40.0, "voltage_v 48.1, but 40 by the older protocol")]
 )
 def test_the_older_protocol_agrees_within_what_a_second_may_change(page_v: float, said: str) -> None:
-    shown = lines_of({"voltage_v": Measurement(page_v, 0.0), "status": None, "soc_pct": "soc_pct 140 is outside"})
+    shown = lines_of(
+        {"voltage_v": Measurement(page_v, 0.0), "status": None, "soc_pct": cause("soc_pct 140 is outside")}
+    )
     assert f"map tabos: {said or 'nothing speaks against it'}" in shown
 
 

@@ -149,11 +149,13 @@ measurements = st.none() | st.builds(Measurement, st.sampled_from([20.0, 21.0]),
 snapshots = st.builds(
     Snapshot,
     st.sampled_from(
-        [None, READING, replace(READING, t_s=2.0), replace(READING, charge_mode=None, illegal=("mode 9",))]
+        [None, READING, replace(READING, t_s=2.0), replace(READING, charge_mode=None, illegal=(cause("mode 9"),))]
     ),
-    st.sampled_from([ChargerLink(), ChargerLink(online=True), ChargerLink(problem="gone"), ChargerLink(online=True)]),
+    st.sampled_from(
+        [ChargerLink(), ChargerLink(online=True), ChargerLink(problem=cause("gone")), ChargerLink(online=True)]
+    ),
     st.builds(BatteryReading, soc_pct=measurements, temperature_c=measurements, voltage_v=measurements),
-    st.sampled_from([BatteryLink(), BatteryLink(online=True, implausible={"soc_pct": "140"})]),
+    st.sampled_from([BatteryLink(), BatteryLink(online=True, implausible={"soc_pct": cause("140")})]),
     st.sampled_from([None, *Request]),
     st.sampled_from(["", "broken"]),
     st.booleans(),
@@ -224,7 +226,7 @@ def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
 def test_a_countdown_is_no_news() -> None:
     """The reason of a backoff says when it goes on: new words each second, and not one line of the journal."""
     world = charging()
-    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
     world.tick()
     world.battery_link = replace(world.battery_link, implausible={})
     world.run(5)

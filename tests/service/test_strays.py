@@ -16,6 +16,7 @@ from orchestrator.service.past import Entry, Place
 from orchestrator.service.store import Store
 from orchestrator.service.strays import WATCHED_S, Strays
 from orchestrator.text.catalogue import say
+from tests.core.said import into
 from tests.waiting import wait_until
 
 LOST = Place("bay-1", "/dev/lost", "can0", 16)
@@ -52,7 +53,7 @@ class Case:
         self.store = Store(directory, [Place("bay-2", "/dev/2", "can0", 17)], lambda: self.now_s, time.time)
         here = self.store._places[0]
         self.store._begin([Entry(here, Persisted(), 1), Entry(LOST, Persisted(running=True), 1)])
-        self.strays = Strays(self.store, lambda _: cast("ChargerPort", self.port), self.said.append)
+        self.strays = Strays(self.store, lambda _: cast("ChargerPort", self.port), into(self.said))
         self.strays.begin()
 
     def sees(
@@ -79,7 +80,7 @@ def _case(tmp_path: Path) -> Iterator[Case]:
 def test_it_is_told_to_stop_and_people_are_told_of_it(case: Case) -> None:
     assert case.port.started
     assert case.port.orders == [STOP]
-    assert case.strays.unverified == ["bay-1 on /dev/lost"]
+    assert [say(one) for one in case.strays.unverified] == ["bay-1 on /dev/lost"]
     assert case.said == [
         "bay-1 on /dev/lost: the station file has no bay on this port, but its charger may be running: stopping it"
     ]

@@ -13,7 +13,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.core import course
-from orchestrator.model import Request, State
+from orchestrator.model import Cause, Request, State
 from orchestrator.service.records import WHOLE_EVERY
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import Difference, compare, told
@@ -185,7 +185,7 @@ def one_run(directory: Path, began_s: float, wall_s: float, *, trip: bool = Fals
     if trip:
         bench.battery.values["temperature_c"] = 80.0
     else:
-        bench.bay.end("SIGTERM")
+        bench.bay.end(Cause.of("signal", name="SIGTERM"))
     bench.step(20)
     bench.journal._write()
     bench.store._ownership.give_up()
