@@ -304,8 +304,8 @@ Forge = Callable[[bytes], list[bytes]]
     [
         (lambda request: [answer(request), answer(request, 600)], "25.0 and 60.0"),
         (lambda request: [answer(request, 200), answer(request)], "20.0 and 25.0"),
-        (lambda request: [b"\x4b" + answer(request)[1:], answer(request)], "declared 2 bytes"),
-        (lambda request: [answer(request), b"\x4b" + answer(request)[1:]], "declared 2 bytes"),
+        (lambda request: [b"\x4b" + answer(request)[1:], answer(request)], "a size of 2"),
+        (lambda request: [answer(request), b"\x4b" + answer(request)[1:]], "a size of 2"),
         (lambda request: [answer(request), refusal(request, 0x06020000)], "25.0 and a refusal"),
         (lambda request: [refusal(request, 0x06020000), answer(request)], "a refusal and 25.0"),
         (lambda request: [answer(request), answer(request, 0x7FFF)], "outside"),

@@ -15,6 +15,7 @@ import pytest
 from orchestrator.errors import LinkError, RefusedError
 from orchestrator.link import can_text
 from orchestrator.link.can import DEFAULT_BITRATE, MAX_GARBAGE, CanBus
+from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NmtCommand
 from tests.core.said import raises, say
 from tests.link.ptys import Pty
@@ -212,10 +213,10 @@ def test_an_error_passive_controller_is_noticed(pair: Pair) -> None:
     bus, heard, other = pair
     other.send(message(0x004, bytes.fromhex("00 20 00 00 00 00 80 00"), is_error_frame=True))
     bus.receive(1.0)
-    assert say(bus.trouble) == can_text.PASSIVE
+    assert bus.trouble == Cause(can_text.PASSIVE)
     other.send(message(0x008, bytes(8), is_error_frame=True))  # passing noise says nothing
     bus.receive(1.0)
-    assert say(bus.trouble) == can_text.PASSIVE
+    assert bus.trouble == Cause(can_text.PASSIVE)
     other.send(message(0x004, bytes.fromhex("00 40 00 00 00 00 00 00"), is_error_frame=True))
     bus.receive(1.0)
     assert say(bus.trouble) == ""
@@ -239,7 +240,7 @@ def test_a_bus_that_cannot_be_opened_says_why(settings: dict[str, object], words
     bus = CanBus("left", settings, [0x10])
     with raises(LinkError, match=r"^CAN bus left ") as failure:
         bus.open()
-    assert words in str(failure.value)
+    assert words in say(failure.value.cause)
     bus.close()
 
 

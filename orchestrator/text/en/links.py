@@ -22,7 +22,7 @@ TEXTS: Mapping[str, str] = {
     "port_too_many_files": "{port}: too many open files: raise the limit of the service (LimitNOFILE)",
     "port_not_rs485": "{port}: its driver cannot switch the direction of an RS-485 line (rs485: kernel); use an adapter "
     "that switches by itself, with rs485: off",
-    "port_failed": "{port}: cannot be used ({error:word}); unplug the adapter and plug it in again",
+    "port_failed": "{port}: cannot be opened ({error:word})",
     # a charger that answers badly, or not at all
     "charger_no_reply": "{port}: no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + "
     "and −)",

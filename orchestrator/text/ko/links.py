@@ -20,7 +20,7 @@ TEXTS: Mapping[str, str] = {
     "port_too_many_files": "{port}: 열린 파일이 너무 많습니다: 서비스의 한계(LimitNOFILE)를 올리십시오",
     "port_not_rs485": "{port}: 드라이버가 RS-485 회선의 방향을 전환하지 못합니다(rs485: kernel). 스스로 전환하는 어댑터를 "
     "rs485: off로 사용하십시오",
-    "port_failed": "{port}: 사용할 수 없습니다({error:word}). 어댑터를 뽑았다가 다시 꽂으십시오",
+    "port_failed": "{port}: 열 수 없습니다({error:word})",
     # a charger that answers badly, or not at all
     "charger_no_reply": "{port}: 응답이 없습니다: 충전기의 전원과 케이블, 뒤바뀐 배선(RX와 TX, 또는 +와 −)을 확인하십시오",
     "charger_noise": "{port}: 깨진 프레임만 수신됩니다: 케이블의 차폐, 접지, 종단 저항과 19200 8N1을 확인하십시오",
