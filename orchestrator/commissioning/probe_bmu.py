@@ -174,4 +174,6 @@ def _said(reply: SdoReply | None) -> str:
     if isinstance(reply, SdoValue):
         raw = reply.value.to_bytes(reply.size, "little")
         return f"{hex_of(raw):11} = 0x{reply.value:0{2 * reply.size}X} = {reply.value}, {reply.size} bytes"
-    return say(reply.cause) if isinstance(reply, SdoAbort) else "no answer"
+    if isinstance(reply, SdoAbort):
+        return say(reply.cause).partition(" ")[2]  # without the object, which stands before it
+    return "no answer"

@@ -122,7 +122,9 @@ class Store:
         pending_s, problem = self._pending_s, self._blind or self._problem
         if problem is None and pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:
             problem = Cause.of("disk_slow", file=str(self.path), limit_s=KEPT_WITHIN_S)
-        return Cause.of("would_forget", problem=problem) if problem is not None else None
+        if problem is None:
+            return None
+        return Cause.of("would_forget", problem=problem, then=Cause("restart_then") if self._blind else None)
 
     def refuse_unkept(self, now_s: float) -> None:
         """RequestError where what is to be changed now would be forgotten."""

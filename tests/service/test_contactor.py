@@ -11,6 +11,7 @@ from orchestrator.model import STOP, Cause, Request, State
 from orchestrator.service import bay as bay_module
 from orchestrator.service.contactor import CLOSING_S, REOPEN_S, Contactor
 from orchestrator.service.guarded import GuardedOutput
+from orchestrator.text.catalogue import fields
 from tests.core.said import cause, say
 from tests.service.bench import Bench
 
@@ -134,7 +135,7 @@ def test_it_closes_when_standby_is_verified_and_opens_at_the_end(bench: Bench, l
     assert bench.bay.verified
     bench.bay.isolate()
     assert (line.closed, line.held) == (False, False)
-    assert told(bench) == [{"closed": closed, "problem": ""} for closed in (False, True, False)]
+    assert told(bench) == [{"closed": closed, "problem": "", "cause": None} for closed in (False, True, False)]
 
 
 def test_a_charger_that_does_not_obey_is_cut_off(bench: Bench, line: Line) -> None:
@@ -145,7 +146,7 @@ def test_a_charger_that_does_not_obey_is_cut_off(bench: Bench, line: Line) -> No
     bench.until(State.UNCONTROLLABLE)
     assert not line.closed
     status = json.loads(json.dumps(bench.bay.status()))
-    assert (status["alarm"], status["contactor"]) == ("danger", {"closed": False, "problem": ""})
+    assert (status["alarm"], status["contactor"]) == ("danger", {"closed": False, "problem": "", "cause": None})
 
 
 def test_an_exception_of_our_own_that_stays_opens_it_once_the_stop_has_had_its_time(
@@ -170,11 +171,11 @@ def test_a_line_that_fails_stops_the_charge_and_is_told(bench: Bench, line: Line
     status = json.loads(json.dumps(bench.bay.status()))
     assert [fault["id"] for fault in status["faults"]] == ["contactor_lost"]
     assert GONE in status["faults"][0]["text"]
-    assert status["contactor"] == {"closed": False, "problem": GONE}
-    assert told(bench)[-1] == {"closed": False, "problem": GONE}
+    assert status["contactor"] == {"closed": False, "problem": GONE, "cause": fields(cause(GONE))}
+    assert told(bench)[-1] == {"closed": False, "problem": GONE, "cause": fields(cause(GONE))}
     line.broken = False
     bench.step(round(2 * REOPEN_S / 0.2))
-    assert bench.bay.status()["contactor"] == {"closed": True, "problem": ""}
+    assert bench.bay.status()["contactor"] == {"closed": True, "problem": "", "cause": None}
     bench.until(State.CHARGING, 300)
 
 

@@ -250,7 +250,7 @@ def test_a_refused_object_is_an_answer(site: Site) -> None:
     finally:
         site.plant.inject("heal", 1)
     assert status == 0
-    assert "0x6004:00  refused: object does not exist in the object dictionary (0x06020000)" in shown
+    assert "0x6004:00  aborted with 0x06020000: object does not exist in the object dictionary" in shown
 
 
 def test_a_bay_that_is_not_there_and_a_service_that_runs_are_refused(site: Site) -> None:

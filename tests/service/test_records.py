@@ -122,8 +122,16 @@ def test_a_session_begins_and_ends_once() -> None:
 
 
 def plain(snapshot: Snapshot) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads(json.dumps(asdict(snapshot)))
+    document: dict[str, Any] = json.loads(json.dumps(causes_plain(asdict(snapshot))))
     return document
+
+
+def causes_plain(value: Any) -> Any:
+    """Causes as the journal has them: with their parameters as an object."""
+    if isinstance(value, dict):
+        found = {name: causes_plain(one) for name, one in value.items()}
+        return {**found, "params": dict(found["params"])} if "params" in found else found
+    return [causes_plain(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def rebuilt(lines: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -225,9 +225,9 @@ def test_the_page_is_in_the_readers_language() -> None:
     document = {"bays": [told], "strays": [{"bay": "bay-7", "port": "/dev/old", "problem": "", "state": "STOPPING",
                                             "verified": False}]}  # fmt: skip
     lines = page(document, "ko").splitlines()
-    assert lines[0].startswith("ALARM: bay-7의 것이었던 /dev/old의 충전기의 주전원을 차단하십시오")
+    assert lines[0].startswith("경보: bay-7의 것이었던 /dev/old의 충전기의 주전원을 차단하십시오")
     assert lines[1] == (
-        "ALARM: bay-1의 충전기(/dev/x)의 주전원을 차단하십시오: OFFLINE: 다른 무엇보다 먼저 충전기를 정지하고 있습니다"
+        "경보: bay-1의 충전기(/dev/x)의 주전원을 차단하십시오: OFFLINE: 다른 무엇보다 먼저 충전기를 정지하고 있습니다"
     )
     assert "the charger is being stopped" in page(document)
     assert "the charger is being stopped before anything else" in page(document, "en")

@@ -15,13 +15,13 @@ import pytest
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.operator import OWN, STOPPED
 from orchestrator.core.persisted import COUNTERS_S, Persisted, PersistedFault
-from orchestrator.errors import ServiceError
+from orchestrator.errors import StartError
 from orchestrator.model import Cause, Session
 from orchestrator.service.loading import FILE, FIRST_FILE
 from orchestrator.service.past import Place
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.text.catalogue import say
-from tests.core.said import cause
+from tests.core.said import cause, raises
 from tests.service.disks import FULL, WornDisk
 from tests.waiting import wait_until
 
@@ -440,15 +440,16 @@ SECOND = """
 import sys, time
 from pathlib import Path
 from orchestrator.service.past import Place
+from orchestrator.errors import StartError
 from orchestrator.service.store import Store
-from tests.core.said import cause
+from orchestrator.text.catalogue import say
 store = Store(Path(sys.argv[1]), [Place("bay-1", "/dev/1", "can0", 16)], time.monotonic, time.time)
 store.start()
 try:
     print(store.wait(10), flush=True)
     sys.stdin.read()
-except Exception as error:
-    print(error)
+except StartError as error:
+    print(say(error.cause))
 """
 
 
@@ -474,7 +475,7 @@ def test_the_lock_goes_with_its_process_whatever_ends_it(tmp_path: Path) -> None
         assert owner.stdout.readline() == "True\n"
         refused = Store(tmp_path, [A], time.monotonic, time.time)
         refused.start()
-        with pytest.raises(ServiceError, match="another service keeps its state in"):
+        with raises(StartError, match="another service keeps its state in"):
             refused.wait(5)
         owner.kill()
         owner.wait()

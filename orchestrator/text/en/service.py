@@ -18,7 +18,8 @@ TEXTS: Mapping[str, str] = {
     "disk_failed": "{file}: {error:word}",
     "disk_slow": "{file} is not written within {limit_s:g} s",
     "disk_hangs": "{file} is not written within {limit_s:g} s: its disk hangs",
-    "disk_silent": "the disk of {directory} does not answer; restart the service once it does",
+    "disk_silent": "the disk of {directory} does not answer",
+    "restart_then": "restart the service once it does",
     "disk_internal": "internal error: {error}",
     "directory_taken": "another service keeps its state in {directory}: stop it first, or give this station a "
     "journal.directory of its own",

@@ -18,7 +18,8 @@ TEXTS: Mapping[str, str] = {
     "disk_failed": "{file}에 쓸 수 없습니다: {error:word}",
     "disk_slow": "{file}을(를) {limit_s:g} s 안에 쓰지 못했습니다",
     "disk_hangs": "{file}을(를) {limit_s:g} s 안에 쓰지 못했습니다: 디스크가 멈추어 있습니다",
-    "disk_silent": "{directory}의 디스크가 응답하지 않습니다. 응답하면 서비스를 재시작하십시오",
+    "disk_silent": "{directory}의 디스크가 응답하지 않습니다",
+    "restart_then": "응답하면 서비스를 재시작하십시오",
     "disk_internal": "내부 에러: {error}",
     "directory_taken": "다른 서비스가 {directory}에 상태를 저장하고 있습니다: 먼저 그 서비스를 정지하거나 이 스테이션에 별도의 "
     "journal.directory를 지정하십시오",
