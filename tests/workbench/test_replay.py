@@ -295,11 +295,14 @@ def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: py
     )
 
 
-def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(journal: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [2, 3])
+def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(
+    journal: Path, tmp_path: Path, version: int
+) -> None:
     (tmp_path / "journal").mkdir()
     for path in journal.glob("*.jsonl"):
         lines = path.read_text(encoding="utf-8").splitlines()
-        old = [json.dumps(_with_sentences(json.loads(line))) for line in lines]
+        old = [json.dumps(_with_sentences(json.loads(line), version)) for line in lines]
         (tmp_path / "journal" / path.name).write_text("\n".join(old) + "\n", encoding="utf-8")
     record = read([tmp_path / "journal"])
     assert record.bays == {}
@@ -308,8 +311,10 @@ def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(journal: 
     }
 
 
-def _with_sentences(line: dict[str, Any]) -> dict[str, Any]:
+def _with_sentences(line: dict[str, Any], version: int) -> dict[str, Any]:
     if line.get("whole"):
-        del line["memory"]["cause"]
-        line["memory"]["reason"] = "no battery"
+        line["charger_link"]["problem"] = ""
+        if version == 2:
+            del line["memory"]["cause"]
+            line["memory"]["reason"] = "no battery"
     return line
