@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
+from unicodedata import east_asian_width
 
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
@@ -60,10 +61,10 @@ def table(bays: Sequence[Bay], language: str = "") -> str:
     """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
     bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
     rows = [HEAD, *(_row(bay, language) for bay in bays)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
+    widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
     lines = [_labelled("alarm", what_to_do(bay, language), language) for bay in bays if is_alarming(bay)]
     for row, bay in zip(rows, [None, *bays], strict=True):
-        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
+        cells = [cell + " " * (width - width_of(cell)) for cell, width in zip(row, widths, strict=False)]
         lines.append("  ".join([*cells, row[-1]]).rstrip())
         if bay is not None:
             lines.extend(f"  {line}" for line in _below(bay, language))
@@ -173,6 +174,11 @@ def _row(bay: Bay, language: str) -> tuple[str, ...]:
         step_of(step, bay.get("step_current_a")),
         say(Cause("see_alarm"), language) if is_alarming(bay) else str(bay["reason"]),
     )
+
+
+def width_of(text: str) -> int:
+    """How many columns of a terminal it takes: a Korean letter takes two."""
+    return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
 
 
 def step_of(index: object, current_a: object) -> str:

@@ -6,7 +6,7 @@ from typing import cast
 import pytest
 
 from orchestrator.model import Cause
-from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
+from orchestrator.show import figure, page, stands_by, strays, table, what_to_do, width_of
 from orchestrator.text.catalogue import fields
 
 
@@ -217,6 +217,16 @@ def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_w
     ]
     assert strays({}) == []
     assert page({"bays": [], "journal": {"problem": ""}}) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"
+
+
+def test_the_columns_stand_below_each_other_in_every_language() -> None:
+    assert (width_of("48.10 V (old)"), width_of("48.10 V (이전 값)")) == (13, 17)
+    stale = bay(charger={"current_a": 14.0, "old": True, "age_s": 46.0})
+    for language in ("en", "ko"):
+        lines = table([stale, bay(name="bay-2")], language).splitlines()
+        steps = [width_of(line[: line.index("2 (5.0 A)  ")]) for line in lines if line.startswith("bay-")]
+        assert len(steps) == 2
+        assert len(set(steps)) == 1, language
 
 
 def test_the_page_is_in_the_readers_language() -> None:
