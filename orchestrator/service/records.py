@@ -35,6 +35,8 @@ OURS = (
     "internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem", "waits", "moves",
     "running_kept",
 )  # fmt: skip
+#: What of a reading or a link may have causes in it; the rest is written as it is.
+DEEP = frozenset({Cause, tuple, dict})
 #: A whole snapshot, with the memory and the bay's rules, at least this often: a reader may begin at each of them.
 WHOLE_EVERY = 250
 
@@ -182,7 +184,11 @@ def _new_values(old: BatteryReading, new: BatteryReading) -> dict[str, object]:
 
 def _plain(record: ChargerReading | BatteryLink | Measurement | None) -> dict[str, object] | None:
     """A record without records in it but causes. Far faster than `asdict`, and this is done for every reading."""
-    return {name: _bare(getattr(record, name)) for name in record.__slots__} if record is not None else None
+    if record is None:
+        return None
+    return {
+        name: _bare(value) if (value := getattr(record, name)).__class__ in DEEP else value for name in record.__slots__
+    }
 
 
 def _record(record: Snapshot | Memory | ChargerLink) -> dict[str, object]:
