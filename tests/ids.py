@@ -7,7 +7,7 @@ from enum import Enum
 from typing import Any
 
 #: Ids are read in one line, and some values are long.
-LONGEST = 72
+LONGEST = 56
 MOST_BYTES = 24
 
 
@@ -16,7 +16,7 @@ def name_of(value: object) -> str | None:
     if isinstance(value, Enum):
         return value.name
     if isinstance(value, str):
-        return short(" ".join(value.split())) if len(value) > LONGEST else None
+        return short(" ".join(value.split())) if len(value) > LONGEST or "\n" in value.strip() else None
     if value is None or isinstance(value, (bool, int, float, complex, type)):
         return None
     return short(shown(value))
@@ -40,9 +40,9 @@ def shown(value: object) -> str:
     return str(name) if name is not None else str(value)
 
 
-def short(text: str) -> str:
+def short(text: str, longest: int = LONGEST) -> str:
     """No longer than an id may be."""
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 2].rstrip()}.."
+    return text if len(text) <= longest else f"{text[: longest - 2].rstrip()}.."
 
 
 def _hex(data: bytes) -> str:
@@ -52,13 +52,14 @@ def _hex(data: bytes) -> str:
 
 
 def _record(value: Any) -> str:
-    """By its name, if it has one, else by what differs from its defaults."""
-    name = getattr(value, "name", None)
-    if isinstance(name, str) and name:
-        return name
+    """By its name, if it has one (a policy's is in `policy`), else by what differs from its defaults."""
+    kind = type(value).__name__
+    for name in (getattr(value, "name", None), getattr(value, kind.lower(), None)):
+        if isinstance(name, str) and name:
+            return name
     told = {field.name: getattr(value, field.name) for field in fields(value) if field.repr}
     changed = [f"{name}={shown(one)}" for name, one in told.items() if one != _default(value, name)]
-    return " ".join((type(value).__name__, *changed))
+    return " ".join((kind, *changed))
 
 
 def _default(value: Any, name: str) -> object:

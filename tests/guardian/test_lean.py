@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.guardian.chargers import running_chargers
-from tests.test_imports import PACKAGE, ROOT, Module, product
+from tests.sources import PACKAGE, ROOT, Module, product
 
 ROOM = {"", "lastresort"}
 PORT = ROOM | {f"lastresort.{name}" for name in ("port_owner", "line_settings", "bareport")}
