@@ -1,7 +1,7 @@
 """`say()`: the sentence for a cause, in English or Korean.
 
 Theory of operation. A template stands under the id of its cause and names its parameters, with the rounding of the
-figures. What an advice adds stands in a frame. Beside the formats of numbers there are five of our own: `word` (a word
+figures. What an advice adds stands in a frame; `where` stands before it all, `then` and `how` behind. Beside the formats of numbers there are five of our own: `word` (a word
 of a fixed list, translated), `nth` (the first time …), `and` and `then` (how the parts of a list are joined), `after`
 (a cause, if there is one, after what stands before it).
 

@@ -65,3 +65,19 @@ def test_every_template_is_of_a_cause_that_is_made() -> None:
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     }
     assert [id_ for id_ in TEXTS if id_ not in written and not id_.startswith(TOGETHER)] == []
+
+
+def test_no_id_stands_in_two_files() -> None:
+    for folder in ("en", "ko"):
+        keys = [
+            key.value
+            for path in (ROOT / "text" / folder).glob("*.py")
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            if isinstance(node, ast.AnnAssign)
+            and getattr(node.target, "id", "") in ("TEXTS", "WORDS", "CODES")
+            and isinstance(node.value, ast.Dict)
+            for key in node.value.keys
+            if isinstance(key, ast.Constant)
+        ]
+        texts, words = LANGUAGES[folder].texts, LANGUAGES[folder].words
+        assert len(keys) == len(texts) + len(words)
