@@ -1,9 +1,9 @@
 """`say()`: the sentence for a cause, in English or Korean.
 
 Theory of operation. A template stands under the id of its cause and names its parameters, with the rounding of the
-figures. What an advice adds stands in a frame; `where` stands before it all, `then` and `how` behind. Beside the formats of numbers there are five of our own: `word` (a word
-of a fixed list, translated), `nth` (the first time …), `and` and `then` (how the parts of a list are joined), `after`
-(a cause, if there is one, after what stands before it).
+figures. What an advice adds stands in a frame; `where` stands before it all, `then` and `how` behind. Beside the formats
+of numbers there are five of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
+`then` (how the parts of a list are joined), `after` (a cause, if there is one, after what stands before it).
 
 `say` never raises, whatever it is given: what it is asked for is often the reason of a stop. A cause that is not known,
 of an older or newer version say, or lacks something, is shown as its data.
