@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Any
 
 #: A cause within a cause within a cause … is nothing that was ever said.
-DEPTH = 8
+DEPTH = 10
 #: Several causes at once, in `whats`.
 SEVERAL = "several"
 #: A mere sentence, in `text`.
