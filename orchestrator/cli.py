@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator import __version__
-from orchestrator.errors import ConfigError, HexError, OrchestratorError, UsageError
+from orchestrator.errors import CauseError, ConfigError, HexError, OrchestratorError, ServiceError, UsageError
 from orchestrator.service.verbs import add_service_verbs
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
@@ -28,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 1
     except OrchestratorError as error:
-        print(f"orchestrator: {error}", file=sys.stderr)
+        print(f"orchestrator: {_said(error)}", file=sys.stderr)
         return 2 if isinstance(error, UsageError | HexError) else 1
     except KeyboardInterrupt:
         return 130
@@ -38,6 +38,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:  # a full disk behind our output, as a rule
         print(f"orchestrator: {error}", file=sys.stderr)
         return 1
+
+
+def _said(error: OrchestratorError) -> str:
+    """What to print of it: in the reader's language where it is told as data."""
+    from orchestrator.show import own_language
+    from orchestrator.text.catalogue import say
+    from orchestrator.text.document import said
+
+    if isinstance(error, CauseError):
+        return say(error.cause, own_language())
+    return said(error.told, str(error), own_language()) if isinstance(error, ServiceError) else str(error)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -5,6 +5,10 @@ by itself, a refusal is answered.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from orchestrator.model import Cause
 
 
 class OrchestratorError(Exception):
@@ -33,7 +37,15 @@ class ConfigError(OrchestratorError):
         self.findings = findings
 
 
-class LinkError(OrchestratorError):
+class CauseError(OrchestratorError):
+    """One that is told as data: its sentence is made at the edge, in the language of who reads it."""
+
+    def __init__(self, cause: "Cause") -> None:
+        super().__init__(f"{cause.id} ({', '.join(f'{name}={value}' for name, value in cause.params)})")
+        self.cause = cause
+
+
+class LinkError(CauseError):
     """A port or a bus cannot be used now: unplugged, stalled, busy, down. It may come back."""
 
 
@@ -54,8 +66,20 @@ class RefusedError(OrchestratorError):
 
 
 class ServiceError(OrchestratorError):
-    """The service cannot be reached or answered with an error."""
+    """The service cannot be reached or answered with an error; `told` is that as data, where the service said so."""
+
+    def __init__(self, text: str, told: object = None) -> None:
+        super().__init__(text)
+        self.told = told
 
 
 class NoServiceError(ServiceError):
     """The service cannot be reached: whatever is to be done must be done without it."""
+
+
+class RequestError(CauseError):
+    """A request to the running service is not understood, or cannot be done."""
+
+
+class StartError(CauseError):
+    """The service cannot run here: what it needs is another's, or too little."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from orchestrator.config.station import ChargerConfig, Limits
-from orchestrator.model import Action, Command, ControlMode, Snapshot
+from orchestrator.model import Action, Cause, Command, ControlMode, Snapshot
 
 #: Five polls. A charger that has not answered for so long may be doing anything.
 CHARGER_MAX_AGE_S = 1.0
@@ -59,37 +59,44 @@ def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
     return Grant(expires_s, highest_v, temperature.value, charger.current_limit, kept=snapshot.running_kept)
 
 
-def permit(command: Command, evidence: Grant | None, now_s: float, charger: ChargerConfig, limits: Limits) -> str:
-    """Why the order must not go out now; "" if it may. A stop always may.
+def permit(
+    command: Command, evidence: Grant | None, now_s: float, charger: ChargerConfig, limits: Limits
+) -> Cause | None:
+    """Why the order must not go out now; None if it may. A stop always may.
 
     `limits` are the hard ones of the station file; nothing here comes from a policy.
     """
     action, value = command.action, command.value
     if action is Action.STOP:
-        return ""
+        return None
     if value not in ALLOWED[charger.control].get(action, ()):
-        return f"{action} {value} is no order for a charger in {charger.control.name.lower()} mode"
+        return Cause.of("no_order", order=action.value, value=value, control=charger.control.name.lower())
     if evidence is None:
-        return f"{action}: no fresh reading of charger, pack voltage and pack temperature"
+        return Cause.of("no_evidence", order=action.value)
     if not evidence.kept:
-        return f"{action}: it is not on disk that this charger may be running"
+        return Cause.of("not_on_disk", order=action.value)
     if not now_s < evidence.expires_s:
-        return f"{action}: the readings that it rests on are {now_s - evidence.expires_s:.1f} s too old"
+        return Cause.of("evidence_old", order=action.value, age_s=now_s - evidence.expires_s)
     if not evidence.voltage_v <= limits.voltage_v:
-        return f"{action}: {evidence.voltage_v:g} V is above the station's {limits.voltage_v:g} V"
+        return _beyond("above_station_v", action, voltage_v=evidence.voltage_v, limit_v=limits.voltage_v)
     if evidence.temperature_c not in limits.temperature_c:
-        return f"{action}: {evidence.temperature_c:g} °C is outside the station's {limits.temperature_c} °C"
+        low_c, high_c = limits.temperature_c.low, limits.temperature_c.high
+        return _beyond("outside_station_c", action, pack_c=evidence.temperature_c, low_c=low_c, high_c=high_c)
     if action is Action.SET_LIMIT:
         return _too_much(action, value, charger, limits)
     if action is Action.RUN:
         return _too_much(action, evidence.current_limit, charger, limits)
-    return ""
+    return None
 
 
-def _too_much(action: Action, step: int | None, charger: ChargerConfig, limits: Limits) -> str:
+def _beyond(id_: str, action: Action, **params: float) -> Cause:
+    return Cause(id_, (("order", action.value), *params.items()))
+
+
+def _too_much(action: Action, step: int | None, charger: ChargerConfig, limits: Limits) -> Cause | None:
     if step is None or not 0 <= step < len(charger.steps_a):
-        return f"{action}: what the charger's current limit {step} means is not known"
+        return Cause.of("step_unknown", order=action.value, step=step)
     current_a = charger.steps_a[step]
     if not current_a <= limits.current_a:
-        return f"{action}: step {step + 1} is {current_a:g} A, above the station's {limits.current_a:g} A"
-    return ""
+        return _beyond("above_station_a", action, step=step + 1, step_a=current_a, limit_a=limits.current_a)
+    return None

@@ -4,10 +4,11 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
+from unicodedata import east_asian_width
 
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
-from orchestrator.text.document import in_language
+from orchestrator.text.document import in_language, language_of_answer
 from orchestrator.text.language import language_of
 
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
@@ -35,13 +36,14 @@ def own_language() -> str:
 
 def page(document: Mapping[str, object], language: str = "") -> str:
     """The whole status: what to do, the bays, and what is wrong with the station itself."""
+    language = language_of_answer(document, language)
     document = in_language(document, language)
-    lines = [f"ALARM: {text}" for text in strays(document, language)]
+    lines = [_labelled("alarm", text, language) for text in strays(document, language)]
     lines.append(table(cast("Sequence[Bay]", document["bays"]), language))
     problems = (
         cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
     )
-    return "\n".join([*lines, *(f"WARNING: {problem}" for problem in problems if problem)])
+    return "\n".join([*lines, *(_labelled("warning", str(problem), language) for problem in problems if problem)])
 
 
 def strays(document: Mapping[str, object], language: str = "") -> list[str]:
@@ -58,11 +60,11 @@ def strays(document: Mapping[str, object], language: str = "") -> list[str]:
 def table(bays: Sequence[Bay], language: str = "") -> str:
     """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
     bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
-    rows = [HEAD, *(_row(bay) for bay in bays)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
-    lines = [f"ALARM: {what_to_do(bay, language)}" for bay in bays if is_alarming(bay)]
+    rows = [HEAD, *(_row(bay, language) for bay in bays)]
+    widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
+    lines = [_labelled("alarm", what_to_do(bay, language), language) for bay in bays if is_alarming(bay)]
     for row, bay in zip(rows, [None, *bays], strict=True):
-        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
+        cells = [cell + " " * (width - width_of(cell)) for cell, width in zip(row, widths, strict=False)]
         lines.append("  ".join([*cells, row[-1]]).rstrip())
         if bay is not None:
             lines.extend(f"  {line}" for line in _below(bay, language))
@@ -128,9 +130,13 @@ def what_to_do(bay: Bay, language: str = "") -> str:
 def _below(bay: Bay, language: str) -> Iterator[str]:
     yield from (f"{fault['effect']}: {fault['text']}" for fault in other_faults(bay))
     if old := "; ".join(say(one, language) for one in _old_values(bay)):
-        yield f"OLD: {old}"
+        yield _labelled("old", old, language)
     if cast("Mapping[str, object]", bay.get("policy", {})).get("waiting_sha256"):
-        yield f"POLICY: {say(Cause('policy_waits'), language)}"
+        yield _labelled("policy_note", say(Cause("policy_waits"), language), language)
+
+
+def _labelled(id_: str, what: str, language: str) -> str:
+    return say(Cause.of(id_, what=what), language)
 
 
 def _old_values(bay: Bay) -> Iterator[Cause]:
@@ -155,19 +161,24 @@ def _part(bay: Bay, name: str) -> Mapping[str, object]:
     return cast("Mapping[str, object]", bay[name])
 
 
-def _row(bay: Bay) -> tuple[str, ...]:
+def _row(bay: Bay, language: str) -> tuple[str, ...]:
     battery, charger = _part(bay, "battery"), _part(bay, "charger")
     old, step = _old(bay), bay["step"]
     return (
         str(bay["name"]),
         str(bay["state"]),
-        _marked(figure(battery["soc_pct"], "{:.0f} %"), old="soc_pct" in old),
-        _marked(figure(battery["voltage_v"], "{:.2f} V"), old="voltage_v" in old),
-        _marked(figure(charger["current_a"], "{:.2f} A"), old=bool(charger.get("old"))),
-        _marked(figure(battery["temperature_c"], "{:.1f} °C"), old="temperature_c" in old),
+        _marked(figure(battery["soc_pct"], "{:.0f} %"), language, old="soc_pct" in old),
+        _marked(figure(battery["voltage_v"], "{:.2f} V"), language, old="voltage_v" in old),
+        _marked(figure(charger["current_a"], "{:.2f} A"), language, old=bool(charger.get("old"))),
+        _marked(figure(battery["temperature_c"], "{:.1f} °C"), language, old="temperature_c" in old),
         step_of(step, bay.get("step_current_a")),
-        "see ALARM" if is_alarming(bay) else str(bay["reason"]),
+        say(Cause("see_alarm"), language) if is_alarming(bay) else str(bay["reason"]),
     )
+
+
+def width_of(text: str) -> int:
+    """How many columns of a terminal it takes: a Korean letter takes two."""
+    return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
 
 
 def step_of(index: object, current_a: object) -> str:
@@ -175,8 +186,8 @@ def step_of(index: object, current_a: object) -> str:
     return f"{index + 1} ({figure(current_a, '{:.1f} A')})" if isinstance(index, int) else "–"
 
 
-def _marked(text: str, *, old: bool) -> str:
-    return f"{text} (old)" if old else text
+def _marked(text: str, language: str, *, old: bool) -> str:
+    return say(Cause.of("old_figure", figure=text), language) if old else text
 
 
 def figure(value: object, form: str) -> str:

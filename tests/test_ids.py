@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from orchestrator.config.load import load_policy
-from orchestrator.errors import LinkError
+from orchestrator.errors import RefusedError
 from orchestrator.model import Action, Command, State
 from tests.ids import LONGEST, name_of
 
@@ -29,7 +29,7 @@ NAMES: dict[str, object] = {
     "Thing size_m=2.0 colour=blue notes=a=1": Thing(2.0, "blue", {"a": 1}),
     "Command action=SET_LIMIT value=3": Command(Action.SET_LIMIT, 3),
     "li-ion-48v": load_policy("li-ion-48v"),
-    "LinkError gone": LinkError("gone"),
+    "RefusedError gone": RefusedError("gone"),
     "name_of": name_of,
     "two lines": "two\nlines",
 }

@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Mapping
 from itertools import chain
 
-from orchestrator.model import Measurement
+from orchestrator.model import Cause, Measurement
 from orchestrator.protocol.objects import READING_FIELDS, ObjectMap
 from orchestrator.protocol.pages import PAGES
 from orchestrator.protocol.words import Decoded, decode_word
+from orchestrator.text.catalogue import say
 
 Key = tuple[int, int]
 Values = Mapping[str, Decoded]
@@ -52,7 +53,7 @@ def _cell(field: str, values: Values) -> str:
 
 def _wrong(one: ObjectMap, values: Values, pages: Values) -> Iterator[str]:
     """What cannot be, and what the older protocol says otherwise."""
-    yield from (value for value in values.values() if isinstance(value, str))
+    yield from (say(value) for value in values.values() if isinstance(value, Cause))
     fields = chain(*(entry.fields for entry in one.objects), *PAGES.values())
     scales = {field.name: field.scale for field in fields}
     for name, page in pages.items():

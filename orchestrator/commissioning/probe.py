@@ -16,10 +16,12 @@ from orchestrator.errors import LinkError, ServiceError
 from orchestrator.link.can import CanBus
 from orchestrator.link.gpio import describe
 from orchestrator.link.serial import SerialLine
+from orchestrator.model import Cause
 from orchestrator.protocol.explain import explain
 from orchestrator.protocol.hextext import hex_of
 from orchestrator.protocol.sdo import NmtCommand
 from orchestrator.service.socketfile import is_alive
+from orchestrator.text.catalogue import say
 
 NMT = {
     "start": NmtCommand.START,
@@ -68,23 +70,23 @@ def _charger(config: ChargerConfig, show: Show) -> bool:
     try:
         line = SerialLine.open(config.port, kernel_rs485=config.rs485 is Rs485.KERNEL)
     except LinkError as error:
-        show(f"charger: {error}")
+        show(f"charger: {say(error.cause)}")
         return False
     dialogue = Dialogue()
     try:
         if stranger := line.locked_by():
-            show(f"charger on {config.port}: {stranger} has locked this port, and may take its answers")
+            show(f"charger on {config.port}: {say(stranger)} has locked this port, and may take its answers")
         for _ in REQUESTS:
             reading, exchange = poll(line, dialogue, monotonic)
             if reading is not None:
                 break
     except LinkError as error:
-        show(f"charger: {error}")
+        show(f"charger: {say(error.cause)}")
         return False
     finally:
         line.close()
     if reading is None:
-        show(f"charger on {config.port}: {SILENCE[dialogue.heard]}")
+        show(f"charger on {say(Cause.of(SILENCE[dialogue.heard], port=config.port))}")
     else:
         show(f"charger on {config.port}: answers")
     show(indent("\n".join(item.text for item in explain(hex_of(exchange))), "  "))
@@ -102,7 +104,7 @@ def _contactor(config: ContactorConfig, show: Show) -> bool:
         closes = "low" if config.active_low else "high"
         show(f"contactor on {describe(config.chip, config.line)}; closed while the pin is {closes}")
     except LinkError as error:
-        show(f"contactor: {error}")
+        show(f"contactor: {say(error.cause)}")
         return False
     return True
 
@@ -118,7 +120,7 @@ def _bmu(station: Station, bay: Bay, nmt: NmtCommand | None, *, old_protocol: bo
         bus.open()
         return bmu.run(nmt, old_protocol=old_protocol)
     except LinkError as error:
-        show(f"BMU: {error}")
+        show(f"BMU: {say(error.cause)}")
         return False
     finally:
         bus.close()

@@ -30,6 +30,7 @@ from orchestrator.protocol.sdo import (
     request_cob_id,
 )
 from orchestrator.protocol.words import Decoded
+from orchestrator.text.catalogue import say
 
 Key = tuple[int, int]
 
@@ -163,7 +164,7 @@ class BmuProbe:
                 f"but other frames come in (COB-ID {heard}), so wiring and bit rate are right: "
                 "check its node switch (node id = switch + 0x10) and battery.node_id"
             )
-        return self._bus.trouble or (
+        return say(self._bus.trouble) or (
             "nothing at all is heard: check its power, the cable, the terminators, the bit rate "
             "and its node switch (node id = switch + 0x10)"
         )
@@ -173,4 +174,6 @@ def _said(reply: SdoReply | None) -> str:
     if isinstance(reply, SdoValue):
         raw = reply.value.to_bytes(reply.size, "little")
         return f"{hex_of(raw):11} = 0x{reply.value:0{2 * reply.size}X} = {reply.value}, {reply.size} bytes"
-    return f"refused: {reply.meaning} (0x{reply.code:08X})" if isinstance(reply, SdoAbort) else "no answer"
+    if isinstance(reply, SdoAbort):
+        return say(reply.cause).partition(" ")[2]  # without the object, which stands before it
+    return "no answer"

@@ -81,20 +81,18 @@ def _step(f: Facts, index: int, bound: Bound) -> Step:
     return Step(index, f.rules.steps_a[index], limit(f, bound))
 
 
+# --- as causes --------------------------------------------------------------------------------------------------------
+
+#: The parameter that each quantity has in a cause.
+PARAMS = {"temperature_c": "pack_c", "soc_pct": "soc_pct", "soh_pct": "soh_pct", "voltage_v": "pack_v"}
+#: The words for them.
+WORDS = {"temperature_c": "temperature", "soc_pct": "soc", "soh_pct": "soh", "voltage_v": "pack_voltage"}
+
+
 def limit(f: Facts, bound: Bound) -> Cause:
-    """What limits the current, as a cause. Its sentence is still made here."""
-    return Cause.of("limit", key=bound.key, place=_place(f, bound.key), text=sentence(f, bound))
-
-
-# --- as sentences -----------------------------------------------------------------------------------------------------
-
-#: How each quantity is said: its name, its number format with unit.
-WORDS = {
-    "temperature_c": ("temperature", "{:.1f} °C"),
-    "soc_pct": ("SOC", "{:.0f} %"),
-    "soh_pct": ("SOH", "{:.0f} %"),
-    "voltage_v": ("pack voltage", "{:.2f} V"),
-}
+    """What limits the current: the row or key, with the evidence and the line where it stands."""
+    id_, params = _what(f, bound)
+    return Cause(id_, params, bound.key, _place(f, bound.key))
 
 
 def _place(f: Facts, key: str) -> str:
@@ -104,53 +102,55 @@ def _place(f: Facts, key: str) -> str:
     return (f.rules.bay.source if key.startswith("limits.") else f.rules.policy.source).at(key)
 
 
-def sentence(f: Facts, bound: Bound) -> str:
-    """What limits the current, with its evidence and its place."""
-    key, place = bound.key, _place(f, bound.key)
+def _what(f: Facts, bound: Bound) -> tuple[str, tuple[tuple[str, object], ...]]:
+    """The id, and the parameters."""
+    key, row = bound.key, bound.row
     if not key:
-        return "the highest step, nothing limits it"
+        return "limit_none", ()
     if key.startswith("fault "):
-        return f"the {key}"
+        return "limit_fault", (("fault", key.removeprefix("fault ")),)
     if key == "pack.current_a":
-        return f"the pack bears {bound.allowed_a:.1f} A, {place}"
+        return "limit_pack", (("allowed_a", bound.allowed_a),)
     if key.startswith("limits."):
-        return f"the station's current limit, {place}"
-    if bound.row is None:
-        name, form = WORDS[key.removeprefix("current.")]
-        value = values(f)[key.removeprefix("current.")]
-        return (
-            f"{name} unknown, {place}"
-            if value is None
-            else f"{name} {form.format(value)} outside of its table, {place}"
-        )
-    return f"{_where(f, bound)} {_allows(bound)}, {place}"
+        return "limit_station", (("allowed_a", bound.allowed_a),)
+    if row is None:
+        name = key.removeprefix("current.")
+        value = values(f)[name]
+        if value is None:
+            return "limit_unknown", (("quantity", WORDS[name]),)
+        return "limit_outside", (("value", _value(name, value)),)
+    return "limit_row", (("spans", _spans(f, bound, row)), ("allows", _allows(bound.allowed_a, row)))
 
 
-def _where(f: Facts, bound: Bound) -> str:
-    row, known = bound.row, values(f)
+def _spans(f: Facts, bound: Bound, row: Band | Where) -> tuple[Cause, ...]:
+    """Each quantity that the row is about."""
     if isinstance(row, Band):
         name = next(name for name in RESOLUTION if bound.key.startswith(f"current.{name}."))
-        return _said(f, name, known[name], row.from_, row.to)
-    spans = ranges(row).items() if row is not None else ()
-    return " and ".join(_said(f, name, known[name], span.low, span.high) for name, span in spans)
+        return (_span(f, name, row.from_, row.to),)
+    return tuple(_span(f, name, span.low, span.high) for name, span in ranges(row).items())
 
 
-def _said(f: Facts, name: str, value: float | None, low: float, high: float) -> str:
+def _span(f: Facts, name: str, low: float, high: float) -> Cause:
     """A value and the row that it is in, or was in and is not well outside of."""
-    what, form = WORDS[name]
+    value = values(f)[name]
     if value is None:
-        return f"{what} unknown"
+        return Cause.of("span_unknown", quantity=WORDS[name])
+    said = _value(name, value)
     if low <= value <= high:
-        return f"{what} {form.format(value)} in {low:g} … {high:g}"
+        return Cause.of("span_in", value=said, low=low, high=high)
     well = hysteresis(f.rules.policy.current, name)
     if not low - well < value < high + well:
-        return f"{what} {form.format(value)} beyond {low:g} … {high:g}, to which it came back too often in this charge:"
-    return f"{what} {form.format(value)} not yet {well:g} beyond {low:g} … {high:g}"
+        return Cause.of("span_kept", value=said, low=low, high=high)
+    return Cause.of("span_near", value=said, well=well, low=low, high=high)
 
 
-def _allows(bound: Bound) -> str:
-    row = bound.row
-    if bound.allowed_a == 0:
-        return "allows no current"
-    share = f" ({row.max_c:g} C)" if row is not None and row.max_c is not None else ""
-    return f"allows {bound.allowed_a:.1f} A{share}"
+def _value(name: str, value: float) -> Cause:
+    return Cause(f"value_{name}", ((PARAMS[name], value),))
+
+
+def _allows(allowed_a: float, row: Band | Where) -> Cause:
+    if allowed_a == 0:
+        return Cause("allows_nothing")
+    if row.max_c is None:
+        return Cause.of("allows_a", allowed_a=allowed_a)
+    return Cause.of("allows_c", allowed_a=allowed_a, max_c=row.max_c)

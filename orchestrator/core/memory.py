@@ -7,7 +7,7 @@ can hold them side by side; the fields say what kind of thing they carry (`parts
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 from orchestrator.core.parts import Kind, changed, event, measured, of_kind, total
@@ -226,12 +226,9 @@ def with_values(memory: Memory, **values: Any) -> Memory:  # noqa: ANN401 - any 
     return changed(memory, **own)
 
 
-def plain(memory: Memory) -> dict[str, Any]:
-    """As the journal has it: all values side by side."""
-    values = asdict(memory)
-    for part in FLAT:
-        values |= values.pop(part)
-    return values
+def side_by_side(memory: Memory) -> dict[str, Any]:
+    """All values by name, as the journal has them."""
+    return {name: value_of(memory, name) for name in names()}
 
 
 def in_parts(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -33,12 +33,12 @@ class Heard:
     refusal: Cause | None = None
 
 
-def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Heard:
+def hear(memory: Memory, request: Request, now_s: float, unkept: Cause | None = None) -> Heard:
     """What becomes of the request.
 
     What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
     """
-    if unkept and request in (Request.START, Request.RESET):
+    if unkept is not None and request in (Request.START, Request.RESET):
         return _refused(memory, Cause.of("not_done", problem=unkept))
     return VERBS[request](memory, now_s)
 

@@ -42,5 +42,5 @@ def _witnesses(f: Facts) -> Cause:
 def problem(f: Facts, silent: str) -> Cause:
     """Why the charger cannot be heard; `silent` is the id for one that only does not answer."""
     if f.charger.problem:
-        return Cause.of("charger_problem", problem=f.charger.problem)
+        return f.charger.problem
     return Cause.of(silent, port=f.rules.bay.charger.port)

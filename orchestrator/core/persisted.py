@@ -12,7 +12,7 @@ from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory, with_values
 from orchestrator.core.states import MAY_RUN
 from orchestrator.model import Cause, Session
-from orchestrator.model.cause import together
+from orchestrator.model.cause import said, together
 
 #: Mere counters are written this often while nothing else changes.
 COUNTERS_S = 30.0
@@ -163,6 +163,4 @@ def from_first_format(name: str, text: str) -> PersistedFault:
     row = ROW.get(name)
     backoff = row is not None and row.clear is Clear.BACKOFF  # it would not have been kept with fewer strikes
     strikes = (0.0,) * (len(BACKOFF_S) + 1) if backoff else ()
-    return PersistedFault(
-        Cause.of("said", text=text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes
-    )
+    return PersistedFault(said(text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes)

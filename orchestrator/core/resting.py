@@ -66,9 +66,7 @@ def _absent(f: Facts, _faults: Faults) -> Found:
     if f.departed:
         return Trigger.REST, Cause("battery_absent")
     id_ = "bmu_just_booted" if f.just_booted else "bmu_does_not_answer"
-    what = Cause.of(id_, node_id=f.rules.bay.battery.node_id)
-    if f.battery.problem:
-        what = Cause.of("bmu_problem", problem=f.battery.problem)
+    what = f.battery.problem or Cause.of(id_, node_id=f.rules.bay.battery.node_id)
     return Trigger.LOSE, Cause.of("battery_not_heard", charger_v=f.volts or 0.0, what=what)
 
 
@@ -143,7 +141,7 @@ def _wanted(f: Facts) -> tuple[bool, Cause]:
 
 def ending(f: Facts) -> Cause | None:
     """The service is about to end, and why."""
-    return Cause.of("service_ends", why=f.snapshot.ending) if f.snapshot.ending else None
+    return Cause.of("service_ends", why=f.snapshot.ending) if f.snapshot.ending is not None else None
 
 
 def offline(f: Facts) -> Cause:

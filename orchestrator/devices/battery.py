@@ -12,14 +12,14 @@ from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.battery_view import BatteryView
 from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup
 from orchestrator.devices.bus_budget import BusBudget
-from orchestrator.devices.emergency import emergency_cob_id, emergency_text
+from orchestrator.devices.emergency import emergency_cob_id, emergency_of, is_emergency
 from orchestrator.devices.node_health import NOT_OURS, NodeHealth
 from orchestrator.devices.other_masters import OtherMasters
 from orchestrator.devices.read_plan import ReadPlan
 from orchestrator.devices.requester import Requester, Send
 from orchestrator.devices.sdo_client import SdoClient, Verdict
 from orchestrator.devices.whose_answer import whose_answer
-from orchestrator.model import BatteryLink, BatteryReading
+from orchestrator.model import BatteryLink, BatteryReading, Cause
 from orchestrator.protocol.objects import TpdoEntry
 from orchestrator.protocol.sdo import (
     NmtState,
@@ -47,10 +47,10 @@ class BatteryNode:
 
     def __init__(self, bus: str, config: BatteryConfig, budget: BusBudget, on_change: Callable[[], None]) -> None:
         self.node_id = config.node_id
-        self.trouble = ""  #: what is wrong with the bus, in words, though it is open
+        self.trouble: Cause | None = None  #: what is wrong with the bus, though it is open
         self.next_due_s = -inf  #: when `turn()` has something to do, frames apart
         self._config = config
-        self._place = f"BMU 0x{config.node_id:02X} on {bus}"
+        self._bus = bus
         self._plan = ReadPlan(config, budget)
         self._client = SdoClient(config.sdo_timeout_s)
         self._setup = BmuSetup(config)
@@ -60,7 +60,7 @@ class BatteryNode:
         self._requester = Requester(
             self.node_id, budget, plan=self._plan, client=self._client, setup=self._setup, others=self._others
         )
-        self._view = BatteryView(f"{self._place}: not asked yet", on_change)
+        self._view = BatteryView(Cause.of("bmu_not_asked", node_id=self.node_id, bus=bus), on_change)
         self._handlers = self._frame_handlers()
 
     def _frame_handlers(self) -> dict[int, Callable[[bytes, float], None]]:
@@ -111,7 +111,7 @@ class BatteryNode:
             self.next_due_s = min(self.next_due_s, self._answer_s + ANSWER_LIMIT_S)
         self._publish()
 
-    def fail(self, problem: str, now_s: float) -> None:
+    def fail(self, problem: Cause, now_s: float) -> None:
         """The bus, or our own code, failed: what was asked is lost, and the reason is shown until an answer comes."""
         self.next_due_s = self._requester.fail(now_s)
         self._view.set(online=False, problem=problem)
@@ -128,18 +128,18 @@ class BatteryNode:
         if link.online:
             if now_s >= self._answer_s + ANSWER_LIMIT_S:  # the same sum as in `turn`: a difference is rounded otherwise
                 # The next one to answer may be another battery: what this one complained of is not its fault.
-                self._view.set(online=False, problem=self._why_silent(), emergency="")
+                self._view.set(online=False, problem=self._why_silent(), emergency=None)
             elif link.heartbeat_s is not None and link.heartbeat_t_s is not None:
                 self._setup.watch(now_s, link.heartbeat_t_s)
         elif expired:
             self._view.set(problem=self._why_silent())
 
-    def _why_silent(self) -> str:
+    def _why_silent(self) -> Cause:
         if self._view.link.nmt_state == NmtState.STOPPED:
-            why = "an NMT command has stopped it; NMT start wakes it"
-        else:
-            why = self.trouble or self._health.silence(self._config.sdo_timeout_s)
-        return f"{self._place} does not answer: {why}"
+            return Cause.of("bmu_stopped", node_id=self.node_id, bus=self._bus)
+        if self.trouble is not None:
+            return Cause.of("bmu_cut_off", node_id=self.node_id, bus=self._bus, why=self.trouble)
+        return self._health.silence(self.node_id, self._bus, self._config.sdo_timeout_s)
 
     # --- what frames say ----------------------------------------------------------------------------------------------
 
@@ -161,7 +161,7 @@ class BatteryNode:
         self.next_due_s = now_s
         asked, reply = self._client.pending, parse_reply(data)
         verdict = whose_answer(reply, data, self._client, self._others, now_s)
-        self._health.answer(verdict, reply.reason if isinstance(reply, SdoMalformed) else "")
+        self._health.answer(verdict, reply.cause if isinstance(reply, SdoMalformed) else None)
         if verdict is Verdict.ACCEPTED and not isinstance(reply, SdoMalformed):
             self._accept(reply, now_s)
             return
@@ -175,7 +175,7 @@ class BatteryNode:
     def _accept(self, reply: SdoValue | SdoWritten | SdoAbort, now_s: float) -> None:
         self._answer_s = now_s
         self._requester.hurry()
-        self._view.set(online=True, problem="")
+        self._view.set(online=True, problem=None)
         if self._others.active:
             self._others.ours_answered(self._client.asked_s)
         if self._client.writing:
@@ -192,7 +192,7 @@ class BatteryNode:
             self._view.measured(polled.from_sdo(reply, self._client.asked_s))
         if self._view.link.abort or polled.abort:
             abort = next((polled.abort for polled in self._plan.objects if polled.abort), None)
-            self._view.set(abort=str(abort or ""), abort_code=abort.code if abort else 0)
+            self._view.set(abort=abort.cause if abort else None, abort_code=abort.code if abort else 0)
 
     def _configured(self, now_s: float, *, written: bool) -> None:
         write = self._setup.answered(written=written)
@@ -230,11 +230,10 @@ class BatteryNode:
         self.next_due_s = now_s
 
     def _on_emergency(self, data: bytes, _now_s: float) -> None:
-        text = emergency_text(data)
-        if text is None:
-            self._view.dropped()
+        if is_emergency(data):
+            self._view.set(emergency=emergency_of(data))
         else:
-            self._view.set(emergency=text)
+            self._view.dropped()
 
     def _on_tpdo(self, tpdo: TpdoEntry, data: bytes, now_s: float) -> None:
         values = None if self._setup.tpdos_changed else self._plan.from_tpdo(tpdo, data, now_s)
@@ -245,6 +244,6 @@ class BatteryNode:
             self._view.measured(fields)
 
     def _publish(self) -> None:
-        if problem := self._health.problem:
-            self._view.set(online=False, problem=f"{self._place}: {problem}")
+        if problem := self._health.problem(self.node_id, self._bus):
+            self._view.set(online=False, problem=problem)
         self._view.publish()

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from orchestrator.devices.polled import Fields
-from orchestrator.model import BatteryLink, BatteryReading, Measurement
+from orchestrator.model import BatteryLink, BatteryReading, Cause, Measurement
 from orchestrator.protocol.sdo import NmtState
 
 
@@ -13,7 +13,7 @@ class BatteryView:
 
     __slots__ = ("_news", "_on_change", "current", "link", "reading")
 
-    def __init__(self, problem: str, on_change: Callable[[], None]) -> None:
+    def __init__(self, problem: Cause, on_change: Callable[[], None]) -> None:
         self.reading = BatteryReading()
         self.link = BatteryLink(problem=problem)
         self.current = (self.reading, self.link)  #: what other threads may look at
@@ -28,7 +28,7 @@ class BatteryView:
         values: dict[str, Measurement | None] = {}
         implausible = {name: why for name, why in self.link.implausible.items() if name not in fields}
         for name, value in fields.items():
-            if isinstance(value, str):
+            if isinstance(value, Cause):
                 implausible[name] = value
                 continue
             old: Measurement | None = getattr(self.reading, name)
@@ -39,7 +39,7 @@ class BatteryView:
             self.reading = replace(self.reading, **values)
         self.set(implausible=implausible)
 
-    def doubted(self, why: Mapping[str, str]) -> None:
+    def doubted(self, why: Mapping[str, Cause]) -> None:
         """Values that were taken before are not to be believed any more, by field."""
         if why:
             self.set(implausible={**self.link.implausible, **why})

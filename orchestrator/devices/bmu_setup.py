@@ -8,6 +8,7 @@ from math import inf
 
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.sdo_client import Key
+from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NmtState, write_request
 
 HEARTBEAT: Key = (0x1017, 0)
@@ -137,24 +138,22 @@ class BmuSetup:
         """The heartbeat's period is asked for."""
         self.check_due, self._check_s = False, now_s + RETRY_S
 
-    def checked(self, period_ms: int) -> str:
-        """What it is. "" if it is ours; else in words what was found, and ours will be written again.
+    def checked(self, period_ms: int) -> Cause | None:
+        """What it is. None if it is ours; else what was found, and ours will be written again.
 
         None at all may also come from a restart that nobody heard: then everything is written again.
         """
         if period_ms == round(self._heartbeat_s * 1000):
-            return ""
+            return None
         heard = self._heard
         if period_ms == 0:
             self.restart()
             self._rearm = heard
-            return (
-                f"the BMU's heartbeat was off: another master did that, or a restart that nobody heard; {self._again}"
-            )
+            return Cause.of("heartbeat_was_off", period_s=self._heartbeat_s)
         if HEARTBEAT not in [write.key for write in self._left]:
             self._left.insert(0, self._all[0])
         self._retry_s, self._rearm = -inf, heard
-        return f"another master had set the BMU's heartbeat to {period_ms / 1000:g} s; {self._again}"
+        return Cause.of("heartbeat_was", found_s=period_ms / 1000, period_s=self._heartbeat_s)
 
     def rearms(self) -> bool:
         """Whether a heartbeat that was just written is waited for from now on, as from the first time.
@@ -165,10 +164,6 @@ class BmuSetup:
         rearm, self._rearm = self._rearm, False
         self._heard = self._heard and not rearm
         return rearm
-
-    @property
-    def _again(self) -> str:
-        return f"it is set to {self._heartbeat_s:g} s again"
 
     def _check(self, now_s: float) -> None:
         if now_s >= self._check_s and not self._left:

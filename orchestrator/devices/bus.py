@@ -8,6 +8,7 @@ from typing import Protocol
 
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.errors import LinkError
+from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NMT_COB_ID
 
 REOPEN_S = 1.0  #: pause before a bus that failed is opened again
@@ -20,7 +21,7 @@ class CanPort(Protocol):
     """What of `link/can.py` is needed here."""
 
     name: str
-    trouble: str
+    trouble: Cause | None
 
     def subscribe(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
         """Have the frames with this id handed on, but those that we sent ourselves."""
@@ -47,7 +48,7 @@ class BatteryBus:
         self._clock = clock
         self._closing = threading.Event()
         self._open = False
-        self._trouble = ""
+        self._trouble: Cause | None = None
         self._turn_s = clock()
         self._thread = threading.Thread(target=self._run, name=f"can-{port.name}", daemon=True)
         for node in self._nodes:
@@ -81,9 +82,9 @@ class BatteryBus:
                 while not self._closing.is_set():
                     self._turn()
             except LinkError as error:
-                self._failed(str(error))
+                self._failed(error.cause)
             except Exception as error:  # noqa: BLE001 - the thread must not die, and the reason be seen
-                self._failed(f"CAN bus {self._port.name}: internal error: {error!r}")
+                self._failed(Cause.of("can_internal", bus=self._port.name, error=repr(error)))
             self._open = False
             self._port.close()
             self._closing.wait(REOPEN_S)
@@ -121,13 +122,13 @@ class BatteryBus:
                 self._node_failed(node, error)
 
     def _node_failed(self, node: BatteryNode, error: Exception) -> None:
-        self._show(node, f"BMU 0x{node.node_id:02X} on {self._port.name}: internal error: {error!r}")
+        self._show(node, Cause.of("bmu_internal", node_id=node.node_id, bus=self._port.name, error=repr(error)))
 
-    def _failed(self, problem: str) -> None:
+    def _failed(self, problem: Cause) -> None:
         for node in self._nodes:
             self._show(node, problem)
 
-    def _show(self, node: BatteryNode, problem: str) -> None:
+    def _show(self, node: BatteryNode, problem: Cause) -> None:
         try:
             node.fail(problem, self._clock())
         except Exception:  # the view says it already; only who was to be told of it failed as well

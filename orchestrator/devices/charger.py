@@ -19,7 +19,7 @@ from orchestrator.devices.poll import poll
 from orchestrator.devices.schedule import Schedule, Turn
 from orchestrator.errors import LinkError
 from orchestrator.interlock import Grant, permit
-from orchestrator.model import STOP, ChargerLink, ChargerReading, Command, ControlMode, Sent
+from orchestrator.model import STOP, Cause, ChargerLink, ChargerReading, Command, ControlMode, Sent
 from orchestrator.protocol.charger import OPERATION_STOP_FRAME, STOP_FRAME, encode
 
 #: Without a turn for so long the loop hangs: a write may take 0.2 s, a poll 0.12 s.
@@ -145,29 +145,29 @@ class ChargerPort:
 
     def _obey(self, line: ChargerLine, order: Command, grant: Grant | None) -> None:
         refused = permit(order, grant, self._clock(), self._config, self._limits)
-        if refused:
+        if refused is not None:
             self._poll(line, refused)
         else:
             self._write(line, encode(order), order, Turn.ORDER)
 
     def _write(self, line: ChargerLine, frame: bytes, order: Command, turn: Turn, *, whole_stop: bool = False) -> None:
         start_s = self._clock()
-        found = self._restored(line) if order == STOP else ""
+        found = self._restored(line) if order == STOP else None
         line.write(frame)
         end_s = self._clock()
         self._took(turn, start_s, end_s)
         self._found(found)
         stop_sent_s = end_s if whole_stop else self._view.link.stop_sent_s
-        self._view.publish(sent=Sent(order, end_s), stop_sent_s=stop_sent_s, refused="")
+        self._view.publish(sent=Sent(order, end_s), stop_sent_s=stop_sent_s, refused=None)
 
-    def _restored(self, line: ChargerLine) -> str:
+    def _restored(self, line: ChargerLine) -> Cause | None:
         """What had to be set right. That this fails must not keep a stop from the line."""
         with suppress(LinkError):
             return line.restore()
-        return ""
+        return None
 
-    def _found(self, taken_over: str) -> None:
-        if taken_over:
+    def _found(self, taken_over: Cause | None) -> None:
+        if taken_over is not None:
             self._view.publish(taken_over=taken_over, taken_over_t_s=self._clock())
 
     def _look(self, line: ChargerLine) -> None:
@@ -176,7 +176,7 @@ class ChargerPort:
         self._found(self._restored(line))
         self._view.publish(locked_by=line.locked_by())
 
-    def _poll(self, line: ChargerLine, refused: str = "") -> None:
+    def _poll(self, line: ChargerLine, refused: Cause | None = None) -> None:
         if self._clock() >= self._look_s:
             self._look(line)
         dialogue = self._dialogue
@@ -202,7 +202,7 @@ class ChargerPort:
         self._line = self._open_line()
         self._dialogue, self._look_s = Dialogue(), now_s
         self._restart()
-        self._view.publish(misses=0, problem=f"{self._config.port}: open, no answer yet", bad_frames=0)
+        self._view.publish(misses=0, problem=Cause.of("port_opened", port=self._config.port), bad_frames=0)
 
     def _restart(self) -> None:
         with self._lock:
@@ -212,10 +212,11 @@ class ChargerPort:
         """A port that failed is closed and opened again. After anything else the charger is stopped and polled on."""
         line, locked_by = None, self._view.link.locked_by
         if isinstance(error, LinkError):
-            problem, locked_by = str(error), ""
+            problem, locked_by = error.cause, None
             line, self._line = self._line, None
         else:
-            problem = f"internal: {type(error).__name__}: {error}"
+            said = f"{type(error).__name__}: {error}"
+            problem = Cause.of("charger_internal", port=self._config.port, error=said)
             self._restart()
         with suppress(Exception):  # it may be `on_change` itself that fails
             self._view.publish(online=False, problem=problem, locked_by=locked_by)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from orchestrator.devices.dialogue import SILENCE, Dialogue, Heard
 from orchestrator.devices.line_quality import LineQuality
-from orchestrator.model import ChargerLink, ChargerReading
+from orchestrator.model import Cause, ChargerLink, ChargerReading
 
 #: So many polls in a row without an answer are silence: with one frame in a hundred lost, three come every seven hours,
 #: five once in two years. Five take 1.12 s of the 2.0 s that a silent device may go on for (DESIGN §6).
@@ -23,23 +23,26 @@ class ChargerView:
         self._port, self._on_change = port, on_change
         self._quality = LineQuality()
         #: What other threads may look at.
-        self.current: tuple[ChargerReading | None, ChargerLink] = (None, ChargerLink(problem=f"{port}: not opened yet"))
+        self.current: tuple[ChargerReading | None, ChargerLink] = (
+            None,
+            ChargerLink(problem=Cause.of("port_not_opened", port=port)),
+        )
 
     @property
     def link(self) -> ChargerLink:
         """How the line is doing."""
         return self.current[1]
 
-    def polled(self, reading: ChargerReading | None, dialogue: Dialogue, now_s: float, refused: str) -> None:
+    def polled(self, reading: ChargerReading | None, dialogue: Dialogue, now_s: float, refused: Cause | None) -> None:
         """A poll is over; `reading` is None where no answer came, `refused` why an order did not go out instead."""
         link = self.link
         misses = 0 if reading else link.misses + 1
-        problem = "" if reading else link.problem
+        problem = None if reading else link.problem
         silent = misses >= (LATE_UNTIL_SILENT if dialogue.heard is Heard.LATE_REPLY else MISSES_UNTIL_SILENT)
         complained = dialogue.error_t_s != link.error_t_s
         self._quality.count(now_s, bad=reading is None or complained)
         if silent:
-            problem = f"{self._port}: {SILENCE[dialogue.heard]}"
+            problem = Cause.of(SILENCE[dialogue.heard], port=self._port)
         self.publish(
             reading,
             online=reading is not None or (link.online and not silent),

@@ -40,12 +40,12 @@ class Heard(IntEnum):
     LATE_REPLY = 3
 
 
-#: What silence means to a person, by what was heard instead.
+#: The cause of a silence, by what was heard instead.
 SILENCE = {
-    Heard.NOTHING: "no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + and −)",
-    Heard.NOISE: "only broken frames come in: check shield, ground and termination of the cable, and 19200 8N1",
-    Heard.ERROR_FRAME: "it answers with error frames only: check shield, ground and termination of the cable",
-    Heard.LATE_REPLY: "it answers, but not in time or not what was asked: check for a slow converter in the line",
+    Heard.NOTHING: "charger_no_reply",
+    Heard.NOISE: "charger_noise",
+    Heard.ERROR_FRAME: "charger_complains",
+    Heard.LATE_REPLY: "charger_late",
 }
 
 

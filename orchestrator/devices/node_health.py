@@ -1,6 +1,7 @@
 """Whether the frames of one node id look like those of one healthy node."""
 
 from orchestrator.devices.sdo_client import Verdict
+from orchestrator.model import Cause
 
 BABBLE_HZ = 500  #: frames a second; a node that is read as fast as allowed sends a tenth of that
 #: Second answers are added up, answers as they should be taken off: with a second node on the id every exchange has
@@ -15,7 +16,7 @@ NOT_OURS = (Verdict.THEIRS, Verdict.FRAGMENT, Verdict.UNCLEAR)
 class NodeHealth:
     """Counts what is odd about a node."""
 
-    __slots__ = ("_babbling", "_doubled", "_frames", "_last", "_reason", "_strays", "_window_s")
+    __slots__ = ("_babbling", "_doubled", "_frames", "_last", "_strays", "_why", "_window_s")
 
     def __init__(self) -> None:
         self._frames = 0
@@ -24,7 +25,7 @@ class NodeHealth:
         self._strays = 0
         self._doubled = False
         self._last: Verdict | None = None
-        self._reason = ""
+        self._why: Cause | None = None
 
     def frame(self, now_s: float) -> None:
         """A frame of any kind came."""
@@ -38,31 +39,30 @@ class NodeHealth:
         """That frame was another master's, or an answer to it: as many as that one likes are no babble."""
         self._frames -= 1
 
-    def answer(self, verdict: Verdict, reason: str = "") -> None:
-        """An SDO answer came; `reason` says what is wrong with a malformed one."""
+    def answer(self, verdict: Verdict, why: Cause | None = None) -> None:
+        """An SDO answer came; `why` says what is wrong with a malformed one."""
         if verdict in NOT_OURS:
             self.excuse()
             return
-        self._last, self._reason = verdict, reason
+        self._last, self._why = verdict, why
         if verdict in (Verdict.STRAY, Verdict.SECOND):
             self._strays = min(_MOST, self._strays + _STRAY)
         elif verdict is Verdict.ACCEPTED:
             self._strays = max(0, self._strays - _CLEAN)
         self._doubled = self._strays >= _DOUBLED or (self._doubled and self._strays > 0)
 
-    @property
-    def problem(self) -> str:
-        """Why its answers must not be relied upon, although it answers; "" if nothing is odd."""
+    def problem(self, node_id: int, bus: str) -> Cause | None:
+        """Why its answers must not be relied upon, although it answers; None if nothing is odd."""
         if self._doubled:
-            return "requests are answered twice: two BMUs have this node id, or something else answers for this one"
+            return Cause.of("bmu_doubled", node_id=node_id, bus=bus)
         if self._babbling:
-            return f"it sends more than {BABBLE_HZ} frames a second"
-        return ""
+            return Cause.of("bmu_babbles", node_id=node_id, bus=bus, limit_hz=BABBLE_HZ)
+        return None
 
-    def silence(self, timeout_s: float) -> str:
+    def silence(self, node_id: int, bus: str, timeout_s: float) -> Cause:
         """The best guess why no answer was accepted for some time."""
         if self._last is Verdict.LATE:
-            return f"its answers come later than {timeout_s:g} s (sdo_timeout_s)"
+            return Cause.of("bmu_late", node_id=node_id, bus=bus, timeout_s=timeout_s)
         if self._last is Verdict.MALFORMED:
-            return f"its newest answer is not understood: {self._reason}"
-        return "check its power, the cable, the bit rate and its node switch (node id = switch + 0x10)"
+            return Cause.of("bmu_garbled", node_id=node_id, bus=bus, why=self._why)
+        return Cause.of("bmu_unreachable", node_id=node_id, bus=bus)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import inf
 
 from orchestrator.devices.sdo_client import Key
+from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NmtCommand, SdoAbort, SdoMalformed, SdoReply, SdoWritten
 from orchestrator.protocol.sdo_others import Ask, Part, SdoRequest, parse_part, parse_request, segment_number
 
@@ -26,13 +27,16 @@ _READS, _WRITES, _COMMANDS = range(3)  # how much what they do weighs
 _OUT_OF_STEP = (0x0503, 0x0504)  #: upper half of an abort code: the protocol was not kept, whatever the object is
 _AHEAD = 4  #: segments of a block that may be lost to us alone
 
-_VERBS = {Ask.READ: "reads", Ask.BLOCK_READ: "reads", Ask.WRITE: "writes", Ask.BLOCK_WRITE: "writes"}
+_DEEDS = {
+    Ask.READ: "master_reads", Ask.BLOCK_READ: "master_reads",
+    Ask.WRITE: "master_writes", Ask.BLOCK_WRITE: "master_writes",
+}  # fmt: skip
 _NMT_DEEDS: Mapping[int, str] = {
-    NmtCommand.START: "started {}",
-    NmtCommand.STOP: "stopped {}",
-    NmtCommand.PREOPERATIONAL: "set {} to pre-operational",
-    NmtCommand.RESET_NODE: "reset {}",
-    NmtCommand.RESET_COMMUNICATION: "reset the communication of {}",
+    NmtCommand.START: "master_started",
+    NmtCommand.STOP: "master_stopped",
+    NmtCommand.PREOPERATIONAL: "master_preoperational",
+    NmtCommand.RESET_NODE: "master_reset",
+    NmtCommand.RESET_COMMUNICATION: "master_reset_communication",
 }
 
 
@@ -69,7 +73,7 @@ class OtherMasters:
     )
 
     def __init__(self) -> None:
-        self.said = ""  #: what another master was last seen to do, for a person
+        self.said: Cause | None = None  #: what another master was last seen to do
         self.said_s = -inf  #: when
         self._weight = _READS
         self._open: deque[Open] = deque(maxlen=MOST_OPEN)
@@ -129,21 +133,20 @@ class OtherMasters:
             return request
         writes = request.ask in (Ask.WRITE, Ask.BLOCK_WRITE)
         self._open.append(Open(key, writes, now_s))
-        place = f"0x{request.index:04X}" + (f":{request.sub:02X}" if request.sub else "")
-        self._say(f"another CANopen master {_VERBS[request.ask]} {place}", now_s, _WRITES if writes else _READS)
+        deed = Cause.of(_DEEDS[request.ask], index=request.index, sub=request.sub)
+        self._say(deed, now_s, _WRITES if writes else _READS)
         return request
 
     def commanded(self, command: int, now_s: float, *, everybody: bool) -> None:
         """An NMT command that is not ours, to this node or to all."""
         deed = _NMT_DEEDS.get(command)
         if deed:
-            whom = "all nodes" if everybody else "this node"
-            self._say(f"another CANopen master has {deed.format(whom)} (NMT)", now_s, _COMMANDS)
+            self._say(Cause.of(deed, whom="all_nodes" if everybody else "this_node"), now_s, _COMMANDS)
 
-    def _say(self, text: str, now_s: float, weight: int) -> None:
+    def _say(self, said: Cause, now_s: float, weight: int) -> None:
         """What weighs more is said at once, all else when what was said has stood for SAY_S."""
         if weight > self._weight or now_s >= self.said_s + SAY_S:
-            self.said, self.said_s, self._weight = text, now_s, weight
+            self.said, self.said_s, self._weight = said, now_s, weight
 
     # --- what is answered -----------------------------------------------------------------------------------------
 

@@ -5,7 +5,7 @@ from math import inf
 
 from orchestrator.devices.sdo_client import Key
 from orchestrator.devices.two_answers import TwoAnswers
-from orchestrator.model import Measurement
+from orchestrator.model import Cause, Measurement
 from orchestrator.protocol.objects import ObjectEntry
 from orchestrator.protocol.sdo import SdoAbort, SdoValue
 from orchestrator.protocol.words import Decoded, decode_word
@@ -70,5 +70,6 @@ class Polled:
             if isinstance(tpdo, Measurement) and isinstance(sdo, Measurement):
                 tolerance = TOLERANCE * (field.range.high - field.range.low)
                 if abs(tpdo.value - sdo.value) > tolerance:
-                    different[field.name] = f"{field.name}: a TPDO says {tpdo.value:g}, the SDO read {sdo.value:g}"
+                    one, other = tpdo.value, sdo.value
+                    different[field.name] = Cause.of("tpdo_contradicts", field=field.name, tpdo=one, sdo=other)
         return different

@@ -8,7 +8,7 @@ this module: they are compared only where they differ by more than any battery c
 from math import inf
 
 from orchestrator.devices.sdo_client import Verdict
-from orchestrator.model import Measurement
+from orchestrator.model import Cause, Measurement
 from orchestrator.protocol.objects import FieldMap, ObjectEntry
 from orchestrator.protocol.sdo import SdoReply, SdoValue
 from orchestrator.protocol.words import Decoded, decode_word
@@ -35,22 +35,21 @@ class TwoAnswers:
         self._entry = entry
         self._newest: SdoValue | None = None
         self._newest_s = -inf
-        self._doubts: dict[str, str] = {}
+        self._doubts: dict[str, Cause] = {}
         self._doubts_s = -inf
 
     def took(self, reply: SdoValue, asked_s: float) -> None:
         """This one was taken for the answer to a request of `asked_s`."""
         self._newest, self._newest_s = reply, asked_s
 
-    def doubts(self, now_s: float) -> dict[str, str]:
+    def doubts(self, now_s: float) -> dict[str, Cause]:
         """Why the object's fields are not believed now; empty if they are."""
         if self._doubts and now_s - self._doubts_s >= DOUBT_S:
             self._doubts = {}
         return self._doubts
 
-    def second(self, first: SdoReply, second: SdoReply, now_s: float, share: float = ONE_REQUEST) -> dict[str, str]:
+    def second(self, first: SdoReply, second: SdoReply, now_s: float, share: float = ONE_REQUEST) -> dict[str, Cause]:
         """Two answers to one request came; the doubts of which they are the reason."""
-        texts = _readable(self._entry, first), _readable(self._entry, second)
         words = _fields(self._entry, first), _fields(self._entry, second)
         fields = [field for field in self._entry.fields if share == ONE_REQUEST or field.name in STEADY]
         apart = [field.name for field in fields if _apart(field, *words, share)]
@@ -58,13 +57,14 @@ class TwoAnswers:
             return {}
         self._doubts_s = now_s
         self._doubts = {
-            name: f"{name}: two answers to one request, "
-            + (f"{texts[0][name]} and {texts[1][name]}" if name in apart else f"which differ in {apart[0]}")
-            for name in texts[0]
+            name: Cause.of("two_answers", field=name, one=_shown(words[0][name]), other=_shown(words[1][name]))
+            if name in apart
+            else Cause.of("two_answers_elsewhere", field=name, other=apart[0])
+            for name in words[0]
         }
         return self._doubts
 
-    def other(self, verdict: Verdict, first: SdoReply | None, reply: SdoReply, now_s: float) -> dict[str, str]:
+    def other(self, verdict: Verdict, first: SdoReply | None, reply: SdoReply, now_s: float) -> dict[str, Cause]:
         """An answer came that was not taken; the doubts that it leaves. `first`: the one before, if it is a second."""
         if verdict is Verdict.SECOND and first is not None:
             return self.second(first, reply, now_s)
@@ -74,24 +74,21 @@ class TwoAnswers:
             return self._held_against_newest(reply, now_s, OTHERS, OTHERS_S)
         return {}
 
-    def _held_against_newest(self, reply: SdoReply, now_s: float, share: float, age_s: float) -> dict[str, str]:
+    def _held_against_newest(self, reply: SdoReply, now_s: float, share: float, age_s: float) -> dict[str, Cause]:
         if self._newest is None or now_s - self._newest_s > age_s or not isinstance(reply, SdoValue):
             return {}
         return self.second(self._newest, reply, now_s, share)
 
 
 def _fields(entry: ObjectEntry, reply: SdoReply) -> dict[str, Decoded]:
-    """What an answer says of each field; the same text for each if it is none, or one of another size."""
+    """What an answer says of each field; the same cause for each if it is none, or one of another size."""
     if isinstance(reply, SdoValue):
         return decode_word(entry, reply.value, reply.size, 0.0)
-    return {field.name: "a refusal" for field in entry.fields}
+    return {field.name: Cause("a_refusal") for field in entry.fields}
 
 
-def _readable(entry: ObjectEntry, reply: SdoReply) -> dict[str, str]:
-    return {
-        name: f"{value.value:.1f}" if isinstance(value, Measurement) else value or "not available"
-        for name, value in _fields(entry, reply).items()
-    }
+def _shown(value: Decoded) -> float | Cause:
+    return round(value.value, 1) if isinstance(value, Measurement) else value or Cause("not_available")
 
 
 def _apart(field: FieldMap, first: dict[str, Decoded], second: dict[str, Decoded], share: float) -> bool:

@@ -32,7 +32,8 @@ def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> di
         ) from None
     if not isinstance(answer, dict) or not answer.get("ok"):
         why = answer.get("error") if isinstance(answer, dict) else f"what answers on {path} is no service of this kind"
-        raise ServiceError(str(why or "the service refused"))
+        told = answer.get("cause") if isinstance(answer, dict) else None
+        raise ServiceError(str(why or "the service refused"), told)
     return answer
 
 

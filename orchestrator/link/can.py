@@ -21,6 +21,7 @@ from orchestrator.errors import LinkError, RefusedError
 from orchestrator.link import can_filter, can_text
 from orchestrator.link.can_echo import CanEcho
 from orchestrator.link.can_gate import refusal
+from orchestrator.model import Cause
 from orchestrator.protocol.sdo import FRAME_BYTES, NmtCommand
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class CanBus:
         filtered: bool = True,
     ) -> None:
         self.name = name
-        self.trouble = ""  #: error-passive, bus-off, nobody acknowledges: in words; "" once a frame comes again
+        self.trouble: Cause | None = None  #: error-passive, bus-off, nobody acknowledges; None once a frame comes again
         self._settings = {**PROTECTIVE.get(str(settings.get("interface")), {}), **settings}
         self._nodes = frozenset(nodes)
         self._pages = pages
@@ -120,7 +121,7 @@ class CanBus:
         A full transmit queue is no broken bus but a BMU that is not there: the frame is lost and `trouble` says so.
         """
         if reason := refusal(cob_id, data, self._nodes, pages=self._pages):
-            raise RefusedError(f"{can_text.place(self.name, self._settings)}: not sent: {reason}")
+            raise RefusedError(f"CAN bus {self.name}: not sent: {reason}")
         if self._bus is None:
             raise self._closed()
         try:
@@ -148,7 +149,7 @@ class CanBus:
         if message.is_error_frame:
             self._error_frame(message)
             return
-        self.trouble = ""
+        self.trouble = None
         if message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES:
             return  # none of CANopen's
         if message.arbitration_id in self._callbacks and not self._echo.is_own(message):
@@ -158,9 +159,9 @@ class CanBus:
         said = can_text.error_frame(message.arbitration_id, bytes(message.data))
         if said is None:
             return
-        self.trouble = can_text.filled(said, self._settings)
-        if said == can_text.BUS_OFF:
-            raise LinkError(f"{can_text.place(self.name, self._settings)}: {self.trouble}")
+        self.trouble = can_text.trouble(said, self._settings) if said else None
+        if self.trouble is not None and said == can_text.BUS_OFF:
+            raise LinkError(self.trouble.with_(where=can_text.place(self.name, self._settings)))
 
     def _unreadable(self, error: Exception) -> None:
         """A frame that the driver chokes on is noise, whatever it raises; an errno, or many in a row, is a failure."""
@@ -175,7 +176,7 @@ class CanBus:
                 raise self._failed(broken) from broken
 
     def _closed(self) -> LinkError:
-        return LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
+        return LinkError(Cause.of("can_not_open", where=can_text.place(self.name, self._settings)))
 
     def _failed(self, error: Exception) -> LinkError:
         return LinkError(can_text.failure(self.name, self._settings, error))

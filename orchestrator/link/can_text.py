@@ -1,55 +1,58 @@
-"""What is wrong with a CAN bus, in sentences for the technician who stands before it."""
+"""What is wrong with a CAN bus, as a cause, from what the libraries and the kernel say."""
 
 import errno
-import os
 import termios
 from collections.abc import Iterator, Mapping
+
+from orchestrator.model import Cause
 
 Settings = Mapping[str, object]
 
 _UP = "ip link set {channel} up type can bitrate {bitrate} restart-ms 100"
 
-#: What to do, by errno.
-_ADVICE: Mapping[int, str] = {
-    errno.ENETDOWN: f"the interface is down; bring it up: {_UP}",
-    errno.ENODEV: "there is no such interface: is the adapter plugged in? `ip link` lists what there is",
-    errno.ENXIO: "the adapter is gone: plug it in again",
-    errno.ENOENT: "there is no such device: is the adapter plugged in? Best name it by /dev/serial/by-path",
-    errno.EIO: "the adapter is gone: plug it in again",
-    errno.EACCES: "not allowed: the service's user needs access to this device (for a serial adapter, group dialout)",
-    errno.EPERM: "not allowed: the service's user needs access to this device",
-    errno.ENOTTY: "this is no serial port: check the channel in the station file",
-    errno.EBUSY: "another program holds it: end that program",
-    errno.EAFNOSUPPORT: "this kernel has no CAN: modprobe can_raw, or use another interface",
-    errno.EPROTONOSUPPORT: "this kernel has no raw CAN: modprobe can_raw, or use another interface",
-    errno.ENOBUFS: "the transmit queue is full, nobody acknowledges: check cable, terminators, bit rate, BMU's power",
+#: The cause, by errno; each says what to do.
+_CAUSES: Mapping[int, str] = {
+    errno.ENETDOWN: "can_down",
+    errno.ENODEV: "can_no_interface",
+    errno.ENXIO: "can_gone",
+    errno.ENOENT: "can_no_device",
+    errno.EIO: "can_gone",
+    errno.EACCES: "can_forbidden",
+    errno.EPERM: "can_forbidden",
+    errno.ENOTTY: "can_not_serial",
+    errno.EBUSY: "can_busy",
+    errno.EAFNOSUPPORT: "can_no_kernel",
+    errno.EPROTONOSUPPORT: "can_no_kernel",
+    errno.ENOBUFS: "can_queue_full",
 }
+#: Those that name the command that mends it.
+_BY_COMMAND = ("can_down", "can_bus_off")
 
-#: What to do where there is no errno, by a part of what the libraries say.
-_HINTS: Mapping[str, str] = {
-    "msgpack": "udp_multicast needs it: pip install msgpack",
-    "Write timeout": "the adapter takes nothing any more: unplug it and plug it in again",
-}
+#: The cause where there is no errno, by a part of what the libraries say.
+_HINTS: Mapping[str, str] = {"msgpack": "can_needs_msgpack", "Write timeout": "can_stalled"}
 
 #: Error frames of SocketCAN (linux/can/error.h): the bits of the id.
 _CONTROLLER, _NO_ACK, _BUS_OFF, _RESTARTED = 0x004, 0x020, 0x040, 0x100
 _PASSIVE, _ACTIVE = 0x30, 0x40  # data byte 1 of a controller error: receive or transmit error-passive; active again
 
-BUS_OFF = f"the controller is bus-off; check cable, terminators and bit rate. It recovers by itself only with {_UP}"
-PASSIVE = "the controller is error-passive: check cable, terminators and bit rate"
-NO_ACK = "nobody acknowledges our frames: check the BMU's power, cable and bit rate"
-QUEUE_FULL = _ADVICE[errno.ENOBUFS]
+BUS_OFF, PASSIVE, NO_ACK = "can_bus_off", "can_passive", "can_no_ack"
+QUEUE_FULL = Cause("can_queue_full")
 
 
-def place(name: str, settings: Settings) -> str:
+def place(name: str, settings: Settings) -> Cause:
     """Which bus it is: its name in the station file, and what that stands for."""
-    return f"CAN bus {name} ({settings.get('interface', 'no interface')} {settings.get('channel', '')}".rstrip() + ")"
+    wire = f"{settings.get('interface', '–')} {settings.get('channel', '')}".rstrip()
+    return Cause.of("can_bus", bus=name, wire=wire)
 
 
-def filled(text: str, settings: Settings) -> str:
-    """An advice with this bus's channel and bit rate in it."""
+def trouble(id_: str, settings: Settings) -> Cause:
+    """What an error frame has said, with this bus's channel and bit rate where they are of use."""
+    return Cause.of(id_, command=_command(settings)) if id_ in _BY_COMMAND else Cause(id_)
+
+
+def _command(settings: Settings) -> str:
     channel, bitrate = settings.get("channel", "can0"), settings.get("bitrate", 250_000)
-    return text.replace("{channel}", str(channel)).replace("{bitrate}", str(bitrate))
+    return _UP.format(channel=channel, bitrate=bitrate)
 
 
 def chain(error: BaseException) -> Iterator[BaseException]:
@@ -77,28 +80,26 @@ def _number(error: BaseException) -> object:
     return getattr(error, "error_code", None)  # python-can's
 
 
-def failure(name: str, settings: Settings, error: BaseException) -> str:
-    """The sentence for an exception of python-can, canopen or the operating system."""
+def failure(name: str, settings: Settings, error: BaseException) -> Cause:
+    """The cause of an exception of python-can, canopen or the operating system."""
     number = errno_of(error)
-    if number is not None:
-        advice = filled(_ADVICE.get(number, ""), settings)
-        what = f"{os.strerror(number)} (errno {number})"
-    else:
-        what, advice = _unnumbered(error)
-    return f"{place(name, settings)}: {what}" + (f": {advice}" if advice else "")
+    if number is None:
+        return _unnumbered(error).with_(where=place(name, settings))
+    id_, code = _CAUSES.get(number, "can_failed"), errno.errorcode.get(number, str(number))
+    command = {"command": _command(settings)} if id_ in _BY_COMMAND else {}
+    return Cause.of(id_, error=code, **command, where=place(name, settings))
 
 
-def _unnumbered(error: BaseException) -> tuple[str, str]:
+def _unnumbered(error: BaseException) -> Cause:
     text = "; ".join(dict.fromkeys(str(link) for link in chain(error) if str(link)))
-    if advice := next((advice for hint, advice in _HINTS.items() if hint in text), None):
-        return text, advice
+    if id_ := next((id_ for hint, id_ in _HINTS.items() if hint in text), None):
+        return Cause.of(id_, error=text)
     kind = type(error).__name__
-    what = f"{kind}: {text}" if text else kind
-    return what, "check the bus's settings in the station file, and that the interface's driver is installed"
+    return Cause.of("can_not_understood", error=f"{kind}: {text}" if text else kind)
 
 
 def error_frame(can_id: int, data: bytes) -> str | None:
-    """What an error frame says of the bus: `BUS_OFF`, `PASSIVE`, `NO_ACK`, "" for recovered; None for passing noise."""
+    """The id of what an error frame says of the bus, "" for recovered; None for passing noise."""
     if can_id & _BUS_OFF:
         return BUS_OFF
     if can_id & _RESTARTED:

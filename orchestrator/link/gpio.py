@@ -6,10 +6,10 @@ library).
 """
 
 import errno
-import os
 from typing import TYPE_CHECKING, Self
 
 from orchestrator.errors import LinkError
+from orchestrator.model import Cause
 
 if TYPE_CHECKING:
     import gpiod
@@ -18,23 +18,17 @@ if TYPE_CHECKING:
 #: What `gpioinfo` shows as the line's user.
 CONSUMER = "orchestrator"
 
-_NO_CHIP = "no such GPIO chip: check the name in the station file (gpiodetect lists them)"
-_FORBIDDEN = "permission denied: add the user that runs this to the chip's group (ls -l shows it), then log in again"
-_BUSY = "in use: another program or a driver of the kernel holds the line (gpioinfo shows which)"
-_NO_LINE = "it has no such line, or the line cannot be an output (gpioinfo lists them)"
-_GONE = "not a GPIO chip, or one that is gone: check its name (gpiodetect lists them), or plug its adapter in again"
-
-#: What a person has to know and do, by what the kernel says.
-_SENTENCES = {
-    errno.ENOENT: _NO_CHIP,
-    errno.ENOTTY: _NO_CHIP,
-    errno.EACCES: _FORBIDDEN,
-    errno.EPERM: _FORBIDDEN,
-    errno.EBUSY: _BUSY,
-    errno.EINVAL: _NO_LINE,
-    errno.EIO: _GONE,
-    errno.ENODEV: _GONE,
-    errno.ENXIO: _GONE,
+#: The cause, by what the kernel says; each says what to do.
+_CAUSES = {
+    errno.ENOENT: "gpio_missing",
+    errno.ENOTTY: "gpio_missing",
+    errno.EACCES: "gpio_forbidden",
+    errno.EPERM: "gpio_forbidden",
+    errno.EBUSY: "gpio_busy",
+    errno.EINVAL: "gpio_no_line",
+    errno.EIO: "gpio_gone",
+    errno.ENODEV: "gpio_gone",
+    errno.ENXIO: "gpio_gone",
 }
 
 
@@ -43,10 +37,7 @@ def need_gpiod() -> None:
     try:
         import gpiod  # noqa: F401, PLC0415 - only where a station has a contactor
     except ImportError:
-        raise LinkError(
-            "the station file names a contactor, which needs the package gpiod: "
-            "pip install 'charging-station-orchestrator[gpio]'"
-        ) from None
+        raise LinkError(Cause("gpio_not_installed")) from None
 
 
 class OutputLine:
@@ -104,5 +95,5 @@ def describe(chip: str, line: int) -> str:
 
 def _failed(error: Exception, chip: str, line: int) -> LinkError:
     number = error.errno if isinstance(error, OSError) else errno.EINVAL  # gpiod: "line offset out of range"
-    sentence = _SENTENCES.get(number or 0) or f"cannot be driven ({os.strerror(number or 0)})"
-    return LinkError(f"{chip} line {line}: {sentence}")
+    id_ = _CAUSES.get(number or 0, "gpio_failed")
+    return LinkError(Cause.of(id_, chip=chip, line=line, error=errno.errorcode.get(number or 0, str(number))))

@@ -22,6 +22,8 @@ from serial.rs485 import RS485Settings
 from orchestrator.errors import LinkError
 from orchestrator.lastresort import line_settings
 from orchestrator.lastresort.port_owner import holder
+from orchestrator.link.port_cause import GONE, errno_of, port_cause, program, settings_found
+from orchestrator.model import Cause
 
 BAUD = 19200  #: 8 data bits, no parity, 1 stop bit, no flow control (protocol 2/2, §2.2.2)
 BYTE_S = 10 / BAUD  #: start bit, 8 data bits, stop bit: 0.52 ms
@@ -31,36 +33,7 @@ _READ_SIZE = 4096  #: more than a line can bring in several slots
 #: What pyserial 3.5 raises when a port is unplugged, closed, odd or not there (SerialException is an OSError).
 _FAILURES = (OSError, termios.error, TypeError, ValueError)
 
-_MISSING = "no such port: check that the adapter is plugged in, and the name (ls -l /dev/serial/by-path)"
-_GONE = "the adapter was unplugged or lost its power, or another program reads this port; plug it in again"
-_BUSY = "in use: another program holds it, or two bays name the same port; close the other one (lsof shows it)"
-_FORBIDDEN = "permission denied: add the user that runs this to the group dialout, then log in again"
-_NO_PORT = "it is no serial port: check the name in the station file (ls -l /dev/serial/by-path)"
-_STUBBORN = f"its driver does not take the charger's settings, {BAUD} baud 8N1; use another adapter"
 _ESSENTIAL = ("baud", "data bits", "parity")  #: else no charger understands a word
-_STALLED = f"stalled, it took nothing for {WRITE_TIMEOUT_S:g} s; unplug the adapter and plug it in again"
-_TAKEN = (
-    "another program has opened it for itself alone (TIOCEXCL), so that nobody else can stop this charger: end that "
-    "program{who}, or cut the charger's mains"
-)
-_FULL = "too many open files: raise the limit of the service (LimitNOFILE)"
-
-#: What a person has to know and do, by what the kernel says.
-_SENTENCES = {
-    errno.ENOENT: _MISSING,
-    errno.EACCES: _FORBIDDEN,
-    errno.EPERM: _FORBIDDEN,
-    errno.EAGAIN: _BUSY,  # its lock (flock) is taken
-    errno.EBUSY: _TAKEN,
-    errno.EIO: _GONE,
-    errno.ENXIO: _GONE,
-    errno.ENODEV: _GONE,
-    errno.ENOTTY: _NO_PORT,
-    errno.EINVAL: _NO_PORT,
-    errno.EISDIR: _NO_PORT,
-    errno.EMFILE: _FULL,
-    errno.ENFILE: _FULL,
-}
 
 
 class SerialLine:
@@ -75,10 +48,11 @@ class SerialLine:
         self._writable = select.poll()
         self._writable.register(self._fd, select.POLLOUT)
         self._tolerated = ""
-        self.restore()  # pyserial does not set all of it; output may be suspended, say
-        self._tolerated = self.restore()  # what the driver does not take is nobody else's doing
+        self._restore()  # pyserial does not set all of it; output may be suspended, say
+        self._tolerated = self._restore()  # what the driver does not take is nobody else's doing
         if any(word in self._tolerated for word in _ESSENTIAL):
-            raise LinkError(f"{self._path}: {_STUBBORN} ({self._tolerated})")
+            found = tuple(self._tolerated.split(", "))
+            raise LinkError(Cause.of("port_stubborn", port=self._path, baud=BAUD, found=found))
 
     @classmethod
     def open(cls, path: str, *, kernel_rs485: bool = False) -> Self:
@@ -92,7 +66,7 @@ class SerialLine:
         try:
             port = _open(path, exclusive=True)
         except LinkError as error:
-            if error.__cause__ is None or _number(error.__cause__) != errno.EAGAIN or holder(path).ours:
+            if error.__cause__ is None or errno_of(error.__cause__) != errno.EAGAIN or holder(path).ours:
                 raise
             locked, port = False, _open(path, exclusive=None)
         if kernel_rs485:
@@ -100,25 +74,25 @@ class SerialLine:
                 port.rs485_mode = RS485Settings()
             except _FAILURES as error:
                 port.close()
-                raise LinkError(
-                    f"{path}: its driver cannot switch the direction of an RS-485 line (rs485: kernel); "
-                    "use an adapter that switches by itself, with rs485: off"
-                ) from error
+                raise LinkError(Cause.of("port_not_rs485", port=path)) from error
         try:
             return cls(port, locked=locked)
         except LinkError:
             port.close()
             raise
 
-    def restore(self) -> str:
-        """Set the port up again if another program has changed it; what was found, in words, "" where all was well."""
+    def restore(self) -> Cause | None:
+        """Set the port up again if another program has changed it; what was found, None where all was well."""
+        return settings_found(self._restore())
+
+    def _restore(self) -> str:
         try:
             return line_settings.restore(self._port.fileno(), self._tolerated)
         except _FAILURES as error:
             raise self._failed(error) from error
 
-    def locked_by(self) -> str:
-        """Which program holds the port's lock instead of us, "" once it is ours: it is asked for again each time."""
+    def locked_by(self) -> Cause | None:
+        """Which program holds the port's lock instead of us, None once it is ours: it is asked for again each time."""
         try:
             fd = self._port.fileno()
             line_settings.share(fd)
@@ -126,10 +100,10 @@ class SerialLine:
                 fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._locked = True
         except BlockingIOError:
-            return str(holder(self._path, (os.getpid(), os.getppid())))
+            return program(holder(self._path, (os.getpid(), os.getppid())))
         except _FAILURES as error:
             raise self._failed(error) from error
-        return ""
+        return None
 
     def write(self, data: bytes) -> None:
         """Hand `data` to the port; it is on the wire `BYTE_S` a byte later. LinkError if the line takes nothing."""
@@ -140,7 +114,7 @@ class SerialLine:
                 raise serial.SerialTimeoutException
         except (serial.SerialTimeoutException, BlockingIOError) as error:
             self._forget_output()
-            raise LinkError(f"{self._path}: {_STALLED}") from error
+            raise LinkError(Cause.of("port_stalled", port=self._path, limit_s=WRITE_TIMEOUT_S)) from error
         except _FAILURES as error:
             raise self._failed(error) from error
 
@@ -186,7 +160,7 @@ class SerialLine:
             return  # then there is no port left that could send it
 
     def _failed(self, error: Exception) -> LinkError:
-        return LinkError(f"{self._path}: {_sentence(error, self._path, otherwise=_GONE)}")
+        return LinkError(port_cause(error, self._path, otherwise=GONE))
 
 
 def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
@@ -204,7 +178,7 @@ def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
                 raise
             port.open()
     except _FAILURES as error:
-        raise LinkError(f"{path}: {_sentence(error, path, otherwise='cannot be opened')}") from error
+        raise LinkError(port_cause(error, path, otherwise="port_failed")) from error
     return port
 
 
@@ -221,29 +195,3 @@ def _taken_back(path: str) -> bool:
     finally:
         with suppress(OSError):
             os.close(fd)
-
-
-def _sentence(error: BaseException, path: str, *, otherwise: str) -> str:
-    """The words for an error, by its errno."""
-    number = _number(error)
-    if number is None:
-        return f"{otherwise} ({error})"
-    sentence = _SENTENCES.get(number) or f"{otherwise} ({os.strerror(number)})"
-    return sentence.format(who=_who(path)) if "{who}" in sentence else sentence
-
-
-def _who(path: str) -> str:
-    """ " gpsd (pid 812)", "" where that cannot be told."""
-    found = holder(path, (os.getpid(),))
-    return f" {found}" if found.pid else ""
-
-
-def _number(error: BaseException) -> int | None:
-    """An error's errno: often pyserial keeps that only in the error's cause or first argument."""
-    cause: BaseException | None = error
-    while cause is not None:
-        number = getattr(cause, "errno", None) or (cause.args[0] if cause.args else None)
-        if isinstance(number, int):
-            return number
-        cause = cause.__context__
-    return None

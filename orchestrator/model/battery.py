@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 
+from orchestrator.model.cause import Cause
+
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
@@ -46,18 +48,18 @@ class BatteryLink:
     """How the line to a BMU is doing. Silence and refusal are two different faults."""
 
     online: bool = False  #: it answered within the stale limit
-    problem: str = ""  #: why not, for a person: bus, node, what to do
+    problem: Cause | None = None  #: why not
     boots: int = 0  #: boot-up frames seen
     boot_t_s: float | None = None  #: when the newest came
     heartbeat_s: float | None = None  #: period that the BMU accepted, None while there is none
     heartbeat_t_s: float | None = None  #: newest heartbeat, or when it was armed
     nmt_state: int | None = None
-    abort: str = ""  #: a read that the BMU refuses: object, code and meaning; "" once it answers again
+    abort: Cause | None = None  #: a read that the BMU refuses: object, code and meaning; None once it answers again
     abort_code: int = 0
-    implausible: Mapping[str, str] = field(default_factory=dict)  #: field → why its newest value was thrown away
-    emergency: str = ""  #: newest EMCY that is not "error reset"
+    implausible: Mapping[str, Cause] = field(default_factory=dict)  #: field → why its newest value was thrown away
+    emergency: Cause | None = None  #: newest EMCY that is not "error reset"
     bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers
-    other_master: str = ""  #: what another CANopen master was last seen to do with this node
+    other_master: Cause | None = None  #: what another CANopen master was last seen to do with this node
     other_master_t_s: float | None = None  #: when that was
-    heartbeat_set: str = ""  #: what somebody else had set this node's heartbeat to when that was last found
+    heartbeat_set: Cause | None = None  #: what somebody else had set this node's heartbeat to when that was last found
     heartbeat_set_t_s: float | None = None  #: when that was; ours was written again at once

@@ -6,9 +6,11 @@ from math import isfinite
 from typing import Any
 
 #: A cause within a cause within a cause … is nothing that was ever said.
-DEPTH = 8
+DEPTH = 10
 #: Several causes at once, in `whats`.
 SEVERAL = "several"
+#: A mere sentence, in `text`.
+SAID = "said"
 #: The parts of a cause in JSON.
 PARTS = frozenset({"id", "params", "key", "place", "advice", "text"})
 
@@ -47,6 +49,11 @@ class Cause:
 def together(causes: Sequence[Cause]) -> Cause:
     """One cause for all of them: itself where there is only one."""
     return causes[0] if len(causes) == 1 else Cause.of(SEVERAL, whats=tuple(causes))
+
+
+def said(text: str) -> Cause:
+    """A sentence of which nobody knows more: one from before there were causes, or of no account."""
+    return Cause.of(SAID, text=text)
 
 
 def plain(cause: Cause) -> dict[str, object]:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag, StrEnum
 
+from orchestrator.model.cause import Cause
+
 
 class ControlMode(IntEnum):
     """Who sets the values: the charger's rotary switch (§1.3.1)."""
@@ -90,7 +92,7 @@ class ChargerReading:
     charge_mode: ChargeMode | None
     precharge: Precharge | None
     connection: Connection | None
-    illegal: tuple[str, ...] = ()  #: e.g. "charge mode 9 (documented: 1 … 8)"
+    illegal: tuple[Cause, ...] = ()  #: the values that are not documented
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,15 +108,15 @@ class ChargerLink:
     """How the line to a charger is doing."""
 
     online: bool = False  #: it answered one of the last five polls
-    problem: str = ""  #: why not, for a person: port, errno text, what to do
+    problem: Cause | None = None  #: why not
     misses: int = 0  #: polls in a row without an answer
     sent: Sent | None = None
     stop_sent_s: float | None = None  #: when the last whole stop was handed to the port
-    refused: str = ""  #: the interlock's reason, if it held the standing order back
+    refused: Cause | None = None  #: the interlock's reason, if it held the standing order back
     error_bits: int = 0  #: of the newest 0x1F frame
     error_t_s: float | None = None  #: when that frame came
     bad_frames: int = 0  #: frames dropped since the port was opened: checksum, length, end
     bad_pct: float = 0.0  #: of the last minute's polls, those without a good answer or with a complaint
-    taken_over: str = ""  #: what another program had set this port to when that was last found: "115200 baud"
+    taken_over: Cause | None = None  #: what another program had set this port to when that was last found
     taken_over_t_s: float | None = None  #: when that was; the port was set up again at once
-    locked_by: str = ""  #: which program, none of ours, holds the port's lock now; it is used in spite of that, to stop
+    locked_by: Cause | None = None  #: which program, none of ours, holds the port's lock; it is used in spite of that

@@ -29,10 +29,10 @@ class Snapshot:
     internal: str = ""  #: an exception of our own code, caught at the boundary, in words
     late_s: float = 0.0  #: how much later than planned this step comes
     slept_s: float = 0.0  #: how long the whole machine was suspended since the step before
-    unkept: str = ""  #: why faults that latch now would be forgotten by a restart, "" while they would not
-    ending: str = ""  #: why the service is about to end, "" while it is not
+    unkept: Cause | None = None  #: why faults that latch now would be forgotten by a restart; None while they would not
+    ending: Cause | None = None  #: why the service is about to end; None while it is not
     connected: bool = True  #: nothing is between charger and battery, or a contactor that was closed for this reading
-    contactor_problem: str = ""  #: why the contactor cannot be driven, for a person: chip, line, what to do
+    contactor_problem: Cause | None = None  #: why the contactor cannot be driven
     waits: Cause | None = (
         None  #: why no charge may begin here right now, though nothing is wrong: another bay begins one
     )

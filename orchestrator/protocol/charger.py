@@ -9,6 +9,7 @@ from typing import Any
 from orchestrator.errors import ProtocolError
 from orchestrator.model import (
     Action,
+    Cause,
     ChargeMode,
     ChargerReading,
     Command,
@@ -128,12 +129,16 @@ class StatusValue:
     decode: Callable[[int], float]  #: of the 16 raw bits; ValueError if they are not documented
     documented: str = ""  #: the values that are
 
-    def value(self, raw: int) -> float | str:
-        """The value, or why it is none: "charge mode 9 (documented: 1 … 8)"."""
+    def value(self, raw: int) -> float | Cause:
+        """The value, or why it is none."""
         try:
             return self.decode(raw)
         except ValueError:
-            return f"{self.title} {raw} (documented: {self.documented})"
+            return Cause.of("undocumented", value=self.name, raw=raw, documented=self.documented)
+
+    def refused(self, raw: int) -> str:
+        """The same for who decodes frames by hand: "charge mode 9 (documented: 1 … 8)"."""
+        return f"{self.title} {raw} (documented: {self.documented})"
 
 
 #: In the order of a reply. The document numbers the data of the ten defined values 1 to 20 without a gap, so the six
@@ -179,8 +184,8 @@ def _expect(frame: Frame, code: Code, size: int, order: int) -> None:
         )
 
 
-def parse_values(frame: Frame, kind1: int, kind2: int) -> dict[str, float | str]:
-    """The values of a reply to a request for any kinds, by name; a str says why a value is none of the documented ones.
+def parse_values(frame: Frame, kind1: int, kind2: int) -> dict[str, float | Cause]:
+    """The values of a reply to a request for any kinds, by name; a Cause says why a value is not documented.
 
     ProtocolError if the frame cannot be that reply.
     """
@@ -193,15 +198,15 @@ def parse_values(frame: Frame, kind1: int, kind2: int) -> dict[str, float | str]
 def parse_status(frame: Frame, kinds: Kinds, t_s: float) -> ChargerReading:
     """The reading in a reply to a request for `kinds`, which must hold `STATUS_KINDS`, sent at `t_s`.
 
-    A value outside its documented list is None and has its sentence in `illegal`. ProtocolError as in `parse_values`.
+    A value outside its documented list is None and has its cause in `illegal`. ProtocolError as in `parse_values`.
     """
     if STATUS_KINDS[0] & ~kinds[0] or STATUS_KINDS[1] & ~kinds[1]:
         raise ValueError(f"kinds {kinds[0]:#04x} {kinds[1]:#04x} do not fill a reading")
     values = parse_values(frame, *kinds)
-    illegal = tuple(value for value in values.values() if isinstance(value, str))
+    illegal = tuple(value for value in values.values() if isinstance(value, Cause))
     reading: dict[str, Any] = {row.name: values[row.name] for row in status_values(*STATUS_KINDS)}
     if illegal:
-        reading = {name: None if isinstance(value, str) else value for name, value in reading.items()}
+        reading = {name: None if isinstance(value, Cause) else value for name, value in reading.items()}
     return ChargerReading(t_s=t_s, illegal=illegal, **reading)
 
 

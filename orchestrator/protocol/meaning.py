@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
-from orchestrator.model import ErrorBit
+from orchestrator.model import Cause, ErrorBit
 from orchestrator.protocol.charger import (
     STATUS_KINDS,
     Code,
@@ -109,11 +109,13 @@ def _status_reply(frame: Frame, kinds: Kinds | None) -> Meaning:
     meaning = Meaning(facts={"kind1": asked[0], "kind2": asked[1]})
     for at, row in enumerate(rows):
         two = frame.data[2 * at : 2 * at + 2]
-        value = row.value(int.from_bytes(two))
-        if isinstance(value, str):
-            meaning.problems.append(value)
-        meaning.facts[row.name] = None if isinstance(value, str) else value
-        meaning.rows.append((two, value if isinstance(value, str) else f"{row.title} {_words(row.name, value)}"))
+        raw = int.from_bytes(two)
+        value = row.value(raw)
+        if isinstance(value, Cause):
+            meaning.problems.append(row.refused(raw))
+        meaning.facts[row.name] = None if isinstance(value, Cause) else value
+        said = row.refused(raw) if isinstance(value, Cause) else f"{row.title} {_words(row.name, value)}"
+        meaning.rows.append((two, said))
     if kinds is None:
         meaning.rows.append((b"", f"taken for the kinds 0x{asked[0]:02X} 0x{asked[1]:02X} that the service asks for"))
     return meaning

@@ -7,7 +7,8 @@ understood on purpose. Everything is little-endian (§3).
 from dataclasses import dataclass
 from enum import IntEnum
 
-from orchestrator.protocol.hextext import byte_count, hex_of
+from orchestrator.model import Cause
+from orchestrator.protocol.hextext import hex_of
 
 FRAME_BYTES = 8
 
@@ -111,19 +112,17 @@ class SdoAbort:
     code: int
 
     @property
-    def meaning(self) -> str:
-        """The code in words (CiA 301, table 22)."""
-        return ABORT_MEANINGS.get(self.code, "not a documented reason")
-
-    def __str__(self) -> str:
-        return f"0x{self.index:04X}:{self.sub:02X} aborted with 0x{self.code:08X}: {self.meaning}"
+    def cause(self) -> Cause:
+        """What it refuses, and why: the code's meaning is a word of the catalogue (CiA 301, table 22)."""
+        meaning = f"sdo_{self.code:08X}" if self.code in ABORTS else "sdo_undocumented"
+        return Cause.of("sdo_abort", index=self.index, sub=self.sub, code=self.code, meaning=meaning)
 
 
 @dataclass(frozen=True, slots=True)
 class SdoMalformed:
     """Not a reply that we understand; it counts as none."""
 
-    reason: str
+    cause: Cause
 
 
 SdoReply = SdoValue | SdoWritten | SdoAbort | SdoMalformed
@@ -132,7 +131,7 @@ SdoReply = SdoValue | SdoWritten | SdoAbort | SdoMalformed
 def parse_reply(data: bytes | bytearray) -> SdoReply:
     """What a frame on a node's reply COB-ID says. Never raises. (python-can hands out bytearrays.)"""
     if len(data) != FRAME_BYTES:
-        return SdoMalformed(f"{byte_count(len(data))}, expected {FRAME_BYTES}: {hex_of(data)}")
+        return SdoMalformed(Cause.of("sdo_length", size=len(data), expected=FRAME_BYTES, data=hex_of(data)))
     command, index, sub = data[0], data[1] | data[2] << 8, data[3]
     size = _VALUE.get(command)
     if size is not None:
@@ -141,40 +140,13 @@ def parse_reply(data: bytes | bytearray) -> SdoReply:
         return SdoWritten(index, sub)
     if command == _ABORT:
         return SdoAbort(index, sub, int.from_bytes(data[4:], "little"))
-    return SdoMalformed(f"command 0x{command:02X}, expected 43, 4B, 4F, 60 or 80: {hex_of(data)}")
+    return SdoMalformed(Cause.of("sdo_command", command=command, data=hex_of(data)))
 
 
-#: CiA 301, table 22.
-ABORT_MEANINGS = {
-    0x05030000: "toggle bit not alternated",
-    0x05040000: "SDO protocol timed out",
-    0x05040001: "command specifier not valid or unknown",
-    0x05040002: "invalid block size",
-    0x05040003: "invalid sequence number",
-    0x05040004: "CRC error",
-    0x05040005: "out of memory",
-    0x06010000: "unsupported access to an object",
-    0x06010001: "attempt to read a write-only object",
-    0x06010002: "attempt to write a read-only object",
-    0x06020000: "object does not exist in the object dictionary",
-    0x06040041: "object cannot be mapped to the PDO",
-    0x06040042: "the objects to be mapped would exceed the PDO's length",
-    0x06040043: "general parameter incompatibility",
-    0x06040047: "general internal incompatibility in the device",
-    0x06060000: "access failed because of a hardware error",
-    0x06070010: "data type or length does not match",
-    0x06070012: "data type does not match: too long",
-    0x06070013: "data type does not match: too short",
-    0x06090011: "sub-index does not exist",
-    0x06090030: "invalid value for the parameter",
-    0x06090031: "value of the parameter too high",
-    0x06090032: "value of the parameter too low",
-    0x06090036: "maximum value is less than minimum value",
-    0x060A0023: "resource not available: SDO connection",
-    0x08000000: "general error",
-    0x08000020: "data cannot be transferred or stored",
-    0x08000021: "data cannot be transferred or stored because of local control",
-    0x08000022: "data cannot be transferred or stored in the device's present state",
-    0x08000023: "no object dictionary is present",
-    0x08000024: "no data available",
-}
+#: The codes that CiA 301 knows (table 22).
+ABORTS = frozenset({
+    0x05030000, 0x05040000, 0x05040001, 0x05040002, 0x05040003, 0x05040004, 0x05040005, 0x06010000,
+    0x06010001, 0x06010002, 0x06020000, 0x06040041, 0x06040042, 0x06040043, 0x06040047, 0x06060000,
+    0x06070010, 0x06070012, 0x06070013, 0x06090011, 0x06090030, 0x06090031, 0x06090032, 0x06090036,
+    0x060A0023, 0x08000000, 0x08000020, 0x08000021, 0x08000022, 0x08000023, 0x08000024,
+})  # fmt: skip

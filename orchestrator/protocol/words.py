@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable
 
-from orchestrator.model import Measurement
-from orchestrator.protocol.hextext import byte_count
+from orchestrator.model import Cause, Measurement
 from orchestrator.protocol.objects import FieldMap, ObjectEntry
 
 #: What a field's newest raw bits turned out to be: a value in range; None where the BMU says that it has none (so a
-#: reading's field becomes unknown, which is no fault by itself); or, in words, why they cannot be believed.
-Decoded = Measurement | str | None
+#: reading's field becomes unknown, which is no fault by itself); or why they cannot be believed.
+Decoded = Measurement | Cause | None
 
 
 def raw_bits(field: FieldMap, word: int) -> int:
@@ -19,7 +18,7 @@ def raw_bits(field: FieldMap, word: int) -> int:
 def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[str, Decoded]:
     """Every field of an object, from the unsigned word that a reply of `size` bytes carried; asked for at `t_s`."""
     if size != entry.size:
-        why = f"0x{entry.index:04X}:{entry.sub:02X} declared {byte_count(size)}, the map says {entry.size}"
+        why = Cause.of("size_differs", index=entry.index, sub=entry.sub, size=size, expected=entry.size)
         return {field.name: why for field in entry.fields}
     return decode_fields(entry.fields, word, t_s)
 
@@ -37,4 +36,5 @@ def _decode(field: FieldMap, word: int, t_s: float) -> Decoded:
     value = round(signed * field.scale + field.offset, 9)  # 29.11, not 29.110000000000003
     if field.range.low <= value <= field.range.high:
         return Measurement(value, t_s)
-    return f"{field.name} {value:g} is outside {field.range} (raw 0x{raw:0{(field.width + 3) // 4}X})"
+    low, high, digits = field.range.low, field.range.high, (field.width + 3) // 4
+    return Cause.of("value_outside", field=field.name, value=value, low=low, high=high, raw=f"0x{raw:0{digits}X}")

@@ -30,9 +30,8 @@ from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
 from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.starts import Starts
-from orchestrator.service.status import bay_status
+from orchestrator.service.status import bay_status, contactor_fields
 from orchestrator.service.store import Store
-from orchestrator.text.catalogue import say
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
@@ -48,7 +47,7 @@ class BayRunner:
         battery: Battery,
         journal: Journal,
         store: Store,
-        say: Callable[[str], None],
+        say: Callable[[Cause], None],
         *,
         contactor: Contactor | None = None,
         starts: Starts | None = None,
@@ -62,13 +61,13 @@ class BayRunner:
         self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
         self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
         self._revision = 0  # the one that keeps this bay's memory
-        self._ending = ""
+        self._ending: Cause | None = None
         self._waits: Cause | None = None  # why the next run has to wait for an operator
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # nobody to wait for
-        self._written: tuple[str, bool] | None = None  # of the contactor: its problem, and whether it is closed
+        self._written: tuple[Cause | None, bool] | None = None  # of the contactor: problem, closed
         self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
         self._requests = Requests()
         self._internal = ""
@@ -93,7 +92,7 @@ class BayRunner:
         """At the end of the service: nobody can wait any longer for an answer."""
         self._answers.look(inf)
 
-    def end(self, why: str, *, orderly: bool = True) -> None:
+    def end(self, why: Cause, *, orderly: bool = True) -> None:
         """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it.
 
         Unless it is not `orderly` and ends a charge: that one waits for an operator, as after any other failure (G3).
@@ -138,7 +137,7 @@ class BayRunner:
         where = traceback.extract_tb(error.__traceback__)[-1]
         internal = f"{error!r} in {where.name}, line {where.lineno}"
         if internal != self._internal:
-            self._say(f"{self.name}: internal error, stopping: {internal}")
+            self._say(Cause.of("bay_internal", bay=self.name, error=internal))
         self._internal, self.last_s = internal, now_s
         try:
             snapshot, memory = replace(self._snapshot, request=request), self._memory
@@ -166,9 +165,14 @@ class BayRunner:
         for line in lines:
             self._journal.put(self.name, line)
         if before is None or before.state is not decision.state:
-            states = f"{before.state} → {decision.state}" if before else decision.state
-            self._say(f"{self.name}: {states}: {say(decision.cause, self._language)}")
+            self._say(self._transition(before, decision))
         self._keep(self._memory, now_s)
+
+    def _transition(self, before: Decision | None, now: Decision) -> Cause:
+        state = now.state.value
+        if before is None:
+            return Cause.of("bay_begins", bay=self.name, state=state, reason=now.cause)
+        return Cause.of("bay_goes", bay=self.name, before=before.state.value, state=state, reason=now.cause)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """All that is known of the bay now."""
@@ -207,14 +211,14 @@ class BayRunner:
         now = (contactor.problem, contactor.closed_s is not None)
         if now != self._written:
             self._written = now
-            self._journal.put(self.name, ("contactor", {"closed": now[1], "problem": now[0]}))
+            self._journal.put(self.name, ("contactor", contactor_fields(contactor, self._language)))
 
     def _take_over(self) -> None:
         bay = self.policy.take_over()
         if bay is not None:
             if self._recorder is not None:
                 self._recorder.begin(bay)
-            self._say(f"{self.name}: {name_of(bay)} is in force")
+            self._say(Cause.of("policy_in_force", bay=self.name, policy=name_of(bay)))
 
     def _keep(self, memory: Memory, now_s: float) -> None:
         persisted = Persisted.of(memory, now_s)
@@ -229,7 +233,7 @@ class BayRunner:
         contactor = self._contactor
         return {
             **status,
-            "contactor": contactor and {"closed": contactor.closed_s is not None, "problem": contactor.problem},
+            "contactor": contactor and contactor_fields(contactor, self._language),
             "port": self.place.port,
             "policy": self.policy.status(),
         }

@@ -5,7 +5,8 @@ import socket
 import struct
 from collections.abc import Mapping
 
-from orchestrator.errors import ServiceError
+from orchestrator.errors import RequestError
+from orchestrator.model import Cause
 
 #: The longest request.
 MAX_REQUEST = 4096
@@ -40,7 +41,7 @@ class Client:
         return pid, uid, gid
 
     def hear(self, now_s: float) -> bool:
-        """Take what has come; whether the request is complete. ServiceError where it cannot become one any more."""
+        """Take what has come; whether the request is complete. RequestError where it cannot become one any more."""
         try:
             part = self._connection.recv(MAX_REQUEST + 1 - len(self._heard))
         except BlockingIOError:
@@ -48,7 +49,7 @@ class Client:
         self._heard += part
         self.heard_s = now_s
         if not part or len(self._heard) > MAX_REQUEST:
-            raise ServiceError(f"a request is one line of at most {MAX_REQUEST} bytes")
+            raise RequestError(Cause.of("request_too_long", limit=MAX_REQUEST))
         if b"\n" in part:
             self.line = bytes(self._heard)  # whatever stands behind the line makes it no request
         return bool(self.line)
@@ -72,11 +73,11 @@ class Client:
 
 
 def parse_request(line: bytes) -> Mapping[str, object]:
-    """A request's object; ServiceError for anything else."""
+    """A request's object; RequestError for anything else."""
     try:
         request = json.loads(line)
     except (ValueError, RecursionError):
-        raise ServiceError("a request is one JSON object on one line") from None
+        raise RequestError(Cause("request_no_object")) from None
     if not isinstance(request, dict):
-        raise ServiceError("a request is one JSON object on one line")
+        raise RequestError(Cause("request_no_object"))
     return request

@@ -8,6 +8,9 @@ import threading
 from collections import deque
 from contextlib import suppress
 
+from orchestrator.model import Cause
+from orchestrator.text.catalogue import say
+
 #: Lines that wait for somebody to read; of more than that the oldest go, and are counted.
 BACKLOG = 1000
 #: Standard error.
@@ -17,7 +20,8 @@ FD = 2
 class Console:
     """`say` never waits. From `start` to `close`, whoever prints to `sys.stderr` says it here, too."""
 
-    def __init__(self, fd: int = FD) -> None:
+    def __init__(self, fd: int = FD, language: str = "en") -> None:
+        self._language = language
         self._fd = fd if sys.__stderr__ is not None else None  # started without: by now that may be a charger's port
         self._said: deque[str] = deque()
         self._left_out = 0
@@ -65,7 +69,7 @@ class Console:
         with self._lock:
             left_out, self._left_out = self._left_out, 0
             if left_out:
-                return f"({left_out} lines are left out here: nobody has read them in time)"
+                return say(Cause.of("lines_left_out", lines=left_out), self._language)
             return self._said.popleft() if self._said else ""
 
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Protocol
 
 from orchestrator.errors import LinkError
-from orchestrator.model import ChargerReading
+from orchestrator.model import Cause, ChargerReading
 
 REOPEN_S = 1.0
 #: A contactor has closed within this, and the charger's measurement has followed. A reading from before proves nothing.
@@ -30,7 +30,7 @@ class Contactor:
     """Used by the control loop's thread only; `open_output` takes the line (LinkError if it cannot)."""
 
     def __init__(self, open_output: Callable[[], Output]) -> None:
-        self.problem = ""  #: why it cannot be driven
+        self.problem: Cause | None = None  #: why it cannot be driven
         self.closed_s: float | None = None  #: since when it has been closed; None: it is open
         self._open_output = open_output
         self._output: Output | None = None
@@ -50,9 +50,9 @@ class Contactor:
             self._output.drive(closed=closed)
         except LinkError as error:
             self.give_back()
-            self.problem, self._retry_s = str(error), now_s + REOPEN_S
+            self.problem, self._retry_s = error.cause, now_s + REOPEN_S
             return
-        self.problem = ""
+        self.problem = None
         self.closed_s = (self.closed_s or now_s) if closed else None
 
     def give_back(self) -> None:

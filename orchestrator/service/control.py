@@ -17,9 +17,10 @@ from math import inf
 from pathlib import Path
 from time import sleep, thread_time
 
-from orchestrator.errors import OrchestratorError, ServiceError
+from orchestrator.errors import RequestError, StartError
+from orchestrator.model import Cause
 from orchestrator.service.client import Client, parse_request
-from orchestrator.service.reception import Handler, Reception, refusal
+from orchestrator.service.reception import Handler, Reception, encode, refused
 from orchestrator.service.socketfile import identity, listen, remove
 
 #: So many clients are served at once; for one more the longest idle one goes.
@@ -43,19 +44,25 @@ class ControlSocket:
     """Listens on a Unix socket and answers each request by `handler` (`Reception`)."""
 
     def __init__(
-        self, path: Path, handler: Handler, clock: Callable[[], float], say: Callable[[str], None] = lambda _: None
+        self,
+        path: Path,
+        handler: Handler,
+        clock: Callable[[], float],
+        say: Callable[[Cause], None] = lambda _: None,
+        language: str = "en",
     ) -> None:
-        self._path, self._clock, self._say = path, clock, say
+        self._path, self._clock, self._say, self._language = path, clock, say, language
         self._strangers, self._said_s = 0, -inf  # turned away since that was said last
         self._turn_s: float | None = None  # since when a turn lasts
         self._closing = False
         self._clients: set[Client] = set()
         self._handler = handler
-        self._reception = Reception(handler, self._reply)
+        self._reception = Reception(handler, self._reply, language)
         self._accept_s = -inf  # nobody is taken in before
         self._selector = selectors.DefaultSelector()
         self._listener = listen(path)
-        self._identity, self._name_s, self._lost = identity(path), clock(), ""
+        self._identity, self._name_s = identity(path), clock()
+        self._lost: Cause | None = None
         self._thread = threading.Thread(target=self._run, name="control", daemon=True)
 
     def start(self) -> None:
@@ -96,10 +103,10 @@ class ControlSocket:
 
     def _begin_anew(self, error: Exception) -> None:
         """Without those who were here when it happened."""
-        self._complain(f"internal error, its clients are sent away: {error!r}")
+        self._complain(Cause.of("socket_internal", error=repr(error)))
         for client in tuple(self._clients):
             self._drop(client)
-        self._reception = Reception(self._handler, self._reply)
+        self._reception = Reception(self._handler, self._reply, self._language)
 
     @property
     def _patience_s(self) -> float:
@@ -157,9 +164,9 @@ class ControlSocket:
             return
         self._strangers += 1
         if now_s - self._said_s >= SAY_S:
-            self._say(f"control socket: turned user {uid} away (process {pid}; {self._strangers} since last said)")
+            self._say(Cause.of("socket_stranger", uid=uid, pid=pid, times=self._strangers))
             self._strangers, self._said_s = 0, now_s
-        self._reply(client, refusal("only the owner of the service may use this socket"), now_s)
+        self._refuse(client, Cause("owner_only"), now_s)
 
     def _pause_accepting(self, now_s: float) -> None:
         self._accept_s = now_s + RETRY_S
@@ -190,10 +197,13 @@ class ControlSocket:
                 self._selector.unregister(client)
                 client.request = parse_request(client.line)
                 self._reception.take(client, now_s)
-        except OrchestratorError as error:
-            self._reply(client, refusal(str(error)), now_s)
+        except RequestError as error:
+            self._refuse(client, error.cause, now_s)
         except OSError:
             self._drop(client)
+
+    def _refuse(self, client: Client, why: Cause, now_s: float) -> None:
+        self._reply(client, encode(refused(why, self._language)), now_s)
 
     def _reply(self, client: Client, text: bytes, now_s: float) -> None:
         if client not in self._clients:
@@ -220,20 +230,20 @@ class ControlSocket:
         if self._closing or found == self._identity:
             return
         if found is not None:
-            self._complain(f"{self._path} is another program's by now: end that, or restart this service")
+            self._complain(Cause.of("socket_taken", socket=str(self._path)))
             return
         try:
             listener = listen(self._path)
-        except ServiceError as error:
-            self._complain(f"{self._path} was removed by somebody: {error}")
+        except StartError as error:
+            self._complain(Cause.of("socket_lost", socket=str(self._path), error=error.cause))
             return
         with suppress(KeyError):
             self._selector.unregister(self._listener)
         self._listener.close()
-        self._listener, self._identity, self._lost = listener, identity(self._path), ""
-        self._say(f"control socket: {self._path} was removed by somebody; it is there again")
+        self._listener, self._identity, self._lost = listener, identity(self._path), None
+        self._say(Cause.of("socket_again", socket=str(self._path)))
 
-    def _complain(self, trouble: str) -> None:
+    def _complain(self, trouble: Cause) -> None:
         if trouble != self._lost:
             self._lost = trouble
-            self._say(f"control socket: {trouble}")
+            self._say(trouble)

@@ -4,10 +4,12 @@ import os
 import sys
 
 from orchestrator.config.load import load_station
-from orchestrator.errors import ConfigError, OrchestratorError, ServiceError
+from orchestrator.errors import CauseError, ConfigError, OrchestratorError, StartError
 from orchestrator.lastresort.descriptors import raised
+from orchestrator.model import Cause
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.supervisor import Supervisor
+from orchestrator.text.catalogue import say
 
 #: What a service has open besides its bays and buses: streams, sockets, journal, clients.
 SHARED = 32
@@ -15,29 +17,30 @@ SHARED = 32
 
 def main(fd: int, station: str) -> int:
     """Run the service for a station file; 0 if every charger was verified at the end."""
+    language = "en"
     guardian = GuardianLink(fd)  # stays open to the last word: its end is the sign that this process has ended
     try:
         loaded = load_station(station)
+        language = loaded.language.value
         check_limit(len(loaded.bays), len(loaded.can))
         return Supervisor(loaded, guardian).run()
     except ConfigError as error:
         print(error, file=sys.stderr)  # noqa: T201 - what people read
+    except CauseError as error:
+        print(f"orchestrator: {say(error.cause, language)}", file=sys.stderr)  # noqa: T201
     except OrchestratorError as error:
         print(f"orchestrator: {error}", file=sys.stderr)  # noqa: T201
     return 1
 
 
 def check_limit(bays: int, buses: int) -> None:
-    """Raise the limit as far as may be; ServiceError where a station of this size needs more.
+    """Raise the limit as far as may be; StartError where a station of this size needs more.
 
     A bay has its port, its contactor, and a file more while one of them is opened; the rest is everybody's.
     """
     needed, limit = SHARED + 3 * bays + 4 * buses, os.sysconf("SC_OPEN_MAX")
     if 0 <= limit < needed and 0 <= (limit := raised(limit)) < needed:
-        raise ServiceError(
-            f"at most {limit} files may be open at once, and this station needs {needed}: raise LimitNOFILE= of the "
-            "unit, or ulimit -n"
-        )
+        raise StartError(Cause.of("files_limited", limit=limit, needed=needed))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,11 @@ import os
 from pathlib import Path
 
 
+def code_of(error: OSError) -> str:
+    """What the operating system says, as the catalogue's word for it: "ENOSPC"."""
+    return errno.errorcode.get(error.errno or 0, str(error))
+
+
 def make_directory(directory: Path) -> None:
     """Make it, and what is missing above it, for good."""
     try:

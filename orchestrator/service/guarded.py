@@ -8,10 +8,11 @@ from collections.abc import Callable
 from orchestrator.lastresort.guardian import ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
 from orchestrator.link.gpio import OutputLine
 from orchestrator.link.serial import SerialLine
+from orchestrator.model import Cause
 
 #: A guardian that has not answered a heartbeat for this long is gone, or hangs.
 SILENCE_S = 2.0
-DIED = "the guardian has died"
+DIED = Cause("guardian_died")
 
 
 class GuardianLink:
@@ -23,15 +24,15 @@ class GuardianLink:
         self._socket.settimeout(0)
         self._lock = threading.Lock()
         self._heard_s: float | None = None
-        self._gone = ""
+        self._gone: Cause | None = None
 
-    def beat(self, now_s: float, *, well: bool) -> str:
-        """Say that every loop has turned, if that is so. Why the guardian can no more be relied on, "" while it can."""
+    def beat(self, now_s: float, *, well: bool) -> Cause | None:
+        """Say that every loop has turned, if that is so. Why the guardian cannot be relied on any more."""
         self._heard_s = now_s if self._heard_s is None or self._answered() else self._heard_s
         if well:
             self._send(BEAT)
         if not self._gone and now_s - self._heard_s > SILENCE_S:
-            self._gone = f"the guardian has not answered for {SILENCE_S:g} s"
+            self._gone = Cause.of("guardian_silent", limit_s=SILENCE_S)
         return self._gone
 
     def hold(self, port: str, fd: int) -> None:
@@ -71,7 +72,7 @@ class GuardianLink:
             with self._lock:
                 self._socket.sendmsg([message], ancillary)
         except BlockingIOError:
-            self._gone = self._gone or "the guardian takes no messages"
+            self._gone = self._gone or Cause("guardian_full")
         except OSError:
             self._gone = self._gone or DIED
 

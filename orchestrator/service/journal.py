@@ -15,11 +15,13 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from orchestrator.model import Cause
+from orchestrator.service.disk import code_of
 from orchestrator.service.records import Line
 from orchestrator.service.rotating import RotatingFile
 
-#: Of these lines; the first had no `run`, the second no causes but sentences.
-VERSION = 3
+#: Of these lines; the first had no `run`, the second no causes but sentences, the third sentences in its snapshots.
+VERSION = 4
 #: Of the allowed space, what the events may take.
 EVENTS_SHARE = 0.25
 #: Lines that wait for a disk that does not take them; beyond it the oldest are dropped and counted.
@@ -79,7 +81,7 @@ class Journal:
         wall: Callable[[], float],
         *,
         boot: str = "",
-        say: Callable[[str], None] = lambda _: None,
+        say: Callable[[Cause], None] = lambda _: None,
     ) -> None:
         self._clock, self._wall, self._say = clock, wall, say
         self._directory = directory
@@ -94,7 +96,7 @@ class Journal:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._turn_s = clock()
-        self._problem = ""
+        self._problem: Cause | None = None
         self.lost = 0
         self._lost_before = 0  # as it was when the lines that wait were last taken
 
@@ -108,12 +110,12 @@ class Journal:
             self.lost += 1
         self._waiting.append((self._clock(), self._wall(), bay, line))
 
-    def problem(self, now_s: float) -> str:
-        """Why nothing is being written, for a person; "" while all is well."""
+    def problem(self, now_s: float) -> Cause | None:
+        """Why nothing is being written; None while all is well."""
         if not self._thread.is_alive():
-            return "the journal is not being written"
+            return Cause("journal_dead")
         if now_s - self._turn_s > STALL_S:
-            return f"the journal has not been written for {now_s - self._turn_s:.0f} s: its disk hangs"
+            return Cause.of("journal_hangs", lasted_s=now_s - self._turn_s)
         return self._problem
 
     def stalled(self, _now_s: float) -> bool:
@@ -142,17 +144,18 @@ class Journal:
         try:
             for stream in self._streams.values():
                 stream.write(self._own_line("lost", {"lines": self.lost}))
-            self._settle("")
+            self._settle(None)
         except OSError as error:
-            self._settle(f"the journal cannot be written: {error.strerror}: {error.filename or self._directory}")
+            file = str(error.filename or self._directory)
+            self._settle(Cause.of("journal_failed", error=code_of(error), file=file))
 
     def _own_line(self, kind: str, fields: dict[str, object]) -> bytes:
         return _line((self._clock(), self._wall(), "", (kind, fields)))
 
-    def _settle(self, problem: str) -> None:
+    def _settle(self, problem: Cause | None) -> None:
         if problem != self._problem:
             self._problem = problem
-            self._say(problem or "the journal is being written again")
+            self._say(problem or Cause("journal_again"))
 
 
 def _drained(waiting: "deque[T]") -> Iterator[T]:

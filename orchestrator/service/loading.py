@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Cause
-from orchestrator.service.disk import read_file
+from orchestrator.service.disk import code_of, read_file
 from orchestrator.service.past import Entry, Place, past_of, settled
 from orchestrator.service.stateformat import Stamp, decode, decode_first
 
@@ -32,7 +32,7 @@ def load(directory: Path, places: Sequence[Place], now: Stamp) -> Loaded:
     try:
         found = _read(directory, now)
     except (OSError, ValueError) as error:
-        reason = str(error.strerror if isinstance(error, OSError) else error)
+        reason = code_of(error) if isinstance(error, OSError) else str(error)
         return Loaded(
             held(places, Cause.of("state_unreadable", file=str(path), error=reason)), aside=(FILE, FIRST_FILE)
         )

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from orchestrator.config.station import Bay
 from orchestrator.core.rules import Rules
+from orchestrator.model import Cause
 
 
 class PolicyInForce:
@@ -13,19 +14,19 @@ class PolicyInForce:
         self.rules = Rules.of(bay)
         self._offered: Bay | None = None  # with a policy that is not in force yet
 
-    def offer(self, bay: Bay | None) -> str:
+    def offer(self, bay: Bay | None) -> Cause:
         """Take another policy over at the next standby; what will come of it. From any thread.
 
         `bay` is this bay in the station file as it is now, None if it is not in there any more.
         """
         mine = self.rules.bay
         if bay is None or replace(bay, policy=mine.policy) != mine:
-            return "the station file has changed here: only a restart of the service brings that into force"
+            return Cause("needs_restart")
         if bay.policy.source == mine.policy.source:
             self._offered = None
-            return f"{name_of(bay)} is unchanged"
+            return Cause.of("policy_unchanged", policy=name_of(bay))
         self._offered = bay
-        return f"{name_of(bay)} comes into force when the bay stands by"
+        return Cause.of("policy_offered", policy=name_of(bay))
 
     def take_over(self) -> Bay | None:
         """The bay stands by: what was offered is in force from now on. The bay with it, None if there is nothing."""
@@ -45,7 +46,7 @@ class PolicyInForce:
         }
 
 
-def name_of(bay: Bay) -> str:
+def name_of(bay: Bay) -> Cause:
     """The policy of a bay, and which file it is."""
     source = bay.policy.source
-    return f"policy {bay.policy.policy} ({source.file}, sha256 {source.digest})"
+    return Cause.of("policy", policy=bay.policy.policy, file=source.file, sha256=source.digest)

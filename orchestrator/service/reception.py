@@ -13,8 +13,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 
-from orchestrator.errors import OrchestratorError
+from orchestrator.errors import CauseError
+from orchestrator.model import Cause
+from orchestrator.model.cause import plain
 from orchestrator.service.client import Client
+from orchestrator.text.catalogue import say
 
 #: So many questions are answered in one turn: a stop is looked for after each.
 TURN_QUESTIONS = 32
@@ -49,8 +52,8 @@ class Reception:
     `handler` must not wait either: what takes time it answers with a function that is asked until it has the answer.
     """
 
-    def __init__(self, handler: Handler, reply: Reply) -> None:
-        self._handler, self._reply = handler, reply
+    def __init__(self, handler: Handler, reply: Reply, language: str = "en") -> None:
+        self._handler, self._reply, self._language = handler, reply, language
         self._urgent: list[Client] = []
         self._questions: deque[Client] = deque()
         self._requests: deque[Client] = deque()
@@ -91,7 +94,7 @@ class Reception:
         for _ in range(min(len(self._questions), TURN_QUESTIONS)):
             self._tell_status(self._questions.popleft(), now_s)
         while self._requests and now_s - self._requests[0].heard_s > QUEUE_S:
-            self._refuse(self._requests.popleft(), "too many requests at once: ask again", now_s)
+            self._refuse(self._requests.popleft(), Cause("too_many_requests"), now_s)
         if self._requests and now_s >= self._request_s:
             self._request_s = now_s + PAUSE_S
             self._begin(self._requests.popleft(), now_s)
@@ -102,7 +105,7 @@ class Reception:
     def _overtake(self, stop: Client, now_s: float) -> None:
         for client in [client for client in self._requests if _share_bays(client.request, stop.request)]:
             self._requests.remove(client)
-            self._refuse(client, "a stop came meanwhile: ask again if it is still wanted", now_s)
+            self._refuse(client, Cause("overtaken"), now_s)
 
     def _begin_stop(self, client: Client, now_s: float) -> None:
         if client.line in self._stops:
@@ -129,11 +132,11 @@ class Reception:
             self._shared.clear()  # the next status has to show what comes of this request
         try:
             answer = self._handler(client.request)
-        except OrchestratorError as error:
-            self._refuse(client, str(error), now_s)
+        except CauseError as error:
+            self._refuse(client, error.cause, now_s)
             return None
         except Exception as error:  # noqa: BLE001 - a request must never end the thread that answers them
-            self._refuse(client, f"internal: {error!r}", now_s)
+            self._refuse(client, _internal(error), now_s)
             return None
         if callable(answer):
             pending = Pending(answer, [client], now_s + ANSWER_S)
@@ -151,19 +154,20 @@ class Reception:
             try:
                 answer = pending.later()
             except Exception as error:  # noqa: BLE001 - as in `_handle`
-                said: Answer = {"ok": False, "error": f"internal: {error!r}"}
+                said = refused(_internal(error), self._language)
             else:
                 if answer is None and now_s < pending.end_s:
                     continue
-                said = {"ok": False, "error": "internal: no answer"} if answer is None else {"ok": True, **answer}
+                late = refused(Cause("request_unanswered"), self._language)
+                said = late if answer is None else {"ok": True, **answer}
             self._pending.remove(pending)
             self._stops = {line: one for line, one in self._stops.items() if one is not pending}
             text = encode(said)
             for client in pending.clients:
                 self._reply(client, text, now_s)
 
-    def _refuse(self, client: Client, why: str, now_s: float) -> None:
-        self._reply(client, refusal(why), now_s)
+    def _refuse(self, client: Client, why: Cause, now_s: float) -> None:
+        self._reply(client, encode(refused(why, self._language)), now_s)
 
 
 def encode(answer: Answer) -> bytes:
@@ -171,9 +175,13 @@ def encode(answer: Answer) -> bytes:
     return json.dumps(answer, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
-def refusal(why: str) -> bytes:
-    """The line that says no."""
-    return encode({"ok": False, "error": why})
+def refused(why: Cause, language: str) -> Answer:
+    """The answer that says no."""
+    return {"ok": False, "error": say(why, language), "cause": plain(why)}
+
+
+def _internal(error: Exception) -> Cause:
+    return Cause.of("request_internal", error=repr(error))
 
 
 def _share_bays(one: Mapping[str, object], other: Mapping[str, object]) -> bool:

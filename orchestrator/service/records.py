@@ -2,17 +2,17 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields, is_dataclass
 
 from orchestrator.config.station import Bay
-from orchestrator.core.memory import Memory
-from orchestrator.core.memory import plain as plain_memory
+from orchestrator.core.memory import Memory, side_by_side
 from orchestrator.core.states import QUIET
 from orchestrator.model import (
     ActiveFault,
     BatteryLink,
     BatteryReading,
     Cause,
+    ChargerLink,
     ChargerReading,
     Command,
     Decision,
@@ -34,6 +34,8 @@ OURS = (
     "internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem", "waits", "moves",
     "running_kept",
 )  # fmt: skip
+#: What of a reading or a link may have causes in it; the rest is written as it is.
+DEEP = frozenset({Cause, tuple, dict})
 #: A whole snapshot, with the memory and the bay's rules, at least this often: a reader may begin at each of them.
 WHOLE_EVERY = 250
 
@@ -56,9 +58,9 @@ def command_fields(command: Command | None) -> dict[str, object]:
     return {"action": command.action, "value": command.value} if command else {"action": None}
 
 
-def without_texts(fields: Mapping[str, object]) -> dict[str, object]:
+def without_texts(said: Mapping[str, object]) -> dict[str, object]:
     """What a record says without the sentences, which depend on language and version."""
-    kept = {name: value for name, value in fields.items() if name not in TEXTS}
+    kept = {name: value for name, value in said.items() if name not in TEXTS}
     return {name: without_texts(value) if name == "step" and value else value for name, value in kept.items()}  # type: ignore[arg-type]
 
 
@@ -139,35 +141,35 @@ class SnapshotRecorder:
         if state in QUIET and not news and snapshot.request is None:
             self._last = None
             return None
-        fields: dict[str, object] = {"at_s": now_s}
+        said: dict[str, object] = {"at_s": now_s}
         if self._last is None or self._since_whole >= WHOLE_EVERY:
-            fields |= {"whole": True, **asdict(snapshot), "memory": plain_memory(memory), "config": self._config}
+            said |= {"whole": True, **_record(snapshot), "memory": _bare(side_by_side(memory)), "config": self._config}
             self._since_whole = 0
         else:
-            fields |= _difference(self._last, snapshot)
+            said |= _difference(self._last, snapshot)
             self._since_whole += 1
         self._last = snapshot
-        return "snapshot", fields
+        return "snapshot", said
 
 
 def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
     """Only the parts that are not the same; of the battery's values only those that are new."""
-    fields: dict[str, object] = {}
+    said: dict[str, object] = {}
     if new.charger is not old.charger:
-        fields["charger"] = _plain(new.charger)
+        said["charger"] = _plain(new.charger)
     if new.charger_link is not old.charger_link and new.charger_link != old.charger_link:
-        fields["charger_link"] = asdict(new.charger_link)
+        said["charger_link"] = _record(new.charger_link)
     if new.battery is not old.battery:
-        fields["battery"] = _new_values(old.battery, new.battery)
+        said["battery"] = _new_values(old.battery, new.battery)
     if new.battery_link is not old.battery_link:
-        fields["battery_link"] = _plain(new.battery_link)
+        said["battery_link"] = _plain(new.battery_link)
     if new.request is not old.request:
-        fields["request"] = new.request
+        said["request"] = new.request
     for name in OURS:
         if getattr(new, name) != getattr(old, name):
             value = getattr(new, name)
-            fields[name] = plain(value) if isinstance(value, Cause) else value
-    return fields
+            said[name] = _bare(value)
+    return said
 
 
 def _new_values(old: BatteryReading, new: BatteryReading) -> dict[str, object]:
@@ -180,5 +182,25 @@ def _new_values(old: BatteryReading, new: BatteryReading) -> dict[str, object]:
 
 
 def _plain(record: ChargerReading | BatteryLink | Measurement | None) -> dict[str, object] | None:
-    """A record without records in it. Twenty times as fast as `asdict`, and this is done for every reading."""
-    return {name: getattr(record, name) for name in record.__slots__} if record is not None else None
+    """A record without records in it but causes. Far faster than `asdict`, and this is done for every reading."""
+    if record is None:
+        return None
+    return {
+        name: _bare(value) if (value := getattr(record, name)).__class__ in DEEP else value for name in record.__slots__
+    }
+
+
+def _record(record: Snapshot | Memory | ChargerLink) -> dict[str, object]:
+    """The same for a record with others in it, however deep."""
+    return {one.name: _bare(getattr(record, one.name)) for one in fields(record)}
+
+
+def _bare(value: object) -> object:
+    """A value with the records and causes in it as JSON has them."""
+    if isinstance(value, Cause):
+        return plain(value)
+    if isinstance(value, tuple):
+        return [_bare(one) for one in value]
+    if is_dataclass(value) and not isinstance(value, type):
+        return {one.name: _bare(getattr(value, one.name)) for one in fields(value)}
+    return {name: _bare(one) for name, one in value.items()} if isinstance(value, Mapping) else value

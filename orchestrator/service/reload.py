@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from orchestrator.config.load import load_station
 from orchestrator.config.station import Station
 from orchestrator.errors import OrchestratorError
+from orchestrator.model import Cause
 from orchestrator.service.bay import BayRunner
 
 
@@ -19,7 +20,7 @@ class Reload:
     However often it is asked meanwhile, it reads once more, and that finds what all of them meant.
     """
 
-    def __init__(self, station: Station, bays: Sequence[BayRunner], say: Callable[[str], None]) -> None:
+    def __init__(self, station: Station, bays: Sequence[BayRunner], say: Callable[[Cause], None]) -> None:
         self._file, self._bays, self._say = station.source.file, bays, say
         self._asked = threading.Event()
         self._thread = threading.Thread(target=self._run, name="reload", daemon=True)
@@ -39,14 +40,14 @@ class Reload:
             try:
                 self.read()
             except Exception as error:  # noqa: BLE001 - the next one may be better
-                self._say(f"{self._file}: reload failed, every policy stays as it is: {error!r}")
+                self._say(Cause.of("reload_failed", file=self._file, error=repr(error)))
 
     def read(self) -> None:
         """Offer each bay what its station file says now."""
         try:
             fresh = {bay.name: bay for bay in load_station(self._file).bays}
         except OrchestratorError as error:
-            self._say(f"{error}\n{self._file}: reload refused, every policy stays as it is")
+            self._say(Cause.of("reload_refused", file=self._file, findings=str(error)))
             return
         for runner in self._bays:
-            self._say(f"{runner.name}: reload: {runner.policy.offer(fresh.get(runner.name))}")
+            self._say(Cause.of("reload", bay=runner.name, what=runner.policy.offer(fresh.get(runner.name))))

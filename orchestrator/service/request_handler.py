@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from orchestrator.config.station import Station
-from orchestrator.errors import ServiceError
+from orchestrator.errors import RequestError
 from orchestrator.model import Cause, Request
 from orchestrator.model.cause import plain
 from orchestrator.service.asked import Asked
@@ -32,12 +32,12 @@ class RequestHandler:
         clock: Callable[[], float],
         wake: Callable[[int], None],
     ) -> None:
-        self._station, self._bays = station, bays
+        self._station, self._bays, self._language = station, bays, station.language.value
         self._journal, self._store, self._strays = journal, store, strays
         self._clock, self._wake = clock, wake
 
     def answer(self, request: Mapping[str, object]) -> Answer | Later:
-        """Whatever was asked; ServiceError where it cannot be understood or done."""
+        """Whatever was asked; RequestError where it cannot be understood or done."""
         verb = request.get("verb")
         if verb == "status":
             name = request.get("bay")
@@ -45,14 +45,15 @@ class RequestHandler:
             now_s, shown = self._clock(), [bay.status() for bay in bays]
             problem, unkept = self._journal.problem(now_s), self._store.unkept(now_s)
             alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
-            return station_status(self._station, alarm, shown, problem, unkept, self._strays.status())
+            strays = self._strays.status(self._language)
+            return station_status(self._station, alarm, shown, problem, unkept, strays)
         if isinstance(verb, str) and verb in set(Request):
             names, port = request.get("bays"), request.get("port")
             if verb == Request.RESET and isinstance(port, str):
                 return self._drop(port)
             bays = self._bays if names is None else [self._named(name) for name in _names(names)]
             return self._ask(list(dict.fromkeys(bays)), Request(verb))
-        raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
+        raise RequestError(Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", *map(str, Request))))
 
     def _drop(self, port: str) -> Later:
         """Forget a charger that no bay has any more; told when the disk has it."""
@@ -62,9 +63,11 @@ class RequestHandler:
 
         def results() -> Answer | None:
             if self._store.kept_revision >= revision:
-                return {"results": {what: ""}}
-            why = self._store.unkept(self._clock()) or "the disk has not taken it"
-            return {"results": {what: f"dropped, but not kept: {why}"}} if self._clock() >= end_s else None
+                return self._results({what: None})
+            if self._clock() < end_s:
+                return None
+            problem = self._store.unkept(self._clock()) or Cause("not_taken")
+            return self._results({what: Cause.of("dropped_not_kept", problem=problem)})
 
         return results
 
@@ -72,7 +75,8 @@ class RequestHandler:
         for bay in self._bays:
             if bay.name == name:
                 return bay
-        raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
+        known = tuple(bay.name for bay in self._bays)
+        raise RequestError(Cause.of("bay_unknown", bay=f"{name!s:.80}", bays=known))
 
     def _ask(self, bays: Sequence[BayRunner], request: Request) -> Later:
         """Hand the request to each bay; what they say is there later, "" is yes."""
@@ -87,15 +91,19 @@ class RequestHandler:
             if not all(one.done.is_set() for one in asked.values()) and self._clock() < end_s:
                 return None
             answers = {name: one.answer if one.done.is_set() else late for name, one in asked.items()}
-            return {
-                "results": {name: say(answer, self._station.language.value) for name, answer in answers.items()},
-                "causes": {name: plain(answer) for name, answer in answers.items() if answer is not None},
-            }
+            return self._results(answers)
 
         return results
+
+    def _results(self, answers: Mapping[str, Cause | None]) -> Answer:
+        return {
+            "language": self._language,
+            "results": {name: say(answer, self._language) for name, answer in answers.items()},
+            "causes": {name: plain(answer) for name, answer in answers.items() if answer is not None},
+        }
 
 
 def _names(value: object) -> list[object]:
     if not isinstance(value, list):
-        raise ServiceError("'bays' is a list of names, or null for all")
+        raise RequestError(Cause("bays_no_list"))
     return value

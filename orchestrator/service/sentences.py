@@ -5,12 +5,12 @@ What comes in is hostile still: what is not decoded here is, or is refused, with
 
 from collections.abc import Mapping
 
+from orchestrator.model.cause import SAID
+
 #: Until there was the state HELD, a hold ended with what to do about it; the bay itself says that now.
 OLD_END = "; start to go on"
 #: The sentences that anything depends on.
 KNOWN = {"stopped by the operator": "operator_stop", "reset by the operator": "operator_reset"}
-#: The cause of a sentence that nobody knows more of.
-SAID = "said"
 
 
 def of_sentences(entry: Mapping[str, object]) -> dict[str, object]:

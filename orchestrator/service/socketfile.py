@@ -4,7 +4,9 @@ import os
 import socket
 from pathlib import Path
 
-from orchestrator.errors import ServiceError
+from orchestrator.errors import StartError
+from orchestrator.model import Cause
+from orchestrator.service.disk import code_of
 
 #: So many clients may wait for their turn; after that, connecting itself waits.
 WAITING = 128
@@ -17,11 +19,9 @@ Identity = tuple[int, int]  #: device and inode
 def listen(path: Path) -> socket.socket:
     """The listening socket, owner-only from the first moment on; a dead one in its place is removed."""
     if not _is_free(path):
-        raise ServiceError(f"{path} is there already and is no socket: give this station another control.socket")
+        raise StartError(Cause.of("socket_occupied", socket=str(path)))
     if is_alive(path):
-        raise ServiceError(
-            f"another service answers on {path}: stop it first, or give this station another control.socket"
-        )
+        raise StartError(Cause.of("socket_answered", socket=str(path)))
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -29,7 +29,7 @@ def listen(path: Path) -> socket.socket:
         listener.listen(WAITING)
     except OSError as error:
         listener.close()
-        raise ServiceError(f"the control socket {path} cannot be opened: {error.strerror or error}") from None
+        raise StartError(Cause.of("socket_failed", socket=str(path), error=code_of(error))) from None
     listener.settimeout(0)
     return listener
 

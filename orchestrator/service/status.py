@@ -12,12 +12,14 @@ from orchestrator.model import (
     ActiveFault,
     Alarm,
     BatteryReading,
+    Cause,
     ChargerReading,
     Decision,
     Measurement,
     Setpoint,
     Snapshot,
 )
+from orchestrator.service.contactor import Contactor
 from orchestrator.service.records import command_fields, session_fields
 from orchestrator.text.catalogue import fields, say
 
@@ -49,12 +51,12 @@ def bay_status(
         "command": {**_setpoint(decision.setpoint), "order": command_fields(decision.command)},
         "charger": {
             "online": snapshot.charger_link.online,
-            "problem": snapshot.charger_link.problem,
+            **_problem(snapshot.charger_link.problem, language),
             **_charger(snapshot.charger, now_s),
         },
         "battery": {
             "online": snapshot.battery_link.online,
-            "problem": snapshot.battery_link.problem,
+            **_problem(snapshot.battery_link.problem, language),
             **_battery(snapshot.battery, now_s),
         },
         "faults": [_fault(fault, wall_s - (now_s - fault.since_s), language) for fault in decision.faults],
@@ -77,8 +79,8 @@ def station_status(
     station: Station,
     alarm: Alarm,
     bays: list[dict[str, object]],
-    journal_problem: str,
-    unkept: str = "",
+    journal_problem: Cause | None,
+    unkept: Cause | None = None,
     strays: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, object]:
     """The whole station. `alarm` is the worst of all its bays and strays, also where `bays` are only some of them.
@@ -87,12 +89,23 @@ def station_status(
     """
     return {
         "station": station.station,
+        "language": station.language.value,
         "alarm": _level(alarm),
         "bays": bays,
         "strays": list(strays),
-        "journal": {"problem": journal_problem},
-        "persisted": {"problem": unkept},
+        "journal": _problem(journal_problem, station.language.value),
+        "persisted": _problem(unkept, station.language.value),
     }
+
+
+def contactor_fields(contactor: Contactor, language: str) -> dict[str, object]:
+    """A contactor as journal and status show it."""
+    return {"closed": contactor.closed_s is not None, **_problem(contactor.problem, language)}
+
+
+def _problem(problem: Cause | None, language: str) -> dict[str, object]:
+    """What is wrong, in words and as data; "" and None where nothing is."""
+    return {"problem": say(problem, language), "cause": fields(problem, language)}
 
 
 def _level(alarm: Alarm) -> str:

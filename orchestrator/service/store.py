@@ -14,9 +14,9 @@ from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 from orchestrator.core.persisted import COUNTERS_S, Persisted
-from orchestrator.errors import ServiceError
+from orchestrator.errors import RequestError, StartError
 from orchestrator.model import Cause
-from orchestrator.service.disk import replace_file
+from orchestrator.service.disk import code_of, replace_file
 from orchestrator.service.loading import FILE, FIRST_FILE, held, load, move_aside
 from orchestrator.service.ownership import Ownership
 from orchestrator.service.past import Entry, Place
@@ -57,7 +57,9 @@ class Store:
         self._pending_s: float | None = None  # since when a change has been waiting for the disk …
         self._later_s: float | None = None  # … and one that the write under way does not have
         self._counted = False  # a counter has changed
-        self._problem = self._foreign = self._blind = ""
+        self._problem: Cause | None = None
+        self._foreign: Cause | None = None
+        self._blind: Cause | None = None
         self._run_number = 1
         self._aside: tuple[str, ...] = ()
         self._ownership = Ownership(directory, clock)
@@ -73,17 +75,17 @@ class Store:
         self._thread.start()
 
     def wait(self, within_s: float) -> bool:
-        """Whether the past is known within this; ServiceError where another service owns the directory."""
+        """Whether the past is known within this; StartError where another service owns the directory."""
         known = self._loaded.wait(within_s)
-        if self._foreign:
-            raise ServiceError(self._foreign)
+        if self._foreign is not None:
+            raise StartError(self._foreign)
         return known
 
     def past(self, place: Place) -> Persisted:
         """What a bay begins with. From the first call on, what the disk has not told by then is not asked for."""
         with self._lock:
             if not self._table:
-                self._blind = f"the disk of {self._directory} does not answer"
+                self._blind = Cause.of("disk_silent", directory=str(self._directory))
                 self._begin(held(self._places, Cause.of("state_disk_silent", directory=str(self._directory))))
             return self._table[place].persisted
 
@@ -115,28 +117,26 @@ class Store:
         """What the disk has of this place, ages as they were then; None while it is not certain whether that runs."""
         return self._disk.get(place)
 
-    def unkept(self, now_s: float) -> str:
-        """Why a restart would forget something; "" while it would not."""
-        if self._blind:
-            return f"a restart would forget what changes: {self._blind}; restart the service once it does"
-        pending_s = self._pending_s
-        if self._problem:
-            return f"a restart would forget what changes: {self._problem}"
-        if pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:
-            return f"a restart would forget what changes: {self.path} is not written within {KEPT_WITHIN_S:g} s"
-        return ""
+    def unkept(self, now_s: float) -> Cause | None:
+        """Why a restart would forget something; None while it would not."""
+        pending_s, problem = self._pending_s, self._blind or self._problem
+        if problem is None and pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:
+            problem = Cause.of("disk_slow", file=str(self.path), limit_s=KEPT_WITHIN_S)
+        if problem is None:
+            return None
+        return Cause.of("would_forget", problem=problem, then=Cause("restart_then") if self._blind else None)
 
     def refuse_unkept(self, now_s: float) -> None:
-        """ServiceError where what is to be changed now would be forgotten."""
+        """RequestError where what is to be changed now would be forgotten."""
         if why := self.unkept(now_s):
-            raise ServiceError(f"not done: {why}")
+            raise RequestError(Cause.of("not_done", problem=why))
 
     def stalled(self, _now_s: float) -> bool:
         """True when the writer has died. That it waits for its disk is no hang: it is what `unkept` is for."""
         return not self._thread.is_alive()
 
-    def close(self, within_s: float) -> str:
-        """Write what is left and end; why something could not be kept, "" if all is."""
+    def close(self, within_s: float) -> Cause | None:
+        """Write what is left and end; why something could not be kept, None if all is."""
         self._ended = True
         self._wake.set()
         if self._thread.is_alive():
@@ -144,8 +144,8 @@ class Store:
         if self._blind or self._problem:
             return self._blind or self._problem
         if self._thread.is_alive() or self.kept_revision < self._revision:
-            return f"{self.path} is not written within {within_s:g} s: its disk hangs"
-        return ""
+            return Cause.of("disk_hangs", file=str(self.path), limit_s=within_s)
+        return None
 
     # --- the thread ---------------------------------------------------------------------------------------------------
 
@@ -153,8 +153,7 @@ class Store:
         try:
             entries = self._load()
         except BlockingIOError:
-            self._foreign = f"another service keeps its state in {self._directory}: stop it first, or give this "
-            self._foreign += "station a journal.directory of its own"
+            self._foreign = Cause.of("directory_taken", directory=str(self._directory))
             self._loaded.set()
             return
         with self._lock:
@@ -176,7 +175,7 @@ class Store:
             if self._due(ended=ended):
                 self._write()
         except Exception as error:  # noqa: BLE001 - a thread that dies here takes every charge with it
-            self._fail(f"internal error: {error!r}", self._clock())
+            self._fail(Cause.of("disk_internal", error=repr(error)), self._clock())
 
     def _begin(self, entries: Sequence[Entry]) -> None:
         now_s = self._clock()
@@ -232,15 +231,15 @@ class Store:
             self._disk = {place: put.persisted for place, put in table.items()}
             self._gists = {place: put.gist for place, put in table.items()}
             self.kept_revision, self._pending_s = revision, self._later_s
-            self._problem, self._written_s = "", stamp.clock_s
+            self._problem, self._written_s = None, stamp.clock_s
         self._on_kept(changed)
 
-    def _fail(self, problem: str, now_s: float) -> None:
+    def _fail(self, problem: Cause, now_s: float) -> None:
         self._problem, self._failed_s, self._counted = problem, now_s, True
 
     def _stamp(self) -> Stamp:
         return Stamp(self._wall(), self._clock(), self._boot)
 
 
-def _said(error: OSError, path: Path) -> str:
-    return f"{error.filename or path}: {error.strerror or error}"
+def _said(error: OSError, path: Path) -> Cause:
+    return Cause.of("disk_failed", file=str(error.filename or path), error=code_of(error))

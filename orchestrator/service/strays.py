@@ -12,11 +12,12 @@ from os.path import abspath
 from threading import Thread
 
 from orchestrator.devices.charger import ChargerPort
-from orchestrator.errors import ServiceError
+from orchestrator.errors import RequestError
 from orchestrator.model import STOP, Alarm, Cause, ChargerReading, Operation
 from orchestrator.service.closing import close_all
 from orchestrator.service.past import Place, shown
 from orchestrator.service.store import Store
+from orchestrator.text.catalogue import fields, say
 
 #: A charger that delivers no more than this delivers nothing: its measurement is no better.
 STANDBY_A = 0.5
@@ -40,7 +41,7 @@ class _Stray:
 class Strays:
     """All of them. `open_port` makes a port that is not started yet; `say` tells people. Used by the control loop."""
 
-    def __init__(self, store: Store, open_port: Callable[[Place], ChargerPort], say: Callable[[str], None]) -> None:
+    def __init__(self, store: Store, open_port: Callable[[Place], ChargerPort], say: Callable[[Cause], None]) -> None:
         self._store, self._open_port, self._say = store, open_port, say
         self._strays: list[_Stray] = []
 
@@ -51,7 +52,7 @@ class Strays:
             port.order(STOP)
             port.start()
             self._strays.append(_Stray(place, port))
-            self._say(f"{place}: the station file has no bay on this port, but its charger may be running: stopping it")
+            self._tell("stray_found", place)
 
     def look(self, now_s: float) -> None:
         """See how far they have come."""
@@ -75,7 +76,7 @@ class Strays:
             stray.seen_s = reading.t_s
         elif stray.verified_s is None and reading.t_s > stray.seen_s:
             stray.verified_s = now_s
-            self._say(f"{stray.place}: standby verified; see why the station file has no bay there")
+            self._tell("stray_verified", stray.place)
             self._remember(stray, running=False)
         elif stray.verified_s is not None and now_s - stray.verified_s >= WATCHED_S:
             stray.closed = True
@@ -83,7 +84,7 @@ class Strays:
 
     def _runs(self, stray: _Stray, reading: ChargerReading) -> None:
         if stray.verified_s is not None:
-            self._say(f"{stray.place}: its charger runs again: stopping it")
+            self._tell("stray_runs", stray.place)
             self._remember(stray, running=True)
         stray.ran_s, stray.stop_s, stray.seen_s, stray.verified_s = reading.t_s, None, None, None
 
@@ -95,25 +96,28 @@ class Strays:
     def drop(self, port: str) -> tuple[str, int]:
         """A person says that a charger is gone for good: forget it. What was forgotten, and the revision that keeps it.
 
-        Nothing else is lost: its bay stays held if it ever comes back. ServiceError where it is not gone.
+        Nothing else is lost: its bay stays held if it ever comes back. RequestError where it is not gone.
         """
         wanted = Place("", abspath(port))  # noqa: PTH100 - not resolved
         stray = next((one for one in self._strays if one.verified_s is None and one.place.is_port_of(wanted)), None)
         if stray is None:
-            there = ", ".join(one.place.port for one in self._strays if one.verified_s is None) or "none"
-            raise ServiceError(f"{port}: no charger without a bay is waited for there (waited for: {there})")
+            there = tuple(shown(one.place.port) for one in self._strays if one.verified_s is None)
+            raise RequestError(Cause.of("stray_unknown" if there else "stray_none", port=shown(port), ports=there))
         if stray.port.view[1].online:
-            raise ServiceError(f"{stray.place}: its charger answers, so it is not gone: it is being stopped")
+            raise RequestError(_cause("stray_answers", stray.place))
         self._strays = [one for one in self._strays if one is not stray]
         revision = self._remember(stray, running=False)
-        self._say(f"{stray.place}: dropped by the operator: its charger is gone for good")
+        self._tell("stray_dropped", stray.place)
         Thread(target=stray.port.close, name="drop", daemon=True).start()  # its driver may take its time
         return str(stray.place), revision
 
+    def _tell(self, id_: str, place: Place) -> None:
+        self._say(_cause(id_, place))
+
     @property
-    def unverified(self) -> list[str]:
+    def unverified(self) -> list[Cause]:
         """Those that may be running still."""
-        return [str(stray.place) for stray in self._strays if stray.verified_s is None]
+        return [_cause("stray", stray.place) for stray in self._strays if stray.verified_s is None]
 
     @property
     def alarm(self) -> Alarm:
@@ -127,7 +131,7 @@ class Strays:
         """To be closed at the end."""
         return [stray.port for stray in self._strays]
 
-    def status(self) -> list[dict[str, object]]:
+    def status(self, language: str = "en") -> list[dict[str, object]]:
         """For the status document."""
         return [
             {
@@ -135,7 +139,12 @@ class Strays:
                 "port": stray.place.port,
                 "state": "STOPPING" if stray.verified_s is None else "HELD",
                 "verified": stray.verified_s is not None,
-                "problem": stray.port.view[1].problem,
+                "problem": say(stray.port.view[1].problem, language),
+                "cause": fields(stray.port.view[1].problem, language),
             }
             for stray in self._strays
         ]
+
+
+def _cause(id_: str, place: Place) -> Cause:
+    return Cause.of(id_, bay=place.bay, port=shown(place.port))

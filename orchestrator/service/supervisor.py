@@ -18,6 +18,7 @@ from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.link.can import CanBus, load
+from orchestrator.model import Cause
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
 from orchestrator.service.closing import close_all
@@ -32,6 +33,7 @@ from orchestrator.service.starts import Starts
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
 from orchestrator.service.wiring import charger_port, open_contactor, stray_port
+from orchestrator.text.catalogue import say
 
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
@@ -54,12 +56,11 @@ class Supervisor:
         self._station, self._language = station, station.language.value
         self._guardian = guardian
         self._beat_s = 0.0
-        self._lost = ""  # why the guardian cannot be relied on any more
+        self._lost: Cause | None = None  # why the guardian cannot be relied on any more
         self._wake: SimpleQueue[int | None] = SimpleQueue()
-        self._ending = ""
+        self._ending: Cause | None = None
         boot, kept = boot_id(), station.journal
-        self._console = Console()
-        self._say = self._console.say
+        self._console = Console(language=self._language)
         self._journal = Journal(kept.directory, kept.max_mb, monotonic, time, boot=boot, say=self._say)
         places = [Place.of(bay) for bay in station.bays]
         self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_kept=self._on_kept)
@@ -75,7 +76,9 @@ class Supervisor:
         self._handler = RequestHandler(
             station, self._bays, self._journal, self._store, self._strays, monotonic, self._wake.put
         )
-        self._control = ControlSocket(station.control.socket, self._handler.answer, monotonic, self._say)
+        self._control = ControlSocket(
+            station.control.socket, self._handler.answer, monotonic, self._say, self._language
+        )
 
     def _build(self) -> None:
         """Devices for every bay; nothing is opened yet."""
@@ -108,17 +111,17 @@ class Supervisor:
     def run(self) -> int:
         """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1. SIGHUP: `Reload`.
 
-        Without its guardian it ends, too, and with 1. Raises ServiceError where another service owns the journal.
+        Without its guardian it ends, too, and with 1. Raises StartError where another service owns the journal.
         """
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGHUP, self._on_hangup)
         try:
             self._begin()
-            while not self._ending:
+            while self._ending is None:
                 self._turn()
-            self._say(f"{self._ending}: stopping every bay")
-            return self._end()
+            self._say(Cause.of("ending", why=self._ending))
+            return self._end(self._ending)
         finally:
             self._console.close()
 
@@ -138,8 +141,13 @@ class Supervisor:
             self._strays.begin()
         for bus in self._buses:
             bus.start()
-        self._say(f"{self._station.station}: {len(self._bays)} bays, control socket {self._station.control.socket}")
+        name, socket = self._station.station, str(self._station.control.socket)
+        self._say(Cause.of("service_begins", station=name, bays=len(self._bays), socket=socket))
         self._run_all()
+
+    def _say(self, cause: Cause) -> None:
+        """A line on standard error."""
+        self._console.say(say(cause, self._language))
 
     def _run_all(self) -> None:
         for bay in self._bays:
@@ -152,7 +160,7 @@ class Supervisor:
                 self._wake.put(number)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
-        self._ending = self._ending or signal.Signals(number).name
+        self._ending = self._ending or Cause.of("signal", name=signal.Signals(number).name)
         self._wake.put(None)
 
     def _on_hangup(self, _number: int, _frame: FrameType | None) -> None:
@@ -195,10 +203,10 @@ class Supervisor:
         except Empty:
             return {number for number in numbers if number is not None}
 
-    def _end(self) -> int:
+    def _end(self, why: Cause) -> int:
         """Stop every bay, wait until each charger is verified, close everything."""
         for bay in self._bays:
-            bay.end(self._ending, orderly=not self._lost)
+            bay.end(why, orderly=self._lost is None)
         end_s = monotonic() + STOP_S
         self._run_all()
         while monotonic() < end_s and (self._unverified() or any(bay.owes for bay in self._bays)):
@@ -213,13 +221,13 @@ class Supervisor:
         for bay in self._bays:
             bay.answer()
         close_all([worker.close for worker in (*self._devices, *self._strays.ports)], CLOSE_S)
-        verdicts = [f"NOT verified: {', '.join(unverified)}"] if unverified else []
-        verdicts += [f"NOT kept: {unkept}"] if unkept else []
-        self._say(f"ended: {'; '.join(verdicts) or 'every charger stands by, verified'}")
+        verdicts = [Cause.of("not_verified", chargers=tuple(unverified))] if unverified else []
+        verdicts += [Cause.of("not_written", problem=unkept)] if unkept is not None else []
+        self._say(Cause.of("ended", verdicts=tuple(verdicts)) if verdicts else Cause("ended_well"))
         self._journal.close()
         return 1 if verdicts or self._lost else 0
 
-    def _unverified(self) -> list[str]:
+    def _unverified(self) -> list[str | Cause]:
         return [*(bay.name for bay in self._bays if not bay.verified), *self._strays.unverified]
 
 

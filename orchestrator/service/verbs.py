@@ -102,9 +102,11 @@ def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> 
 
 def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.lastresort.asking import ask
+    from orchestrator.model import Cause
     from orchestrator.service.where import find_socket
     from orchestrator.show import own_language
-    from orchestrator.text.document import refusals
+    from orchestrator.text.catalogue import say
+    from orchestrator.text.document import language_of_answer, refusals
 
     port = getattr(arguments, "port", None)
     if bool(arguments.bay) + arguments.all + (port is not None) != 1:
@@ -112,38 +114,46 @@ def _request(arguments: argparse.Namespace) -> int:
     bays, path = None if arguments.all else arguments.bay, find_socket(arguments.socket)
     request = {"verb": arguments.verb, "bays": bays} | ({} if port is None else {"port": os.path.abspath(port)})  # noqa: PTH100 - not resolved
     try:
-        results = refusals(ask(path, request), own_language())
+        answer = ask(path, request)
     except NoServiceError as error:
         without = "; to stop chargers without a service: orchestrator estop" if arguments.verb in STOPS else ""
         raise ServiceError(f"{error}{without}") from None
+    language = language_of_answer(answer, own_language())
+    results = refusals(answer, language)
     accepted = [bay for bay, refusal in results.items() if not refusal]
-    unverified, then = {}, ""
+    unverified: dict[str, str] = {}
     if arguments.verb in STOPS:
         # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
         looked_at = list(results) if arguments.verb == "stop" else accepted
-        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), "; stands by, verified"
-    for line in (*unverified.values(), *(f"{bay}: {refusal}" for bay, refusal in results.items() if refusal)):
+        unverified = _wait_for_standby(path, looked_at, language, every=arguments.all)
+    refused = [Cause.of("refused", bay=bay, why=refusal) for bay, refusal in results.items() if refusal]
+    for line in (*unverified.values(), *(say(one, language) for one in refused)):
         print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
     for bay in accepted:
-        print(f"{bay}: {arguments.verb} accepted{'' if bay in unverified else then}")
+        verified = arguments.verb in STOPS and bay not in unverified
+        done = Cause.of("accepted_verified" if verified else "accepted", bay=bay, verb=arguments.verb)
+        print(say(done, language))
     return 1 if unverified or any(results.values()) else 0
 
 
-def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[str, str]:
+def _wait_for_standby(path: Path, names: Sequence[str], language: str, *, every: bool) -> dict[str, str]:
     """Look at these bays until their chargers stand by; what to do about each that was not seen to in time.
 
     `every`: and at chargers that are no bay's any more.
     """
     from orchestrator.lastresort.asking import ask
-    from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do
+    from orchestrator.model import Cause
+    from orchestrator.show import is_alarming, stands_by, strays, what_to_do
+    from orchestrator.text.catalogue import say
     from orchestrator.text.document import in_language
 
-    end_s, language = time.monotonic() + STANDBY_S, own_language()
+    end_s = time.monotonic() + STANDBY_S
     while True:
         try:
             document = in_language(ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S)), language)
         except ServiceError as error:
-            return {name: f"{name}: NOT verified, run `orchestrator estop`: {error}" for name in names}
+            unseen = {name: Cause.of("not_seen_to_stop", bay=name, error=str(error)) for name in names}
+            return {name: say(cause, language) for name, cause in unseen.items()}
         found = cast("list[dict[str, object]]", document["bays"])
         bays = [bay for bay in found if bay["name"] in names and not stands_by(bay)]
         others = strays(document, language) if every else []

@@ -1,9 +1,9 @@
 """`say()`: the sentence for a cause, in English or Korean.
 
 Theory of operation. A template stands under the id of its cause and names its parameters, with the rounding of the
-figures. What an advice adds stands in a frame. Beside the formats of numbers there are five of our own: `word` (a word
-of a fixed list, translated), `nth` (the first time …), `and` and `then` (how the parts of a list are joined), `after`
-(a cause, if there is one, after what stands before it).
+figures. What an advice adds stands in a frame; `where` stands before it all, `then` and `how` behind. Beside the formats
+of numbers there are five of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
+`then` (how the parts of a list are joined), `after` (a cause, if there is one, after what stands before it).
 
 `say` never raises, whatever it is given: what it is asked for is often the reason of a stop. A cause that is not known,
 of an older or newer version say, or lacks something, is shown as its data.
@@ -16,12 +16,20 @@ from orchestrator.model import Cause
 from orchestrator.model.cause import plain
 from orchestrator.text.en.advice import ADVICE as EN_ADVICE
 from orchestrator.text.en.bays import TEXTS as EN_BAYS
+from orchestrator.text.en.codes import CODES as EN_CODES
 from orchestrator.text.en.faults import TEXTS as EN_FAULTS
+from orchestrator.text.en.limits import TEXTS as EN_LIMITS
+from orchestrator.text.en.links import TEXTS as EN_LINKS
+from orchestrator.text.en.service import TEXTS as EN_SERVICE
 from orchestrator.text.en.words import FRAMES as EN_FRAMES
 from orchestrator.text.en.words import WORDS as EN_WORDS
 from orchestrator.text.ko.advice import ADVICE as KO_ADVICE
 from orchestrator.text.ko.bays import TEXTS as KO_BAYS
+from orchestrator.text.ko.codes import CODES as KO_CODES
 from orchestrator.text.ko.faults import TEXTS as KO_FAULTS
+from orchestrator.text.ko.limits import TEXTS as KO_LIMITS
+from orchestrator.text.ko.links import TEXTS as KO_LINKS
+from orchestrator.text.ko.service import TEXTS as KO_SERVICE
 from orchestrator.text.ko.words import FRAMES as KO_FRAMES
 from orchestrator.text.ko.words import WORDS as KO_WORDS
 
@@ -44,8 +52,18 @@ class Language:
 
 
 LANGUAGES: Mapping[str, Language] = {
-    "en": Language({**EN_FAULTS, **EN_BAYS}, EN_ADVICE, EN_WORDS, EN_FRAMES),
-    "ko": Language({**KO_FAULTS, **KO_BAYS}, KO_ADVICE, KO_WORDS, KO_FRAMES),
+    "en": Language(
+        {**EN_FAULTS, **EN_BAYS, **EN_LIMITS, **EN_LINKS, **EN_SERVICE},
+        EN_ADVICE,
+        {**EN_WORDS, **EN_CODES},
+        EN_FRAMES,
+    ),
+    "ko": Language(
+        {**KO_FAULTS, **KO_BAYS, **KO_LIMITS, **KO_LINKS, **KO_SERVICE},
+        KO_ADVICE,
+        {**KO_WORDS, **KO_CODES},
+        KO_FRAMES,
+    ),
 }
 
 
@@ -76,6 +94,7 @@ def advise(id_: str, language: str = "en") -> str:
 def _sentence(cause: Cause, texts: Language) -> str:
     params = _Params(cause, texts)
     what, frames = texts.texts[cause.id].format_map(params), texts.frames
+    what = frames["where"].format(where=params["where"], what=what) if "where" in params else what
     tripped = params.get("effect") == _Value(TRIP, texts)
     if "ago_min" in params and not tripped:
         what = frames["ago" if cause.param("ago_min") else "just_now"].format(what=what, ago_min=params["ago_min"])

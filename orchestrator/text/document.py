@@ -14,26 +14,47 @@ def in_language(document: Mapping[str, Any], language: str) -> dict[str, Any]:
     """
     if not language:
         return dict(document)
-    return {**document, "bays": [_bay(bay, language) for bay in document["bays"]]}
+    parts: dict[str, Any] = {
+        name: _problem(document[name], language) for name in ("journal", "persisted") if name in document
+    }
+    if "strays" in document:
+        parts["strays"] = [_problem(stray, language) for stray in document["strays"]]
+    return {**document, **parts, "bays": [_bay(bay, language) for bay in document["bays"]]}
+
+
+def language_of_answer(answer: Mapping[str, Any], own: str) -> str:
+    """The language to say an answer in: the reader's own, else that of the service."""
+    return own or str(answer.get("language", ""))
 
 
 def refusals(answer: Mapping[str, Any], language: str) -> dict[str, str]:
     """What a service has answered to a request, by bay: "" is yes, else why not."""
     results, causes = answer["results"], answer.get("causes", {})
-    return {bay: said(causes.get(bay), text, language) if language else text for bay, text in results.items()}
+    return {bay: said(causes.get(bay), text, language) for bay, text in results.items()}
 
 
 def said(cause: object, text: str, language: str) -> str:
-    """The sentence for a cause in plain values; `text` where it is none, or none that is known here."""
+    """The sentence for a cause in plain values; `text` where it is none, or none that is known here, or for ""."""
+    if not language:
+        return text
     try:
         return say(from_plain(cause), language, text)
     except ValueError:
         return text
 
 
+def _problem(part: Mapping[str, Any], language: str) -> dict[str, Any]:
+    """A part of it that says what is wrong with something, if it says that as data, too."""
+    if not part.get("cause"):
+        return dict(part)
+    return {**part, "problem": said(part["cause"], part.get("problem", ""), language)}
+
+
 def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
+    parts = ("charger", "battery", "contactor")
     return {
         **bay,
+        **{name: _problem(bay[name], language) for name in parts if bay.get(name)},
         "reason": said(bay.get("cause"), bay["reason"], language),
         "step_rule": said(bay.get("step_cause"), bay.get("step_rule", ""), language),
         "faults": [{**one, "text": said(one.get("cause"), one["text"], language)} for one in bay["faults"]],

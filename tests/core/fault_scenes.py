@@ -18,6 +18,7 @@ from orchestrator.model import (
     State,
 )
 from tests.core.bays import POLICY, charging, full, idle, pulse, qualifying, running_at_the_start, suspended
+from tests.core.said import cause
 from tests.core.world import TICK_S, World, bay
 
 Act = Callable[[World], object]
@@ -251,7 +252,7 @@ def comes_back_at_once(world: World) -> None:
 
 
 def line_found(world: World) -> None:
-    charger(taken_over="115200 baud", taken_over_t_s=world.now_s + TICK_S)(world)
+    charger(taken_over=cause("115200 baud"), taken_over_t_s=world.now_s + TICK_S)(world)
 
 
 def starts_on_a_line_of_its_own(world: World) -> None:
@@ -260,7 +261,7 @@ def starts_on_a_line_of_its_own(world: World) -> None:
 
 
 def somebody_else(what: str) -> Act:
-    return lambda world: bmu(**{what: "by another master", f"{what}_t_s": world.now_s + TICK_S})(world)
+    return lambda world: bmu(**{what: cause("by another master"), f"{what}_t_s": world.now_s + TICK_S})(world)
 
 
 def falls_with_odd_figures(world: World) -> None:
@@ -317,7 +318,8 @@ SCENES: tuple[Scene, ...] = (
           S.TRIPPED, 0.5, anywhere=False),
     Scene("error_stop", shows(charge_mode=ChargeMode.ERROR_STOP), shows_truth, ("mode 8",), S.TRIPPED),
     Scene("system_stop", shows(charge_mode=ChargeMode.SYSTEM_STOP), shows_truth, ("mode 7",), S.HELD),
-    Scene("illegal_value", shows(charge_mode=None, illegal=(ILLEGAL,)), shows_truth, (ILLEGAL,), S.SUSPENDED, 0.5),
+    Scene("illegal_value", shows(charge_mode=None, illegal=(cause(ILLEGAL),)), shows_truth, (ILLEGAL,), S.SUSPENDED,
+          0.5),
     Scene("mode_taken_over", shows(control_mode=ControlMode.AUTOMATIC), shows_truth,
           ("automatic mode", "says manual"), S.HELD, 0.5),
     Scene("rejected_frame", error_frame(ErrorBit.COMMAND), QUIET_LINE, ("0x1F", "wrong command"), S.TRIPPED),
@@ -325,15 +327,15 @@ SCENES: tuple[Scene, ...] = (
     Scene("line_taken_over", line_found, charger(taken_over_t_s=None), ("/dev/ttyX to 115200 baud",), S.SUSPENDED),
     Scene("line_changed", line_found, starts_on_a_line_of_its_own, ("/dev/ttyX to 115200 baud",), S.SUSPENDED,
           begin=suspended, anywhere=False),
-    Scene("port_locked", charger(locked_by="getty (process 812)"), charger(locked_by=""),
+    Scene("port_locked", charger(locked_by=cause("getty (process 812)")), charger(locked_by=None),
           ("/dev/ttyX: getty (process 812)", "in spite of it"), S.SUSPENDED),
     Scene("noisy_line", charger(bad_pct=5.1), charger(bad_pct=5.0), ("5 % of the last minute",), S.CHARGING),
     Scene("charger_silent", world_has(charger_answers=False), world_has(charger_answers=True),
           ("/dev/ttyX: no answer",), S.UNCONTROLLABLE, 1.25),
     Scene("charger_silent", world_has(port_hangs=True), world_has(port_hangs=False),
           ("/dev/ttyX has sent no status for 1.5 s",), S.UNCONTROLLABLE, 1.75),
-    Scene("charger_silent", charger(online=False, problem="/dev/ttyX: Input/output error"),
-          charger(online=True, problem=""), ("/dev/ttyX: Input/output error",), S.OFFLINE),
+    Scene("charger_silent", charger(online=False, problem=cause("/dev/ttyX: Input/output error")),
+          charger(online=True, problem=None), ("/dev/ttyX: Input/output error",), S.OFFLINE),
     Scene("charger_silent", charger(online=False, misses=2), charger(online=True), ("/dev/ttyX has not answered",),
           S.OFFLINE),
     Scene("found_running", nothing, nothing, ("found running",), S.HELD, begin=running_at_the_start, anywhere=False),
@@ -344,8 +346,8 @@ SCENES: tuple[Scene, ...] = (
           ("1.01 A flow", "the charger says 0.00 A", "or the BMU's current is wrong"), S.UNCONTROLLABLE, 2.25,
           begin=idle, anywhere=False),
     Scene("will_not_stop", stopped_in_vain, hears, ("14.00 A",), S.UNCONTROLLABLE, 3.25, anywhere=False),
-    Scene("contactor_lost", world_has(connected=False, contactor_problem="/dev/gpiochip0: gone"),
-          world_has(connected=True, contactor_problem=""), ("/dev/gpiochip0: gone",), S.SUSPENDED),
+    Scene("contactor_lost", world_has(connected=False, contactor_problem=cause("/dev/gpiochip0: gone")),
+          world_has(connected=True, contactor_problem=None), ("/dev/gpiochip0: gone",), S.SUSPENDED),
     Scene("will_not_start", nothing, hears, ("told 'run' for 5.0 s",), S.SUSPENDED, 5.0, begin=ordered_to_run,
           anywhere=False, lapse=False),
     Scene("stopped_by_itself", stops_by_itself, nothing, ("stopped though",), S.HELD, 0.5, lapse=False),
@@ -395,16 +397,17 @@ SCENES: tuple[Scene, ...] = (
     Scene("back_feed", world_has(pack_amps=-0.51), world_has(pack_amps=None), ("0.51 A",), S.TRIPPED, 2.25),
     Scene("bmu_silent", world_has(battery_answers=False), world_has(battery_answers=True), ("node 0x10",),
           S.OFFLINE, 1.5),
-    Scene("bmu_silent", bmu(online=False, problem="two nodes share the id"), bmu(online=True, problem=""),
+    Scene("bmu_silent", bmu(online=False, problem=cause("two nodes share the id")), bmu(online=True, problem=None),
           ("two nodes share the id",), S.OFFLINE),
     Scene("stale_reading", frozen("voltage_v", "current_a"), thawed, ("voltage, current",), S.SUSPENDED, 1.75),
     Scene("stale_reading", frozen("status"), thawed, ("status",), S.SUSPENDED, 1.75),
     Scene("stale_reading", frozen("temperature_c"), thawed, ("temperature",), S.SUSPENDED, 1.75),
     Scene("stale_reading", frozen("soc_pct"), thawed, ("SOC",), S.SUSPENDED, 3.25),
     Scene("stale_reading", frozen("soh_pct"), thawed, ("SOH",), S.SUSPENDED, 3.25),
-    Scene("sdo_refused", bmu(abort="0x6004: no such object", abort_code=0x06020000), bmu(abort="", abort_code=0),
+    Scene("sdo_refused", bmu(abort=cause("0x6004: no such object"), abort_code=0x06020000), bmu(abort=None,
+          abort_code=0),
           ("0x6004: no such object",), S.TRIPPED),
-    Scene("sdo_aborted", bmu(abort="0x6004: device state", abort_code=0x08000022), bmu(abort="", abort_code=0),
+    Scene("sdo_aborted", bmu(abort=cause("0x6004: device state"), abort_code=0x08000022), bmu(abort=None, abort_code=0),
           ("0x6004: device state",), S.SUSPENDED, 0.75),
     Scene("heartbeat_lost", lambda world: bmu(heartbeat_t_s=world.now_s)(world), bmu(heartbeat_t_s=1e9),
           ("no heartbeat", "2.5 s"), S.SUSPENDED, 2.5, begin=beating, anywhere=False),
@@ -422,7 +425,7 @@ SCENES: tuple[Scene, ...] = (
           S.CHARGING),
     Scene("status_limit", value(status=BIT[BatteryStatus.DISCHARGE_OVER_CURRENT]), AS_BEFORE,
           ("discharge over current", "0x0008"), S.CHARGING),
-    Scene("emergency", bmu(emergency="EMCY 0x4210: temperature"), bmu(emergency=""), ("EMCY 0x4210",), S.HELD),
+    Scene("emergency", bmu(emergency=cause("EMCY 0x4210: temperature")), bmu(emergency=None), ("EMCY 0x4210",), S.HELD),
     Scene("hot_trip", value(temperature_c=55.0), value(temperature_c=52.0), ("55.0 °C", "55 °C"), S.TRIPPED, begin=hot,
           anywhere=False),
     Scene("over_temperature", value(temperature_c=45.0), value(temperature_c=39.9), ("45.0 °C", "below 40 °C"),
@@ -431,12 +434,15 @@ SCENES: tuple[Scene, ...] = (
           S.SUSPENDED, begin=warm(2.0), anywhere=False),
     Scene("runaway", value(temperature_c=23.3), nothing, ("K/min, more than 1 K/min",), S.TRIPPED, 1.25,
           begin=long_charging, anywhere=False, lapse=False),
-    Scene("temperature_invalid", bmu(implausible={"temperature_c": "temperature 3276.7 °C"}), bmu(implausible={}),
+    Scene("temperature_invalid", bmu(implausible={"temperature_c": cause("temperature 3276.7 °C")}),
+          bmu(implausible={}),
           ("3276.7 °C",), S.TRIPPED),
     Scene("temperature_invalid", value(temperature_c=25.1), nothing, ("from 20.0 to 25.1 °C in 0.25 s",), S.TRIPPED),
-    Scene("implausible", bmu(implausible={"soc_pct": "SOC 140 %", "temperature_c": "x"}), bmu(implausible={}),
+    Scene("implausible", bmu(implausible={"soc_pct": cause("SOC 140 %"), "temperature_c": cause("x")}),
+          bmu(implausible={}),
           ("SOC 140 %",), S.TRIPPED),
-    Scene("implausible", bmu(implausible={"soc_pct": "SOC 141 %"}), bmu(implausible={}), ("SOC 141 %",), S.SUSPENDED),
+    Scene("implausible", bmu(implausible={"soc_pct": cause("SOC 141 %")}), bmu(implausible={}), ("SOC 141 %",),
+          S.SUSPENDED),
     Scene("under_voltage", value(voltage_v=25.99), value(voltage_v=33.0), ("25.99 V", "26 V", PACK_V),
           S.PRECHARGE_PULSE, 1.25, begin=pulse, anywhere=False),
     Scene("needs_precharge", value(status=BIT[BatteryStatus.LOW_VOLTAGE]), AS_BEFORE, ("no precharge",), S.CHARGING,
@@ -480,6 +486,7 @@ SCENES: tuple[Scene, ...] = (
     Scene("late", world_has(ours={"late_s": 0.41}), world_has(ours={}), ("0.41 s late",), S.CHARGING),
     Scene("overrun", world_has(ours={"late_s": 1.01}), world_has(ours={}), ("for 1.0 s",), S.SUSPENDED),
     Scene("suspended", world_has(ours={"slept_s": 2.1}), world_has(ours={}), ("suspended for 2 s",), S.SUSPENDED),
-    Scene("unkept", world_has(ours={"unkept": "kept.json: No space left"}), world_has(ours={}), ("No space left",),
+    Scene("unkept", world_has(ours={"unkept": cause("kept.json: No space left")}), world_has(ours={}),
+          ("No space left",),
           S.CHARGING),
 )  # fmt: skip

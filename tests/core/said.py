@@ -1,5 +1,12 @@
 """What the core says, read as a person reads it. What a template does not fit fails here, in each language."""
 
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from orchestrator.errors import CauseError
 from orchestrator.model import Cause, Decision
 from orchestrator.text.catalogue import LANGUAGES, _sentence
 
@@ -30,3 +37,16 @@ def said(value: object) -> object:
 def cause(text: str, advice: str = "") -> Cause:
     """A cause that says just this."""
     return Cause.of("said", advice=advice, text=text)
+
+
+def into(lines: list[str]) -> Callable[[Cause], None]:
+    """Who is told causes and keeps their sentences."""
+    return lambda cause: lines.append(say(cause))
+
+
+@contextmanager
+def raises(kind: type[CauseError], match: str) -> Iterator[pytest.ExceptionInfo[CauseError]]:
+    """As `pytest.raises`, of the sentence that the error has."""
+    with pytest.raises(kind) as caught:
+        yield caught
+    assert re.search(match, say(caught.value.cause)), say(caught.value.cause)

@@ -17,6 +17,7 @@ from orchestrator.model import (
     Action,
     BatteryLink,
     BatteryReading,
+    Cause,
     ChargeMode,
     ChargerLink,
     ChargerReading,
@@ -33,7 +34,7 @@ from orchestrator.model import (
 from orchestrator.sim.bay import Bay as Plant
 from orchestrator.sim.charger import Charger, Push
 from orchestrator.sim.pack import Pack
-from tests.core.said import reason_of
+from tests.core.said import cause, reason_of
 from tests.core.world import bay
 
 TICK_S = 0.1
@@ -147,7 +148,7 @@ class Site:
             self._hear(turn, order)
         self.schedule.took(turn, self.now_s, self.now_s)
         stop_sent_s = self.now_s if whole else self.link.stop_sent_s
-        self.link = replace(self.link, sent=Sent(order, self.now_s), stop_sent_s=stop_sent_s, refused="")
+        self.link = replace(self.link, sent=Sent(order, self.now_s), stop_sent_s=stop_sent_s, refused=None)
 
     def _hear(self, turn: Turn, order: Command) -> None:
         if turn is Turn.STOP:
@@ -161,16 +162,16 @@ class Site:
         else:
             self.charger.push(PUSHES[order.action], order.value)
 
-    def _poll(self, refused: str = "") -> None:
+    def _poll(self, refused: Cause | None = None) -> None:
         self.schedule.took(Turn.POLL, self.now_s, self.now_s)
         if self._lost() or self._lost():
             misses = self.link.misses + 1
             online = self.link.online and misses < MISSES_UNTIL_SILENT
-            problem = "" if misses < MISSES_UNTIL_SILENT else "no answer"
+            problem = None if misses < MISSES_UNTIL_SILENT else cause("no answer")
             self.link = replace(self.link, misses=misses, online=online, problem=problem, refused=refused)
             return
         charger = self.charger
-        self.link = replace(self.link, misses=0, online=True, problem="", refused=refused)
+        self.link = replace(self.link, misses=0, online=True, problem=None, refused=refused)
         self.reading = ChargerReading(
             t_s=self.now_s,
             voltage_v=round(charger.voltage_v, 2),

@@ -10,7 +10,7 @@ from orchestrator.core.course import QUALIFY_S
 from orchestrator.core.states import ENERGISED
 from orchestrator.model import Action, Alarm, Request, State
 from tests.core.bays import charging
-from tests.core.said import reason_of
+from tests.core.said import cause, reason_of
 from tests.core.world import TICK_S, World
 
 #: (closed until now, the charger shows standby) → closed; `x` for yes.
@@ -182,6 +182,6 @@ def test_what_was_measured_behind_an_open_contactor_qualifies_nothing() -> None:
 @pytest.mark.parametrize("state", sorted(ENERGISED))
 def test_without_its_output_nothing_charges(state: State) -> None:
     world = charging() if state is State.CHARGING else World(voltage_v=36.0).charging(state)
-    world.connected, world.contactor_problem = False, "/dev/gpiochip0 line 17: gone"
+    world.connected, world.contactor_problem = False, cause("/dev/gpiochip0 line 17: gone")
     world.tick()
     assert (world.state, set(world.raised)) == (State.STOPPING, {"contactor_lost"})

@@ -23,7 +23,7 @@ from orchestrator.model import (
     State,
 )
 from tests.core.bays import IN, POLICY, charging, continuous, full, idle, offline, pulse, suspended, tripped
-from tests.core.said import reason_of, say
+from tests.core.said import cause, reason_of, say
 from tests.core.world import World, bay, with_full
 
 S = State
@@ -526,7 +526,9 @@ def test_a_charger_that_comes_back_running_is_stopped_and_waits_for_a_person() -
 def test_offline_and_back() -> None:
     world = offline()
     assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 0x10) does not answer"
-    world.battery_link = replace(world.battery_link, problem="BMU 0x10 on can0 does not answer: no frame of it came")
+    world.battery_link = replace(
+        world.battery_link, problem=cause("BMU 0x10 on can0 does not answer: no frame of it came")
+    )
     assert reason_of(world.tick()) == "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came"
     world.battery_answers = True
     world.until(S.CHARGING, 10)
@@ -559,7 +561,7 @@ def test_a_line_that_dies_in_mid_charge_and_comes_back() -> None:
 
 def test_a_port_that_says_what_is_wrong_is_quoted() -> None:
     world = charging()
-    world.charger_link = replace(world.charger_link, online=False, problem="/dev/ttyX: no such port")
+    world.charger_link = replace(world.charger_link, online=False, problem=cause("/dev/ttyX: no such port"))
     world.charger_answers = False
     assert "now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: no such port; " in reason_of(
         world.until(S.UNCONTROLLABLE, 5)
@@ -579,7 +581,7 @@ def test_a_bmu_that_boots_in_mid_charge_is_qualified_anew() -> None:
 
 def test_a_new_fault_at_rest_has_the_charger_stopped_and_verified_again() -> None:
     world = idle()
-    world.battery_link = replace(world.battery_link, emergency="EMCY 0x1000")
+    world.battery_link = replace(world.battery_link, emergency=cause("EMCY 0x1000"))
     assert world.tick().state is S.STOPPING
     assert world.decision.command == STOP
     assert world.tick().state is S.STOPPING  # one reply is not enough

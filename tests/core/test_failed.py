@@ -37,7 +37,7 @@ from orchestrator.model import (
 )
 from tests.core import world as worlds
 from tests.core.bays import IN, charging, idle
-from tests.core.said import reason_of, say
+from tests.core.said import cause, reason_of, say
 from tests.core.world import TICK_S, World
 
 every_state = pytest.mark.parametrize("state", State)
@@ -141,7 +141,7 @@ def test_a_stop_is_heard_meanwhile_and_nothing_else_is(raises: Switch, state: St
 
 def test_what_was_known_of_the_bay_is_kept(raises: Switch) -> None:
     world = charging()
-    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
     world.tick()
     world.battery_link = replace(world.battery_link, implausible={})
     raises.on = True

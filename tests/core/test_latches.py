@@ -15,7 +15,7 @@ from tests.core.world import TICK_S, World, remembering
 
 def implausible(world: World, *, seen: bool = True) -> None:
     """A fault with a backoff, that can come in every state and at once."""
-    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"} if seen else {})
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")} if seen else {})
 
 
 def strike(world: World) -> float:
@@ -288,7 +288,7 @@ def test_a_refused_request_changes_nothing() -> None:
     """One latch is clean, the other's cause is still there: neither is cleared."""
     world = charging()
     world.internal = "ValueError()"
-    world.battery_link = replace(world.battery_link, abort="0x6004: no such object", abort_code=0x06020000)
+    world.battery_link = replace(world.battery_link, abort=cause("0x6004: no such object"), abort_code=0x06020000)
     world.run(2)
     assert world.is_in(State.TRIPPED)
     assert world.ask(Request.RESET) == "sdo_refused is still there: 0x6004: no such object"
@@ -297,7 +297,7 @@ def test_a_refused_request_changes_nothing() -> None:
         "sdo_refused is latched and needs a reset: 0x6004: no such object; "
         "internal is latched and needs a reset: ValueError()"
     )
-    world.battery_link = replace(world.battery_link, abort="", abort_code=0)
+    world.battery_link = replace(world.battery_link, abort=None, abort_code=0)
     world.tick()
     assert world.ask(Request.RESET) == ""
     assert not world.raised
@@ -306,7 +306,7 @@ def test_a_refused_request_changes_nothing() -> None:
 def test_each_that_keeps_a_reset_from_its_effect_is_named() -> None:
     world = charging()
     world.shows["connection"] = Connection.REVERSED
-    world.battery_link = replace(world.battery_link, abort="0x6004: no such object", abort_code=0x06020000)
+    world.battery_link = replace(world.battery_link, abort=cause("0x6004: no such object"), abort_code=0x06020000)
     world.run(2)
     assert world.is_in(State.TRIPPED)
     world.shows.clear()
@@ -390,7 +390,7 @@ def test_the_worst_comes_first_then_the_oldest() -> None:
     implausible(world)
     world.tick()
     world.shows["connection"] = Connection.REVERSED
-    world.battery_link = replace(world.battery_link, emergency="EMCY 0x1000")
+    world.battery_link = replace(world.battery_link, emergency=cause("EMCY 0x1000"))
     world.tick()
     world.internal = "ValueError()"
     world.tick()
@@ -430,7 +430,7 @@ def test_a_fault_is_followed_in_states_in_which_it_is_not_looked_for(again: Stat
 def trip_and_reset(world: World, **trips: float) -> str:
     """By a broken sensor, if by nothing else."""
     world.values.update(trips)
-    world.battery_link = replace(world.battery_link, implausible={} if trips else {"temperature_c": "3276.7 °C"})
+    world.battery_link = replace(world.battery_link, implausible={} if trips else {"temperature_c": cause("3276.7 °C")})
     world.run(2)
     world.battery_link = replace(world.battery_link, implausible={})
     world.values["status"] = 0.0

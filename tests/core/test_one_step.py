@@ -19,7 +19,6 @@ from orchestrator.core.sequence import RESUME, RUN, next_order
 from orchestrator.core.step import step
 from orchestrator.model import (
     STOP,
-    Cause,
     ChargeMode,
     Command,
     ControlMode,
@@ -111,7 +110,7 @@ GOES = (
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("no answer on /dev/ttyX; 10.00 A, last heard 9 s ago")), state=STOPPING,
          state_s=3, charger={"t_s": ago(9)}),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("unplugged; 10.00 A, last heard 0 s ago")), state=STOPPING, state_s=3,
-         charger_link={"online": False, "problem": "unplugged"}),
+         charger_link={"online": False, "problem": cause("unplugged")}),
     Edge(goes, (Trigger.GIVE_UP, NEVER.format("its status does not show a standby that lasts")), state=STOPPING,
          state_s=3, charger={"operation": None, "current_a": 0.0}),
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, STARTING, 3,
@@ -132,7 +131,7 @@ GOES = (
     Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted"), {}, IDLE, **AT_REST,
          bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "boot_t_s": ago(1)}),
     Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but unplugged"), {}, IDLE, **AT_REST, bmu=SILENT_BMU["bmu"],
-         bmu_link={"online": False, "problem": "unplugged"}),
+         bmu_link={"online": False, "problem": cause("unplugged")}),
     Edge(goes, (None, "no battery"), {}, IDLE, **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0},
          charger_link=STOP_SENT),
     Edge(goes, (None, "a battery is there; its SOC is not known yet"), {}, IDLE, **AT_REST, bmu={"soc_pct": None}),
@@ -314,9 +313,9 @@ def faults_after(name: str) -> Callable[[Facts], object]:
 
 implausible, soh_low, emergency = map(faults_after, ("implausible", "soh_low", "emergency"))
 charger_silent, bmu_silent = map(faults_after, ("charger_silent", "bmu_silent"))
-UNPLUGGED: dict[str, Any] = {"charger_link": {"online": False, "problem": "unplugged"}}
+UNPLUGGED: dict[str, Any] = {"charger_link": {"online": False, "problem": cause("unplugged")}}
 DEPARTED: dict[str, Any] = {**SILENT_BMU, "charger": {**STANDS_BY, "voltage_v": 0.0}, "charger_link": STOP_SENT}
-SILENT = Cause.of("charger_problem", problem="unplugged")
+SILENT = cause("unplugged")
 DEBOUNCED = FaultMemory(present=True, seen_s=9, polls=9, poll_t_s=ago(1))
 
 
@@ -419,7 +418,7 @@ def test_a_new_fault_orders_a_stop_also_where_the_line_has_just_failed() -> None
     spoilt: dict[str, Any] = {"charger": STANDS_BY, "charger_link": {"online": False, **STOP_SENT}}
     assert whole(Edge(goes, None, tripped, TRIPPED, **spoilt))[0].command is None
     decision, _ = whole(
-        Edge(goes, None, tripped, TRIPPED, **spoilt, bmu_link={"implausible": {"soc_pct": "SOC 140 %"}})
+        Edge(goes, None, tripped, TRIPPED, **spoilt, bmu_link={"implausible": {"soc_pct": cause("SOC 140 %")}})
     )
     assert (decision.state, decision.command) == (TRIPPED, STOP)
 

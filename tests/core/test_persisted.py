@@ -112,7 +112,7 @@ def with_finish(max_hours: float = 12.0, max_ah: float = 44.0) -> Policy:
 
 def in_order(world: World) -> None:
     """The service ends: it stops the charge, verifies that, and begins anew."""
-    world.ours = {"ending": "the service ends: SIGTERM"}
+    world.ours = {"ending": cause("the service ends: SIGTERM")}
     world.run(3)
     assert world.state not in ENERGISED
     assert not Persisted.of(world.memory, world.now_s).running
@@ -306,7 +306,7 @@ def test_a_start_ends_no_charge_that_a_restart_has_left_open() -> None:
 def test_strikes_count_on_over_restarts() -> None:
     world = charging()
     for number in range(1, len(BACKOFF_S) + 1):
-        world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+        world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
         world.tick()
         world.battery_link = replace(world.battery_link, implausible={})
         world.run(3)
@@ -315,7 +315,7 @@ def test_strikes_count_on_over_restarts() -> None:
         world.tick()
         assert "implausible" in world.raised  # the backoff goes on, too
         world.until(State.CHARGING, 400)
-    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
     world.tick()
     world.battery_link = replace(world.battery_link, implausible={})
     world.until(State.TRIPPED, 3)
@@ -326,7 +326,7 @@ def test_strikes_count_on_over_restarts() -> None:
 
 def test_a_backoff_is_over_when_the_gateway_was_off_for_longer() -> None:
     world = charging()
-    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
     world.tick()
     world.battery_link = replace(world.battery_link, implausible={})
     world.run(3)

@@ -8,7 +8,7 @@ import pytest
 from orchestrator.core.states import ENERGISED
 from orchestrator.model import STOP, Action, Alarm, Operation, Request, State
 from tests.core.bays import IN, charging, full, idle, qualifying, running_at_the_start, starting, stopping, suspended
-from tests.core.said import reason_of
+from tests.core.said import cause, reason_of
 from tests.core.world import TICK_S, World
 
 #: Where a bay may rest with a charger that was verified.
@@ -205,11 +205,11 @@ def test_nothing_begins_before_the_line_is_back_and_a_stop_is_verified_on_it() -
 @pytest.mark.parametrize("begin", [idle, full, suspended], ids=lambda begin: begin.__name__)
 def test_a_latch_without_a_line_is_stopped_blindly_first(begin: Callable[[], World]) -> None:
     world = begin()
-    world.charger_link = replace(world.charger_link, online=False, problem="/dev/ttyX: no such port")
+    world.charger_link = replace(world.charger_link, online=False, problem=cause("/dev/ttyX: no such port"))
     world.internal = "KeyError()"
     assert world.tick().command == STOP
     assert world.is_in(State.OFFLINE)
-    world.charger_link = replace(world.charger_link, online=True, problem="")
+    world.charger_link = replace(world.charger_link, online=True, problem=None)
     world.until(State.TRIPPED, 1.0)
 
 

@@ -40,7 +40,7 @@ from orchestrator.model import (
 )
 from tests.core.bays import IN, charging
 from tests.core.fault_scenes import SCENES
-from tests.core.said import reason_of
+from tests.core.said import cause, reason_of
 from tests.core.world import World, bay
 
 NEEDED = ("voltage_v", "current_a", "status", "temperature_c", "soc_pct", "soh_pct")
@@ -70,7 +70,7 @@ def readings(draw: st.DrawFn, now_s: float) -> ChargerReading | None:
         charge_mode=draw(st.sampled_from([None, *ChargeMode])),
         precharge=draw(st.sampled_from([None, *Precharge])),
         connection=draw(st.sampled_from([None, *Connection])),
-        illegal=draw(st.sampled_from([(), (), ("charge mode 9",)])),
+        illegal=draw(st.sampled_from([(), (), (cause("charge mode 9"),)])),
     )
 
 
@@ -80,11 +80,11 @@ def lines(draw: st.DrawFn, now_s: float) -> ChargerLink:
     command = st.builds(Command, st.sampled_from(Action), st.integers(0, 5))
     return ChargerLink(
         online=draw(st.booleans()),
-        problem=draw(st.sampled_from(["", "", "no such port"])),
+        problem=draw(st.sampled_from([None, None, cause("no such port")])),
         misses=draw(st.integers(0, 5)),
         sent=draw(st.one_of(st.none(), st.builds(Sent, command, ages.map(lambda age: now_s - age)))),
         stop_sent_s=draw(times),
-        refused=draw(st.sampled_from(["", "run: too hot"])),
+        refused=draw(st.sampled_from([None, cause("run: too hot")])),
         error_bits=draw(st.integers(0, 255)),
         error_t_s=draw(times),
         bad_frames=draw(st.integers(0, 9)),
@@ -97,15 +97,17 @@ def batteries(draw: st.DrawFn, now_s: float) -> tuple[BatteryReading, BatteryLin
     times = st.one_of(st.none(), ages.map(lambda age: now_s - age))
     return BatteryReading(**values), BatteryLink(
         online=draw(st.booleans()),
-        problem=draw(st.sampled_from(["", "no answer"])),
+        problem=draw(st.sampled_from([None, cause("no answer")])),
         boots=draw(st.integers(0, 2)),
         boot_t_s=draw(times),
         heartbeat_s=draw(st.sampled_from([None, 0.5])),
         heartbeat_t_s=draw(times),
-        abort=draw(st.sampled_from(["", "", "0x6004: refused"])),
+        abort=draw(st.sampled_from([None, None, cause("0x6004: refused")])),
         abort_code=draw(st.sampled_from([0, 0x06020000, 0x08000022])),
-        implausible=draw(st.sampled_from([{}, {}, {"soc_pct": "SOC 255 %"}, {"temperature_c": "3276.7 °C"}])),
-        emergency=draw(st.sampled_from(["", "", "EMCY 0x1000"])),
+        implausible=draw(
+            st.sampled_from([{}, {}, {"soc_pct": cause("SOC 255 %")}, {"temperature_c": cause("3276.7 °C")}])
+        ),
+        emergency=draw(st.sampled_from([None, None, cause("EMCY 0x1000")])),
     )
 
 
@@ -143,7 +145,7 @@ def nearly_good(draw: st.DrawFn, now_s: float, world: World) -> Snapshot:
     }
     values = {name: replace(value, t_s=now_s) for name, value in world.measured.items()}
     sent = Sent(Command(Action.RESUME), now_s - 0.01)
-    link = replace(good.charger_link, stop_sent_s=now_s, sent=sent, problem="")
+    link = replace(good.charger_link, stop_sent_s=now_s, sent=sent, problem=None)
     return Snapshot(
         charger=mixed(draw, replace(good.charger, t_s=now_s, **shown), wild.charger),
         charger_link=mixed(draw, link, wild.charger_link),

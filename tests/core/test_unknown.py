@@ -8,7 +8,7 @@ import pytest
 from orchestrator.core.states import ENERGISED
 from orchestrator.model import STOP, BatteryReading, Measurement, Request, Snapshot, State
 from tests.core.bays import charging, idle, qualifying
-from tests.core.said import reason_of
+from tests.core.said import cause, reason_of
 from tests.core.world import TICK_S, World
 
 NEEDED = ("voltage_v", "current_a", "status", "temperature_c", "soc_pct", "soh_pct")
@@ -187,7 +187,9 @@ def test_an_implausible_word_right_after_a_boot_is_no_fault() -> None:
     world = idle()
     world.values.update(soc_pct=50.0)
     world.boot()
-    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 255 %", "temperature_c": "3276 °C"})
+    world.battery_link = replace(
+        world.battery_link, implausible={"soc_pct": cause("SOC 255 %"), "temperature_c": cause("3276 °C")}
+    )
     world.run(2.25)
     assert not world.raised
     world.tick()

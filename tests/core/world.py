@@ -19,6 +19,7 @@ from orchestrator.model import (
     Action,
     BatteryLink,
     BatteryReading,
+    Cause,
     ChargeMode,
     ChargerLink,
     ChargerReading,
@@ -35,7 +36,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.protocol.objects import ObjectMap
-from tests.core.said import say
+from tests.core.said import cause, say
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 #: A binary fraction, so that a limit can be hit exactly.
@@ -167,7 +168,7 @@ class World:
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
         self.connected = True  #: the contactor, if there is one, is closed
-        self.contactor_problem = ""
+        self.contactor_problem: Cause | None = None
         self.internal = ""  #: an exception of our own, for one tick
         self.ours: dict[str, Any] = {}  #: what else the service says of itself
         self.decisions: list[Decision] = []
@@ -283,7 +284,9 @@ class World:
         self.charger_link = replace(link, misses=misses)
         if misses < MISSES_UNTIL_SILENT:
             return self.charger_link
-        return replace(self.charger_link, online=False, problem=self.charger_link.problem or "/dev/ttyX: no answer")
+        return replace(
+            self.charger_link, online=False, problem=self.charger_link.problem or cause("/dev/ttyX: no answer")
+        )
 
     def _reading(self) -> ChargerReading:
         charger = self.charger

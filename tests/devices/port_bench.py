@@ -11,6 +11,7 @@ from orchestrator.interlock import Grant
 from orchestrator.keys import Range
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import STOP, Action, ChargerLink, ChargerReading, Command, ControlMode
+from tests.core.said import say
 from tests.devices.fake_charger import FakeCharger
 from tests.waiting import wait_until
 
@@ -60,7 +61,7 @@ class Bench:
         self.port.order(order, good())
 
     def wait_problem(self, text: str) -> None:
-        wait_until(lambda: text in self.link.problem, what=f"the problem {text!r}")
+        wait_until(lambda: text in say(self.link.problem), what=f"the problem {text!r}")
         assert not self.link.online
 
     def wait_step(self, step: int) -> None:

@@ -19,8 +19,9 @@ from orchestrator.devices.bus import REOPEN_S, STALL_S, BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.errors import LinkError
 from orchestrator.link.can import CanBus
-from orchestrator.model import BatteryLink, BatteryReading
+from orchestrator.model import BatteryLink, BatteryReading, Cause
 from orchestrator.protocol.sdo import NmtCommand
+from tests.core.said import cause, say
 from tests.devices.bmu_bench import config
 from tests.devices.fake_bmu import Bmus
 from tests.link.ptys import Pty
@@ -129,7 +130,7 @@ def test_a_change_is_told_at_once(virtual: dict[str, object]) -> None:
 
 def test_a_bmu_that_is_switched_on_later_or_reset_is_noticed(virtual: dict[str, object]) -> None:
     with Station(virtual, heartbeat_s=0.1) as station:
-        station.await_link(lambda link: "does not answer" in link.problem, "silence")
+        station.await_link(lambda link: "does not answer" in say(link.problem), "silence")
         with bmus_on(virtual, 0x10):
             station.await_link(lambda link: link.online and link.boots == 1 and link.nmt_state, "the first boot")
             with can.Bus(**virtual) as master:  # type: ignore[arg-type]  # as in a station file
@@ -161,8 +162,8 @@ def test_two_services_on_one_bus_read_the_same_bmu_and_know_of_each_other(udp: d
         while time.monotonic() < begun_s + 1.5:
             for one in (station, second):
                 one.await_fresh()
-                assert (one.link().problem, one.link().implausible, one.link().abort) == ("", {}, "")
-                assert one.link().heartbeat_set == ""
+                assert (say(one.link().problem), one.link().implausible, say(one.link().abort)) == ("", {}, "")
+                assert say(one.link().heartbeat_set) == ""
 
 
 def test_our_own_requests_that_come_back_are_no_other_master(udp: dict[str, object]) -> None:
@@ -170,7 +171,7 @@ def test_our_own_requests_that_come_back_are_no_other_master(udp: dict[str, obje
         station.await_link(lambda link: link.nmt_state == 5, "NMT start")
         for _ in range(20):
             station.await_fresh()
-        assert station.link().other_master == ""
+        assert say(station.link().other_master) == ""
 
 
 def test_thousands_of_foreign_frames_a_second_starve_nothing(udp: dict[str, object]) -> None:
@@ -213,7 +214,7 @@ def test_a_killed_bmu_is_silence_not_a_broken_bus(udp: dict[str, object]) -> Non
             killed_s = time.monotonic()
             link = station.await_link(lambda link: not link.online, "silence")
             assert time.monotonic() - killed_s < 2.0
-            assert "does not answer: check its power" in link.problem
+            assert "does not answer: check its power" in say(link.problem)
         with process_on(udp, 0x10):
             station.await_fresh()
             assert station.link().online
@@ -226,11 +227,11 @@ def test_a_socket_that_breaks_is_reported_and_the_bus_built_anew(udp: dict[str, 
         first._multicast._socket.close()  # type: ignore[union-attr]  # the driver's own
         link = station.await_link(lambda link: not link.online, "the failure")
         broken_s = time.monotonic()
-        assert link.problem.startswith("CAN bus can0 (udp_multicast 239.")
+        assert say(link.problem).startswith("CAN bus can0 (udp_multicast 239.")
         station.await_fresh()
         assert time.monotonic() - broken_s > 0.9 * REOPEN_S
         assert station.link().online
-        assert station.link().problem == ""
+        assert say(station.link().problem) == ""
         assert station.port._bus is not first
 
 
@@ -238,14 +239,14 @@ def test_a_bus_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
     adapter = Pty(tmp_path / "adapter")
     adapter.unplug()
     with Station({"interface": "slcan", "channel": adapter.path, "sleep_after_open": 0}) as station:
-        link = station.await_link(lambda link: "plugged in" in link.problem, "the failure")
+        link = station.await_link(lambda link: "plugged in" in say(link.problem), "the failure")
         assert not link.online
         adapter.plug()
         with slcan_bmu(adapter):
             station.await_fresh()
             adapter.unplug()
             link = station.await_link(lambda link: not link.online, "the unplugging")
-            assert "plug it in again" in link.problem
+            assert "plug it in again" in say(link.problem)
         adapter.plug()
         with slcan_bmu(adapter):
             station.await_fresh()
@@ -286,8 +287,8 @@ def test_bus_off_is_shown_while_nothing_is_heard_again(virtual: dict[str, object
             station.await_fresh()
             bmus.nodes[0].mute = True
             bmus.bus.send(can.Message(arbitration_id=0x040, data=bytes(8), is_error_frame=True))
-            station.await_link(lambda link: "bus-off" in link.problem, "bus-off")
-        station.await_link(lambda link: "does not answer: the controller is bus-off" in link.problem, "the reason")
+            station.await_link(lambda link: "bus-off" in say(link.problem), "bus-off")
+        station.await_link(lambda link: "does not answer: the controller is bus-off" in say(link.problem), "the reason")
         with bmus_on(virtual, 0x10):
             station.await_fresh()
 
@@ -304,12 +305,12 @@ def test_a_bug_in_one_nodes_code_is_that_nodes_problem(
         with monkeypatch.context() as patch:
             patch.setattr(station.nodes[0], "turn", lambda *_args: 1 // 0)
             link = station.await_link(lambda link: not link.online, "the node's failure")
-            assert "internal error: ZeroDivisionError" in link.problem
+            assert "internal error: ZeroDivisionError" in say(link.problem)
             station.await_fresh(1)
             assert station.link(1).online
         station.await_fresh(0)
         assert station.link(0).online
-        assert station.link(0).problem == ""
+        assert station.link(0).problem is None
 
 
 def test_a_bug_on_receiving_is_that_nodes_problem(virtual: dict[str, object]) -> None:
@@ -317,7 +318,7 @@ def test_a_bug_on_receiving_is_that_nodes_problem(virtual: dict[str, object]) ->
         station.await_fresh(0)
         station.nodes[0]._handlers[0x590] = lambda *_args: 1 // 0  # type: ignore[assignment]  # a bug
         link = station.await_link(lambda link: not link.online, "the node's failure")
-        assert "internal error: ZeroDivisionError" in link.problem
+        assert "internal error: ZeroDivisionError" in say(link.problem)
         station.await_fresh(1)
 
 
@@ -326,7 +327,7 @@ def test_a_listener_that_raises_does_not_end_the_thread(virtual: dict[str, objec
         raise ValueError("the listener's bug")
 
     with bmus_on(virtual, 0x10), Station(virtual, on_change=broken) as station:
-        station.await_link(lambda link: "the listener's bug" in link.problem, "its failure")
+        station.await_link(lambda link: "the listener's bug" in say(link.problem), "its failure")
         station.await_fresh()
         assert not station.bus.stalled(time.monotonic())
 
@@ -341,7 +342,7 @@ def test_a_bug_in_the_link_takes_all_nodes_offline_and_the_bus_is_built_anew(
             patch.setattr(station.port, "receive", lambda *_args: 1 // 0)
             for number in range(2):
                 link = station.await_link(lambda link: not link.online, "the failure", number)
-                assert "CAN bus can0: internal error: ZeroDivisionError" in link.problem
+                assert "CAN bus can0: internal error: ZeroDivisionError" in say(link.problem)
         station.await_fresh(0)
         station.await_fresh(1)
 
@@ -350,7 +351,7 @@ class HangingPort:
     """A driver that does not come back."""
 
     name = "can0"
-    trouble = ""
+    trouble: Cause | None = None
 
     def __init__(self) -> None:
         self.hanging, self.opened = threading.Event(), threading.Event()
@@ -364,7 +365,7 @@ class HangingPort:
 
     def receive(self, timeout_s: float) -> None:
         self.hanging.wait(10)
-        raise LinkError("at last")
+        raise LinkError(cause("at last"))
 
     def send(self, cob_id: int, data: bytes) -> None: ...
 

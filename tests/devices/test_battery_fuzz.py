@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from orchestrator.model import BatteryReading, Measurement
 from orchestrator.protocol.objects import FieldMap
+from tests.core.said import say
 from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, TABOS, Bench, config
 
 FRAMES = st.tuples(
@@ -38,7 +39,7 @@ def test_no_frame_makes_it_raise_and_every_value_shown_is_in_range(frames: list[
                 assert isinstance(value, Measurement)
                 assert value.value in RANGES[name].range
                 assert value.t_s <= bench.now_s
-        assert bench.link.online == (bench.link.problem == "")
+        assert bench.link.online == (say(bench.link.problem) == "")
     assert all(cob_id in (0x000, 0x610) for cob_id, _ in bench.sent)
 
 

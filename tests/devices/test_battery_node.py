@@ -8,6 +8,7 @@ import pytest
 from orchestrator.devices.battery import ANSWER_LIMIT_S
 from orchestrator.model import BatteryReading, Measurement
 from orchestrator.protocol.objects import ObjectMap
+from tests.core.said import cause, say
 from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, REQUEST, RX, TABOS, TX, WORDS, Bench, Dialogue, config
 
 #: protocol/bmu.md, "Golden exchanges"; a whole first round with the sample of §4.1 in it.
@@ -49,7 +50,7 @@ def test_the_documents_own_bytes_become_a_reading() -> None:
         "available_wh": 200.0,
     }
     assert bench.link.online
-    assert bench.link.problem == ""
+    assert say(bench.link.problem) == ""
 
 
 def test_a_value_is_as_old_as_its_request() -> None:
@@ -106,8 +107,8 @@ def test_silence_is_noticed_after_the_limit_and_values_keep_their_age() -> None:
     assert bench.link.online
     bench.run(0.02)
     assert not bench.link.online
-    assert "does not answer" in bench.link.problem
-    assert "check its power" in bench.link.problem
+    assert "does not answer" in say(bench.link.problem)
+    assert "check its power" in say(bench.link.problem)
     assert bench.reading == before
     assert bench.now_s - answered_s < 1.52
 
@@ -130,15 +131,15 @@ def test_a_silent_node_is_asked_twice_a_second_and_its_return_is_noticed() -> No
     bench.now_s += 0.01
     bench.hear(REPLY, f"43 {request[1:4].hex()} F8 FF 00 00")
     assert bench.link.online
-    assert bench.link.problem == ""
+    assert say(bench.link.problem) == ""
     assert bench.next_frame(within_s=0.001)
 
 
 def test_a_node_that_never_answered_says_so() -> None:
     bench = Bench()
-    assert "not asked yet" in bench.link.problem
+    assert "not asked yet" in say(bench.link.problem)
     bench.run(1.0)
-    assert "does not answer" in bench.link.problem
+    assert "does not answer" in say(bench.link.problem)
     assert not bench.link.online
 
 
@@ -154,11 +155,11 @@ def test_an_abort_is_a_refusal_not_silence() -> None:
             bench.hear(REPLY, f"43 {request[1:4].hex()} {word.hex()}")
     assert bench.link.online
     assert bench.link.abort_code == 0x06020000
-    assert "0x6004" in bench.link.abort
-    assert "does not exist" in bench.link.abort
+    assert "0x6004" in say(bench.link.abort)
+    assert "does not exist" in say(bench.link.abort)
     assert bench.reading.temperature_c is None
     bench.answer_reads(0.2, WORDS)
-    assert (bench.link.abort, bench.link.abort_code) == ("", 0)
+    assert (say(bench.link.abort), bench.link.abort_code) == ("", 0)
     assert bench.reading.temperature_c is not None
 
 
@@ -207,7 +208,7 @@ def test_an_endless_segmented_answer_is_silence() -> None:
         bench.run(0.001)
         bench.hear(REPLY, "41 00 60 00 FF FF 00 00")
     assert not bench.link.online
-    assert "not understood" in bench.link.problem or "frames a second" in bench.link.problem
+    assert "not understood" in say(bench.link.problem) or "frames a second" in say(bench.link.problem)
 
 
 def test_another_size_than_the_maps_is_implausible() -> None:
@@ -215,7 +216,7 @@ def test_another_size_than_the_maps_is_implausible() -> None:
     before = bench.reading.voltage_v
     bench.play([(TX, REQUEST, "40 00 60 00 00 00 00 00"), (RX, REPLY, "4B 00 60 00 40 09 00 00")])
     assert set(bench.link.implausible) == {"voltage_v", "current_a"}
-    assert "declared 2 bytes, the map says 4" in bench.link.implausible["voltage_v"]
+    assert "came with a size of 2, the map says 4" in say(bench.link.implausible["voltage_v"])
     assert bench.reading.voltage_v == before
 
 
@@ -225,7 +226,7 @@ def test_an_implausible_value_leaves_the_last_one_until_a_plausible_comes() -> N
     before = bench.reading.temperature_c
     bench.answer_reads(1.0, WORDS | {0x6004: 0x7FFF})
     assert list(bench.link.implausible) == ["temperature_c"]
-    assert "3276.7" in bench.link.implausible["temperature_c"]
+    assert "3276.7" in say(bench.link.implausible["temperature_c"])
     assert before is not None
     assert bench.reading.temperature_c is not None
     assert bench.reading.temperature_c.value == 25.0
@@ -255,7 +256,7 @@ def test_a_node_that_always_answers_too_late_is_offline_and_told_why() -> None:
         while due and due[0][0] <= bench.now_s:
             bench.hear(REPLY, due.pop(0)[1])
     assert bench.reading == BatteryReading()
-    assert "later than 0.3 s" in bench.link.problem
+    assert "later than 0.3 s" in say(bench.link.problem)
     assert bench.link.bad_frames > 3
 
 
@@ -302,7 +303,7 @@ def test_a_second_node_on_the_id_is_found_out() -> None:
             bench.now_s += 0.001
             bench.hear(REPLY, f"43 {request[1:4].hex()} {word}")
     assert not bench.link.online
-    assert "answered twice" in bench.link.problem
+    assert "answered twice" in say(bench.link.problem)
     bench.answer_reads(1.0, WORDS)  # the second one was taken off
     assert bench.link.online
 
@@ -322,7 +323,7 @@ def test_a_babbling_node_is_not_believed() -> None:
         bench.now_s += 0.001
         bench.hear(HEARTBEAT, "05")
     assert not bench.link.online
-    assert "500 frames a second" in bench.link.problem
+    assert "500 frames a second" in say(bench.link.problem)
 
 
 # --- heartbeat, boot-up, emergency -----------------------------------------------------------------------------------
@@ -361,7 +362,7 @@ def test_a_refused_heartbeat_is_no_fault_and_not_asked_for_again() -> None:
         ]
     )
     bench.answer_reads(5.0, WORDS)
-    assert (bench.link.heartbeat_s, bench.link.abort, bench.link.online) == (None, "", True)
+    assert (bench.link.heartbeat_s, say(bench.link.abort), bench.link.online) == (None, "", True)
     assert sum(data[0] == 0x2B for _, data in bench.sent) == 1
 
 
@@ -403,7 +404,7 @@ def test_a_boot_up_in_mid_sweep_forgets_everything_and_configures_again() -> Non
     bench.hear(HEARTBEAT, "00")
     assert bench.reading == BatteryReading()
     assert (bench.link.boots, bench.link.boot_t_s) == (1, bench.now_s)
-    assert (bench.link.heartbeat_s, bench.link.heartbeat_t_s, bench.link.emergency) == (None, None, "")
+    assert (bench.link.heartbeat_s, bench.link.heartbeat_t_s, say(bench.link.emergency)) == (None, None, "")
     bench.hear(REPLY, f"43 {in_flight[1:4].hex()} 01 00 02 00")  # an answer from before the boot
     assert bench.reading == BatteryReading()
     bench.play([(TX, REQUEST, HEARTBEAT_WRITE)])
@@ -425,7 +426,7 @@ def test_a_stopped_node_is_told_from_a_dead_one() -> None:
     bench.hear(HEARTBEAT, "04")
     bench.run(2.0)
     assert bench.link.nmt_state == 4
-    assert "NMT start wakes it" in bench.link.problem
+    assert "NMT start wakes it" in say(bench.link.problem)
 
 
 @pytest.mark.parametrize(("cob_id", "data"), [(HEARTBEAT, ""), (HEARTBEAT, "00 00"), (EMERGENCY, "10")])
@@ -434,7 +435,7 @@ def test_frames_of_a_wrong_length_are_dropped_and_counted(cob_id: int, data: str
     before = bench.reading
     bench.hear(cob_id, data)
     assert bench.link.bad_frames == 1
-    assert (bench.reading, bench.link.boots, bench.link.emergency) == (before, 0, "")
+    assert (bench.reading, bench.link.boots, say(bench.link.emergency)) == (before, 0, "")
 
 
 @pytest.mark.parametrize(
@@ -449,9 +450,9 @@ def test_frames_of_a_wrong_length_are_dropped_and_counted(cob_id: int, data: str
 def test_an_emergency_is_shown_in_words_until_it_is_reset(data: str, words: str) -> None:
     bench = online()
     bench.hear(EMERGENCY, data)
-    assert words in bench.link.emergency
+    assert words in say(bench.link.emergency)
     bench.hear(EMERGENCY, "00 00 00 00 00 00 00 00")
-    assert bench.link.emergency == ""
+    assert say(bench.link.emergency) == ""
 
 
 def test_an_emergency_is_forgotten_when_the_node_has_left() -> None:
@@ -459,32 +460,32 @@ def test_an_emergency_is_forgotten_when_the_node_has_left() -> None:
     bench = online()
     bench.hear(EMERGENCY, "10 42 08 01 02 03 04 05")
     bench.run(1.6)
-    assert (bench.link.online, bench.link.emergency) == (False, "")
+    assert (bench.link.online, say(bench.link.emergency)) == (False, "")
 
 
 def test_the_bus_that_breaks_takes_the_node_offline_with_its_reason() -> None:
     bench = online()
     before = bench.reading
     bench.next_frame()
-    bench.node.fail("CAN bus can0 is down", bench.now_s)
-    assert (bench.link.online, bench.link.problem) == (False, "CAN bus can0 is down")
+    bench.node.fail(cause("CAN bus can0 is down"), bench.now_s)
+    assert (bench.link.online, say(bench.link.problem)) == (False, "CAN bus can0 is down")
     assert bench.reading == before
     assert bench.run(0.4) == []
     bench.answer_reads(1.0, WORDS)
-    assert (bench.link.online, bench.link.problem) == (True, "")
+    assert (bench.link.online, say(bench.link.problem)) == (True, "")
 
 
 def test_an_answer_to_what_was_asked_before_a_failure_is_late() -> None:
     bench = Bench()
     bench.next_frame()
-    bench.node.fail("a bug", bench.now_s)
+    bench.node.fail(cause("a bug"), bench.now_s)
     bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")
     assert bench.reading == BatteryReading()
-    assert bench.link.problem == "a bug"
+    assert say(bench.link.problem) == "a bug"
 
 
 def test_trouble_on_the_bus_is_the_reason_of_silence() -> None:
     bench = online()
-    bench.node.trouble = "nobody acknowledges"
+    bench.node.trouble = cause("nobody acknowledges")
     bench.run(2.0)
-    assert bench.link.problem.endswith("nobody acknowledges")
+    assert say(bench.link.problem).endswith("nobody acknowledges")

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.devices.sdo_client import QUIET_S, Key, SdoClient, Verdict
+from orchestrator.model import Cause
 from orchestrator.protocol.sdo import SdoAbort, SdoMalformed, SdoReply, SdoValue, SdoWritten
 
 TIMEOUT_S = 0.3
@@ -89,7 +90,7 @@ def test_a_value_does_not_answer_a_write_nor_the_other_way_round(write: bool, re
 def test_a_malformed_answer_changes_nothing() -> None:
     client = SdoClient(TIMEOUT_S)
     client.ask(VOLTS, 0.0)
-    assert client.take(SdoMalformed("?"), 0.01) is Verdict.MALFORMED
+    assert client.take(SdoMalformed(Cause.of("sdo_length", size=0, expected=8, data="")), 0.01) is Verdict.MALFORMED
     assert client.pending == VOLTS
 
 

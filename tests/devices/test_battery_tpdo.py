@@ -3,6 +3,7 @@
 import pytest
 
 from orchestrator.model import Measurement
+from tests.core.said import say
 from tests.devices.bmu_bench import HEARTBEAT, REPLY, REQUEST, RX, TX, WORDS, Bench, Dialogue, config
 
 TPDO1, TPDO2, TPDO3 = 0x190, 0x290, 0x390
@@ -89,7 +90,7 @@ def test_a_refused_timer_leaves_the_sdo_reads_as_they_were() -> None:
     bench.answer_reads(2.0, WORDS)
     assert all(cob_id == REQUEST for cob_id, _ in bench.sent)  # no NMT start either
     assert sum(data[1] == 0 for _, data in bench.sent) > 30
-    assert bench.link.abort == ""
+    assert say(bench.link.abort) == ""
 
 
 def test_a_tpdo_carries_the_maps_objects_and_is_as_old_as_its_arrival() -> None:
@@ -148,7 +149,7 @@ def test_tpdo_and_sdo_that_tell_different_stories_are_both_not_believed() -> Non
     live(bench, 1.0, other)
     assert bench.link.implausible == {}  # once is no proof: the value may just have changed
     live(bench, 2.0, other)
-    assert "a TPDO says 23.68, the SDO read 50" in bench.link.implausible["voltage_v"]
+    assert "a TPDO says 23.68, the SDO read 50" in say(bench.link.implausible["voltage_v"])
     assert "current_a" not in bench.link.implausible
     live(bench, 1.5)
     assert bench.link.implausible == {}
@@ -162,7 +163,7 @@ def test_a_sender_that_lies_every_other_time_is_found_out() -> None:
     for _ in range(6):
         for words in (other, WORDS):
             live(bench, 1.0, words)
-            found |= "a TPDO says" in bench.link.implausible.get("voltage_v", "")
+            found |= "a TPDO says" in say(bench.link.implausible.get("voltage_v"))
     assert found
 
 

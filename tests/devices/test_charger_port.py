@@ -1,6 +1,7 @@
 """A charger's port over a real pty: polls, standing orders, and the interlock before them."""
 
 from orchestrator.model import STOP, Action, Command, ControlMode, Operation, Sent
+from tests.core.said import say
 from tests.devices.fake_charger import OPERATION_STOP, POLL, REST_STOP, STEP_2, FakeCharger
 from tests.devices.port_bench import SET_STEP_2, SLACK_S, Bench, good, running, wait_frames
 from tests.link.ptys import Pty
@@ -28,7 +29,7 @@ def test_a_reading_is_what_the_charger_said_as_old_as_its_request(bench: Bench, 
     first = next(reading for reading, _ in bench.seen if reading)
     assert (first.voltage_v, first.operation, first.current_limit) == (50.11, Operation.STOPPED, 0)
     assert asked_s - SLACK_S < first.t_s <= asked_s
-    assert (bench.link.problem, bench.link.misses, bench.link.bad_frames) == ("", 0, 0)
+    assert (say(bench.link.problem), bench.link.misses, bench.link.bad_frames) == ("", 0, 0)
 
 
 def test_polls_are_a_slot_apart(bench: Bench, charger: FakeCharger) -> None:
@@ -63,7 +64,7 @@ def test_what_the_interlock_refuses_is_not_written_and_polls_go_on(bench: Bench,
     orders, polls = len(charger.orders), charger.polls
     bench.port.order(Command(Action.RUN))
     wait_until(lambda: bench.link.refused)
-    assert bench.link.refused == "run: no fresh reading of charger, pack voltage and pack temperature"
+    assert say(bench.link.refused) == "run: no fresh reading of charger, pack voltage and pack temperature"
     wait_until(lambda: charger.polls >= polls + 4)
     assert len(charger.orders) == orders
     assert bench.link.online
@@ -73,7 +74,7 @@ def test_what_the_interlock_refuses_is_not_written_and_polls_go_on(bench: Bench,
 
 def test_a_grant_that_runs_out_ends_a_standing_order(bench: Bench, charger: FakeCharger) -> None:
     bench.port.order(SET_STEP_2, good(0.5))
-    wait_until(lambda: "too old" in bench.link.refused)
+    wait_until(lambda: "too old" in say(bench.link.refused))
     assert charger.orders[-1] == STEP_2
     bench.port.order(SET_STEP_2, good())
     wait_until(lambda: not bench.link.refused)

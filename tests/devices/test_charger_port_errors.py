@@ -6,6 +6,7 @@ from threading import Event
 from orchestrator.devices.charger_line import ChargerLine
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import ControlMode
+from tests.core.said import say
 from tests.devices.fake_charger import OPERATION_STOP, REST_STOP, STEP_2, FakeCharger
 from tests.devices.port_bench import SET_STEP_2, Bench, good, running
 from tests.link.ptys import Pty
@@ -21,7 +22,7 @@ def test_an_exception_in_the_thread_stops_the_charger_and_is_told(bench: Bench, 
     bench.upset = None
     wait_until(lambda: charger.orders[orders:][-2:] == [REST_STOP, OPERATION_STOP])
     bench.wait_online()
-    assert bench.link.problem == ""
+    assert say(bench.link.problem) == ""
 
 
 def test_an_exception_that_comes_again_each_time_never_ends_the_stops_nor_floods_the_line(

@@ -9,6 +9,7 @@ from orchestrator.devices.charger import REOPEN_S
 from orchestrator.devices.charger_line import ChargerLine
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Action, Command
+from tests.core.said import say
 from tests.devices.fake_charger import (
     OPERATION_STOP,
     POLL,
@@ -45,8 +46,8 @@ def test_an_unplugged_port_is_a_problem_and_stops_first_when_it_is_back(
     assert wait_frames(charger, frames + 4)[frames:] == [REST_STOP, OPERATION_STOP, POLL, REST_STOP]
     bench.wait_online()
     first = bench.seen[seen][1]
-    assert (first.problem, first.misses, first.online) == (f"{pty.path}: open, no answer yet", 0, False)
-    assert (bench.link.problem, bench.link.bad_frames) == ("", 0)
+    assert (say(first.problem), first.misses, first.online) == (f"{pty.path}: open, no answer yet", 0, False)
+    assert (say(bench.link.problem), bench.link.bad_frames) == ("", 0)
 
 
 def test_an_order_given_while_the_port_was_away_is_not_carried_out(
@@ -123,7 +124,7 @@ def test_a_port_that_another_orchestrator_holds_is_taken_once_it_is_free(pty: Pt
 def test_a_strangers_lock_is_told_and_the_charger_stopped_all_the_same(pty: Pty, charger: FakeCharger) -> None:
     with holding(pty.path) as stranger, running(pty.path) as bench:
         assert wait_frames(charger, 2) == [REST_STOP, OPERATION_STOP]
-        wait_until(lambda: f"(pid {stranger.pid})" in bench.link.locked_by, what="its name")
+        wait_until(lambda: f"(pid {stranger.pid})" in say(bench.link.locked_by), what="its name")
         bench.wait_online()
         stranger.communicate()
-        wait_until(lambda: bench.link.locked_by == "", what="the lock")
+        wait_until(lambda: say(bench.link.locked_by) == "", what="the lock")

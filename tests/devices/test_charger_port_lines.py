@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator.devices import line_quality
 from orchestrator.model import STOP
+from tests.core.said import say
 from tests.devices.fake_charger import (
     OPERATION_STOP,
     REST_STOP,
@@ -84,7 +85,7 @@ def test_a_missed_answer_is_not_yet_silence(bench: Bench, charger: FakeCharger) 
     charger.mute = True
     wait_until(lambda: bench.link.misses == 4)
     assert bench.link.online
-    assert bench.link.problem == ""
+    assert say(bench.link.problem) == ""
     charger.mute = False
     wait_until(lambda: bench.link.misses == 0)
     assert all(link.online for _, link in bench.seen[-6:])
@@ -146,11 +147,11 @@ def test_a_line_that_always_has_more_to_read_does_not_hold_up_a_stop() -> None:
         def read(self, timeout_s: float, expected: int = 0) -> bytes:
             return bytes(64)
 
-        def restore(self) -> str:
-            return ""
+        def restore(self) -> None:
+            return None
 
-        def locked_by(self) -> str:
-            return ""
+        def locked_by(self) -> None:
+            return None
 
         def close(self) -> None:
             pass

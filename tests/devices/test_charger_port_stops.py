@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import STOP, ControlMode
+from tests.core.said import say
 from tests.devices.fake_charger import OPERATION_STOP, POLL, REST_STOP, FakeCharger, charger_on, delayed
 from tests.devices.port_bench import SLACK_S, Bench, running, wait_frames
 from tests.link.ptys import Pty
@@ -62,7 +63,7 @@ def test_a_silent_charger_is_told_to_stop_blindly(bench: Bench, charger: FakeCha
     wait_until(lambda: charger.orders[orders:] == [REST_STOP, OPERATION_STOP] * 2)
     charger.mute = False
     bench.wait_online()
-    assert (bench.link.problem, bench.link.misses) == ("", 0)
+    assert (say(bench.link.problem), bench.link.misses) == ("", 0)
 
 
 def test_close_writes_an_ordered_stop_whole_and_gives_the_port_back(

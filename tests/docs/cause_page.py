@@ -9,9 +9,9 @@ from orchestrator.text.catalogue import LANGUAGES
 HEAD = """\
 # Causes
 
-Whatever the service says of a bay is a cause: data, of which the sentence is made. `status --json`, the journal and the
-answers to requests carry both. A program compares `id` and `key`, never the text: figures change all the time, and the
-text with the language.
+Whatever the service says of a bay is a cause: data, of which the sentence is made. That includes what is wrong with its
+port, its bus, its BMU or the disk, and what is answered to a request. `status --json`, the journal and the answers carry
+both. A program compares `id` and `key`, never the text: figures change all the time, and the text with the language.
 
 ```json
 {"id": "over_temperature", "params": {"pack_c": 45.2, "limit_c": 45, "again_c": 40.0, "effect": "PAUSE"},
@@ -27,10 +27,16 @@ text with the language.
 | `advice` | what a person shall do: of a fault its id in [faults.md](faults.md) |
 
 Some parameters are added by what the cause stands in: `effect` and `strikes` (a fault: what it does, how often it came
-within an hour), `ago_min` (a fault that tells of a moment), `then` and `how` (what comes next, what to type).
+within an hour), `ago_min` (a fault that tells of a moment), `then` and `how` (what comes next, what to type), `where`
+(which bus).
 
 `language: ko` in the station file makes the texts Korean. `orchestrator status` and the other verbs say them in the
-language of `LC_ALL`, `LC_MESSAGES` or `LANG`, whatever the service writes. This page is made from the catalogue itself.
+language of `LC_ALL`, `LC_MESSAGES` or `LANG`, whatever the service writes; where none of them is set, in the service's.
+
+The same in every language are names: of bays, faults, states, effects, verbs, keys, and the heads of the table. Only in
+English are diagnostics: errors of files (FILE:LINE:COLUMN), of the command line and of a service that cannot be reached,
+what `check`, `probe`, `decode`, `replay` and the like print, the text of an exception, and what the last resort says
+(`estop`, the guardian), which must work when nothing else does. This page is made from the catalogue itself.
 
 """
 

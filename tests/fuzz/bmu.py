@@ -2,10 +2,11 @@
 
 from orchestrator.config.load import load_map
 from orchestrator.devices.other_masters import MOST_OPEN
-from orchestrator.model import BatteryReading, Measurement
+from orchestrator.model import BatteryReading, Cause, Measurement
 from orchestrator.protocol.pages import parse_page
 from orchestrator.protocol.sdo import NMT_COB_ID, SdoMalformed, parse_reply
 from orchestrator.protocol.words import decode_word
+from tests.core.said import say
 from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, NODE_ID, REPLY, REQUEST, Bench, config
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
 from tests.protocol.vectors import BMU
@@ -51,8 +52,8 @@ class Session:
         if kind == PAUSE:
             bench.run(content[0] / 100 if content else 0.02)
         elif kind == TROUBLE:
-            bench.node.trouble = "the bus is in trouble" if content else ""
-            bench.node.fail("the bus failed", bench.now_s)
+            bench.node.trouble = Cause("can_passive") if content else None
+            bench.node.fail(Cause("can_not_open"), bench.now_s)
         elif kind == PARSE:
             self._parse(content)
         elif kind == ANSWER:
@@ -80,9 +81,9 @@ class Session:
 
     def _parse(self, content: bytes) -> None:
         reply = parse_reply(content)
-        assert not isinstance(reply, SdoMalformed) or len(reply.reason) <= MAX_TEXT
+        assert not isinstance(reply, SdoMalformed) or len(say(reply.cause)) <= MAX_TEXT
         for value in parse_page(NODE_ID, content).values():
-            assert value is None or isinstance(value, (Measurement, str))
+            assert value is None or isinstance(value, (Measurement, Cause))
         for entry in self._objects:
             for name, value in decode_word(entry, int.from_bytes(content, "little"), len(content), 0.0).items():
                 assert not isinstance(value, Measurement) or value.value in self._ranges[name]
@@ -100,7 +101,7 @@ class Session:
         for name in BatteryReading.__slots__:
             value = getattr(bench.reading, name)
             assert value is None or (value.value in self._ranges[name] and value.t_s <= bench.now_s), name
-        assert link.online == (link.problem == "")
+        assert link.online == (say(link.problem) == "")
         assert set(link.implausible) <= set(self._ranges)
         for text in (
             link.problem,
@@ -110,7 +111,7 @@ class Session:
             link.heartbeat_set,
             *link.implausible.values(),
         ):
-            assert len(text) <= MAX_TEXT and text.isprintable(), text
+            assert len(say(text)) <= MAX_TEXT and say(text).isprintable(), text
 
 
 def one(data: bytes) -> None:

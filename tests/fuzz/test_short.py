@@ -22,7 +22,7 @@ from orchestrator.devices import battery, dialogue, requester
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.lastresort import bareport
 from orchestrator.lastresort.guardian import Guardian
-from orchestrator.model import Measurement
+from orchestrator.model import Cause, Measurement
 from orchestrator.protocol import frame, standby, words
 from orchestrator.service import control, reception, typed
 from orchestrator.service.client import Client
@@ -128,7 +128,8 @@ def remembers_all(patch: Patch) -> None:
 
 
 def short_emergency(patch: Patch) -> None:
-    patch.setattr(battery, "emergency_text", lambda data: f"EMCY {data[1]}")
+    patch.setattr(battery, "is_emergency", lambda _: True)
+    patch.setattr(battery, "emergency_of", lambda data: Cause.of("emcy", code=data[1], meaning="", data=""))
 
 
 def asks_for_ever(patch: Patch) -> None:

@@ -34,6 +34,7 @@ from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import STATUS_REQUEST, encode
 from orchestrator.protocol.standby import OPERATION_STOP_FRAME, QUESTION, STOP_FRAME
 from orchestrator.sim.charger_frames import Kind, Lie
+from tests.core.said import raises, say
 from tests.devices.fake_charger import charger_on
 from tests.guardian.chargers import running_chargers
 from tests.link.ptys import plugged
@@ -447,7 +448,7 @@ def test_a_service_gets_on_without_a_line_discipline(tmp_path: Path, *, opened: 
         line = SerialLine.open(bench.name) if opened else None
         without_discipline(bench.fd)
         line = line or SerialLine.open(bench.name)
-        assert line.restore() == ("line discipline 27" if opened else "")
+        assert say(line.restore()) == ("line discipline 27" if opened else "")
         line.write(STOP_FRAME)
         wait_until(lambda: not bench.runs)
         line.close()
@@ -455,7 +456,7 @@ def test_a_service_gets_on_without_a_line_discipline(tmp_path: Path, *, opened: 
 
 def test_what_is_no_serial_port_has_no_line_discipline() -> None:
     assert stop_all({os.devnull: None}, 0.1) == {os.devnull: "not a serial port"}
-    with pytest.raises(LinkError, match="it is no serial port"):
+    with raises(LinkError, match="it is no serial port"):
         SerialLine.open(os.devnull)
 
 

@@ -25,6 +25,7 @@ from orchestrator.model import (
     Precharge,
     Snapshot,
 )
+from orchestrator.text.catalogue import say
 
 NOW_S = 1000.0
 LIMITS = Limits(voltage_v=58.4, current_a=12.0, temperature_c=Range(0.0, 45.0))
@@ -50,8 +51,7 @@ def passing(
 ) -> set[Command]:
     """Of all commands, those that may go out."""
     verdicts = {command: permit(command, evidence, now_s, charger, limits) for command in EVERY}
-    assert all(isinstance(why, str) for why in verdicts.values())
-    return {command for command, why in verdicts.items() if not why}
+    return {command for command, why in verdicts.items() if why is None}
 
 
 # --- permit ----------------------------------------------------------------------------------------------------------
@@ -134,7 +134,7 @@ def test_a_step_whose_current_the_station_does_not_state_is_refused() -> None:
             RUN,
             replace(GOOD, current_limit=None),
             MANUAL,
-            "run: what the charger's current limit None means is not known",
+            "run: what the charger's current limit – means is not known",
         ),
         (Command(Action.SET_LIMIT, 4), GOOD, MANUAL, "set_limit: step 5 is 14 A, above the station's 12 A"),
         (Command(Action.SET_MODE, 9), GOOD, MANUAL, "set_mode 9 is no order for a charger in manual mode"),
@@ -144,7 +144,7 @@ def test_a_step_whose_current_the_station_does_not_state_is_refused() -> None:
 def test_a_refusal_names_its_reason_with_its_evidence(
     command: Command, evidence: Grant | None, charger: ChargerConfig, why: str
 ) -> None:
-    assert permit(command, evidence, NOW_S, charger, LIMITS) == why
+    assert say(permit(command, evidence, NOW_S, charger, LIMITS)) == why
 
 
 FLOATS = st.floats()
@@ -154,7 +154,7 @@ GRANTS = st.none() | st.builds(Grant, FLOATS, FLOATS, FLOATS, st.none() | st.int
 @given(evidence=GRANTS, value=st.integers(), now_s=FLOATS, control=st.sampled_from(ControlMode))
 def test_a_stop_always_passes(evidence: Grant | None, value: int, now_s: float, control: ControlMode) -> None:
     charger = replace(MANUAL, control=control, steps_a=())
-    assert permit(Command(Action.STOP, value), evidence, now_s, charger, LIMITS) == ""
+    assert permit(Command(Action.STOP, value), evidence, now_s, charger, LIMITS) is None
 
 
 # --- grant -----------------------------------------------------------------------------------------------------------
@@ -251,6 +251,6 @@ def test_the_evidence_may_be_bad_news() -> None:
 
 def test_nothing_but_a_stop_passes_before_it_is_on_disk_that_the_charger_may_run() -> None:
     assert passing(replace(GOOD, kept=False)) == STOPS
-    assert permit(RUN, replace(GOOD, kept=False), NOW_S, MANUAL, LIMITS) == (
+    assert say(permit(RUN, replace(GOOD, kept=False), NOW_S, MANUAL, LIMITS)) == (
         "run: it is not on disk that this charger may be running"
     )

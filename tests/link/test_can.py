@@ -15,7 +15,9 @@ import pytest
 from orchestrator.errors import LinkError, RefusedError
 from orchestrator.link import can_text
 from orchestrator.link.can import DEFAULT_BITRATE, MAX_GARBAGE, CanBus
+from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NmtCommand
+from tests.core.said import raises, say
 from tests.link.ptys import Pty
 from tests.waiting import wait_until
 
@@ -197,27 +199,27 @@ def test_nmt_to_a_foreign_node_is_refused_at_once(pair: Pair) -> None:
 def test_bus_off_breaks_the_bus_and_is_remembered_until_a_frame_comes(pair: Pair) -> None:
     bus, _, other = pair
     other.send(message(0x040, bytes(8), is_error_frame=True))
-    with pytest.raises(LinkError, match="bus-off"):
+    with raises(LinkError, match="bus-off"):
         bus.receive(1.0)
     bus.close()
     bus.open()
-    assert "restart-ms 100" in bus.trouble
+    assert "restart-ms 100" in say(bus.trouble)
     other.send(message(0x123, b""))
     bus.receive(1.0)
-    assert bus.trouble == ""
+    assert say(bus.trouble) == ""
 
 
 def test_an_error_passive_controller_is_noticed(pair: Pair) -> None:
     bus, heard, other = pair
     other.send(message(0x004, bytes.fromhex("00 20 00 00 00 00 80 00"), is_error_frame=True))
     bus.receive(1.0)
-    assert bus.trouble == can_text.PASSIVE
+    assert bus.trouble == Cause(can_text.PASSIVE)
     other.send(message(0x008, bytes(8), is_error_frame=True))  # passing noise says nothing
     bus.receive(1.0)
-    assert bus.trouble == can_text.PASSIVE
+    assert bus.trouble == Cause(can_text.PASSIVE)
     other.send(message(0x004, bytes.fromhex("00 40 00 00 00 00 00 00"), is_error_frame=True))
     bus.receive(1.0)
-    assert bus.trouble == ""
+    assert say(bus.trouble) == ""
     assert heard == []
 
 
@@ -236,9 +238,9 @@ def test_an_error_passive_controller_is_noticed(pair: Pair) -> None:
 )
 def test_a_bus_that_cannot_be_opened_says_why(settings: dict[str, object], words: str) -> None:
     bus = CanBus("left", settings, [0x10])
-    with pytest.raises(LinkError, match=r"^CAN bus left ") as failure:
+    with raises(LinkError, match=r"^CAN bus left ") as failure:
         bus.open()
-    assert words in str(failure.value)
+    assert words in say(failure.value.cause)
     bus.close()
 
 
@@ -246,15 +248,15 @@ def test_a_bit_timing_is_made_of_what_the_station_file_says(channel: str) -> Non
     timing = {"f_clock": 8_000_000, "brp": 1, "tseg1": 13, "tseg2": 2, "sjw": 1}
     bus, _ = opened({"interface": "virtual", "channel": channel, "timing": timing})
     bus.close()
-    with pytest.raises(LinkError, match="tseg1"):
+    with raises(LinkError, match="tseg1"):
         opened({"interface": "virtual", "channel": channel, "timing": {"f_clock": 8_000_000, "brp": 1}})
 
 
 def test_a_closed_bus_neither_sends_nor_receives(channel: str) -> None:
     bus = CanBus("can0", {"interface": "virtual", "channel": channel}, [0x10])
-    with pytest.raises(LinkError, match="is not open"):
+    with raises(LinkError, match="is not open"):
         bus.receive(0.0)
-    with pytest.raises(LinkError, match="is not open"):
+    with raises(LinkError, match="is not open"):
         bus.send(0x610, READ)
 
 
@@ -271,10 +273,10 @@ def test_a_full_transmit_queue_is_an_absent_bmu_not_a_broken_bus(
 
     monkeypatch.setattr(bus._bus, "send", send)  # no bus without a wire can have it for real
     bus.send(0x610, READ)
-    assert "nobody acknowledges" in bus.trouble
+    assert "nobody acknowledges" in say(bus.trouble)
     other.send(message(0x590, ANSWER))
     bus.receive(1.0)
-    assert bus.trouble == ""
+    assert say(bus.trouble) == ""
 
 
 def test_a_send_that_fails_breaks_the_bus(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -284,7 +286,7 @@ def test_a_send_that_fails_breaks_the_bus(pair: Pair, monkeypatch: pytest.Monkey
         raise can.CanOperationError("Failed to transmit", 100)
 
     monkeypatch.setattr(bus._bus, "send", send)
-    with pytest.raises(LinkError, match="Network is down"):
+    with raises(LinkError, match="Network is down"):
         bus.send(0x610, READ)
 
 
@@ -299,7 +301,7 @@ def test_a_driver_that_cannot_even_forget_its_noise_breaks_the_bus(pair: Pair, m
 
     monkeypatch.setattr(bus._bus, "recv", recv)
     monkeypatch.setattr(bus._bus, "flush", flush, raising=False)  # an adapter that is pulled out just then
-    with pytest.raises(LinkError, match="Input/output error"):
+    with raises(LinkError, match="Input/output error"):
         bus.receive(0.0)
 
 
@@ -407,7 +409,7 @@ def test_a_datagram_that_is_no_frame_is_noise(udp: dict[str, object]) -> None:
 def test_a_socket_closed_underneath_breaks_the_bus_and_a_new_one_works(udp: dict[str, object]) -> None:
     bus, heard = opened(udp)
     bus._bus._multicast._socket.close()  # type: ignore[union-attr]  # the driver's own
-    with pytest.raises(LinkError, match="udp_multicast"):
+    with raises(LinkError, match="udp_multicast"):
         for _ in range(MAX_GARBAGE):
             bus.receive(0.0)
     bus.close()
@@ -473,11 +475,11 @@ def test_noise_on_slcan_costs_one_frame_not_the_bus(adapter: Pty, noise: bytes) 
 def test_an_adapter_that_is_unplugged_and_returns(adapter: Pty) -> None:
     bus, heard = slcan(adapter)
     adapter.unplug()
-    with pytest.raises(LinkError, match=r"slcan .*plug it in again"):
+    with raises(LinkError, match=r"slcan .*plug it in again"):
         for _ in range(MAX_GARBAGE):
             bus.receive(0.0)
     bus.close()
-    with pytest.raises(LinkError, match="is the adapter plugged in"):
+    with raises(LinkError, match="is the adapter plugged in"):
         bus.open()
     adapter.plug()
     bus.open()
@@ -499,7 +501,7 @@ def test_an_unplugged_adapter_leaves_no_file_open(adapter: Pty) -> None:
 
 def test_a_stalled_adapter_does_not_stall_the_thread(adapter: Pty) -> None:
     bus, _ = slcan(adapter)
-    with pytest.raises(LinkError, match="slcan"):
+    with raises(LinkError, match="slcan"):
         for _ in range(2000):  # nobody reads: the pty takes some 4 kB
             bus.send(0x610, READ)
     bus.close()

@@ -8,6 +8,7 @@ import can
 import pytest
 
 from orchestrator.link import can_text
+from tests.core.said import say
 
 SETTINGS = {"interface": "socketcan", "channel": "can3", "bitrate": 125_000}
 
@@ -20,8 +21,8 @@ def raised(error: Exception, cause: Exception | None = None) -> Exception:
 
 def test_an_interface_that_is_down_comes_with_the_command_to_bring_it_up() -> None:
     error = raised(can.CanOperationError("Error receiving: Network is down", errno.ENETDOWN))
-    assert can_text.failure("left", SETTINGS, error) == (
-        "CAN bus left (socketcan can3): Network is down (errno 100): the interface is down; "
+    assert say(can_text.failure("left", SETTINGS, error)) == (
+        "CAN bus left (socketcan can3): Network is down: the interface is down; "
         "bring it up: ip link set can3 up type can bitrate 125000 restart-ms 100"
     )
 
@@ -43,7 +44,7 @@ def test_an_interface_that_is_down_comes_with_the_command_to_bring_it_up() -> No
     ],
 )
 def test_other_failures_say_what_to_do(error: Exception, words: str) -> None:
-    text = can_text.failure("can0", SETTINGS, error)
+    text = say(can_text.failure("can0", SETTINGS, error))
     assert words in text
     assert text.startswith("CAN bus can0 (socketcan can3): ")
 

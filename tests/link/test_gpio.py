@@ -1,4 +1,4 @@
-"""The GPIO line where there is none to be had: the sentence for everything that goes wrong, as the library says it."""
+"""The GPIO line where there is none to be had: the id_ for everything that goes wrong, as the library says it."""
 
 import errno
 import os
@@ -9,51 +9,52 @@ import gpiod
 import pytest
 
 from orchestrator.errors import LinkError
-from orchestrator.link import gpio
 from orchestrator.link.gpio import OutputLine, describe
+from orchestrator.model import Cause
+from tests.core.said import say
 
 
 def failures(chip: str, line: int) -> set[str]:
-    """What taking the line says, and what only looking at it says."""
+    """The cause of not being able to take the line, and of not even being able to look at it."""
     said = set()
     for attempt in (lambda: OutputLine.open(chip, line, active_low=False), lambda: describe(chip, line)):
         with pytest.raises(LinkError) as caught:
             attempt()
-        said.add(str(caught.value))
+        cause = caught.value.cause
+        assert say(cause).startswith(f"{chip} line {line}: ") or not cause.params
+        said.add(cause.id)
     return said
 
 
 def test_a_chip_that_is_not_there(tmp_path: Path) -> None:
     chip = str(tmp_path / "gpiochip9")
-    assert failures(chip, 17) == {f"{chip} line 17: {gpio._NO_CHIP}"}
+    assert failures(chip, 17) == {"gpio_missing"}
 
 
 def test_a_file_and_a_device_that_are_no_chips(tmp_path: Path) -> None:
     file = tmp_path / "gpiochip0"
     file.touch()
-    assert failures(str(file), 17) == {f"{file} line 17: {gpio._NO_CHIP}"}
-    assert failures(os.devnull, 17) == {f"/dev/null line 17: {gpio._GONE}"}
+    assert failures(str(file), 17) == {"gpio_missing"}
+    assert failures(os.devnull, 17) == {"gpio_gone"}
 
 
 @pytest.mark.parametrize(
-    ("number", "sentence"),
+    ("number", "id_"),
     [
-        (errno.EACCES, gpio._FORBIDDEN),
-        (errno.EBUSY, gpio._BUSY),
-        (errno.EINVAL, gpio._NO_LINE),
-        (errno.ENODEV, gpio._GONE),
-        (errno.ENOMEM, "cannot be driven (Cannot allocate memory)"),
+        (errno.EACCES, "gpio_forbidden"),
+        (errno.EBUSY, "gpio_busy"),
+        (errno.EINVAL, "gpio_no_line"),
+        (errno.ENODEV, "gpio_gone"),
+        (errno.ENOMEM, "gpio_failed"),
     ],
 )
-def test_what_the_kernel_says_is_told_with_what_to_do(
-    number: int, sentence: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_the_kernel_says_is_told_with_what_to_do(number: int, id_: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise OSError(number, os.strerror(number))
 
     monkeypatch.setattr(gpiod, "request_lines", refuse)
     monkeypatch.setattr(gpiod, "Chip", refuse)
-    assert failures("/dev/gpiochip0", 17) == {f"/dev/gpiochip0 line 17: {sentence}"}
+    assert failures("/dev/gpiochip0", 17) == {id_}
 
 
 def test_a_line_that_the_library_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -62,10 +63,10 @@ def test_a_line_that_the_library_refuses(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(gpiod, "request_lines", refuse)
     monkeypatch.setattr(gpiod, "Chip", refuse)
-    assert failures("/dev/gpiochip0", 99) == {f"/dev/gpiochip0 line 99: {gpio._NO_LINE}"}
+    assert failures("/dev/gpiochip0", 99) == {"gpio_no_line"}
 
 
 def test_without_the_library_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gpiod", None)
-    (said,) = failures("/dev/gpiochip0", 17)
-    assert "pip install 'charging-station-orchestrator[gpio]'" in said
+    (id_,) = failures("/dev/gpiochip0", 17)
+    assert "pip install 'charging-station-orchestrator[gpio]'" in say(Cause(id_))

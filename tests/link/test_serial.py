@@ -17,6 +17,7 @@ import serial
 from orchestrator.errors import LinkError
 from orchestrator.lastresort import line_settings, port_owner
 from orchestrator.link.serial import BYTE_S, SerialLine
+from tests.core.said import raises, say
 from tests.link.ptys import Pty, plugged
 from tests.link.strangers import holding, stty
 from tests.waiting import wait_until
@@ -38,7 +39,7 @@ def line(pty: Pty) -> Iterator[SerialLine]:
 def failure(path: str, *, kernel_rs485: bool = False) -> str:
     with pytest.raises(LinkError) as caught:
         SerialLine.open(path, kernel_rs485=kernel_rs485)
-    return str(caught.value)
+    return say(caught.value.cause)
 
 
 # --- what it does ----------------------------------------------------------------------------------------------------
@@ -117,8 +118,8 @@ def test_a_strangers_lock_keeps_no_stop_away_and_is_named_until_it_is_ours(pty: 
         line = SerialLine.open(pty.path)
         line.write(b"stop")
         assert os.read(pty.master, 16) == b"stop"
-        assert line.locked_by() == f"{Path(f'/proc/{stranger.pid}/comm').read_text().strip()} (pid {stranger.pid})"
-    assert line.locked_by() == ""
+        assert say(line.locked_by()) == f"{Path(f'/proc/{stranger.pid}/comm').read_text().strip()} (pid {stranger.pid})"
+    assert say(line.locked_by()) == ""
     assert "in use" in failure(pty.path), "the lock is ours now"
     line.close()
 
@@ -128,7 +129,7 @@ def test_a_stranger_that_nobody_can_see_is_one_all_the_same(pty: Pty, monkeypatc
         monkeypatch.setattr(port_owner, "_pids", list)  # as with /proc mounted hidepid=2
         monkeypatch.setattr(port_owner, "_lockers", lambda _: [])
         line = SerialLine.open(pty.path)
-        assert line.locked_by() == "an unknown program"
+        assert say(line.locked_by()) == "an unknown program"
         line.close()
 
 
@@ -143,7 +144,7 @@ def test_a_port_that_one_program_has_for_itself_alone_says_what_to_do(pty: Pty) 
 
 def test_a_port_that_is_ours_stays_open_for_a_stop_tool(pty: Pty, line: SerialLine) -> None:
     fcntl.ioctl(line.fileno(), termios.TIOCEXCL)
-    assert line.locked_by() == ""
+    assert say(line.locked_by()) == ""
     with without_privileges(pty) as device:
         os.close(os.open(device, os.O_WRONLY | os.O_NOCTTY))
 
@@ -171,9 +172,9 @@ def test_what_another_program_has_set_is_named_and_set_right(
     pty: Pty, line: SerialLine, words: list[str], found: str
 ) -> None:
     stty(pty.path, *words)
-    assert found in line.restore()
+    assert found in say(line.restore())
     assert termios.tcgetattr(line.fileno())[4:6] == [termios.B19200, termios.B19200]
-    assert line.restore() == ""
+    assert say(line.restore()) == ""
     every_byte = bytes(range(256))
     os.write(pty.master, every_byte)
     assert line.read(1.0) == every_byte
@@ -208,10 +209,10 @@ def test_settings_that_a_driver_does_not_take_are_nobodys_doing(pty: Pty, monkey
 
     monkeypatch.setattr(termios, "tcsetattr", always_two_stop_bits)
     line = SerialLine.open(pty.path)
-    assert line.restore() == ""
+    assert say(line.restore()) == ""
     stty(pty.path, "115200")
-    assert line.restore() == "115200 baud, 2 stop bits"
-    assert line.restore() == ""
+    assert say(line.restore()) == "115200 baud, 2 stop bits"
+    assert say(line.restore()) == ""
     line.close()
 
 
@@ -241,8 +242,8 @@ def test_another_line_discipline_is_taken_back(pty: Pty, line: SerialLine) -> No
         fcntl.ioctl(line.fileno(), termios.TIOCSETD, (1).to_bytes(4, sys.byteorder))  # N_SLIP
     except OSError:
         pytest.skip("this kernel has no other one")
-    assert line.restore() == "line discipline 1"
-    assert line.restore() == ""
+    assert say(line.restore()) == "line discipline 1"
+    assert say(line.restore()) == ""
 
 
 def test_a_look_at_the_settings_costs_a_stop_next_to_nothing(line: SerialLine) -> None:
@@ -296,13 +297,13 @@ def test_an_error_without_a_sentence_of_its_own_is_told_in_the_kernels_words(
         raise OSError(errno.ELOOP, "loops")
 
     monkeypatch.setattr(os, "open", loops)  # no device here fails like that
-    assert failure(pty.path) == f"{pty.path}: cannot be opened (Too many levels of symbolic links)"
+    assert failure(pty.path) == f"{pty.path}: cannot be opened (ELOOP)"
 
 
 def test_an_unplugged_adapter_is_told_by_reading_and_by_writing(pty: Pty, line: SerialLine) -> None:
     pty.unplug()
     for use in (lambda: line.read(1.0), lambda: line.read(1.0, expected=5), lambda: line.write(b"x")):
-        with pytest.raises(LinkError, match=r"port: the adapter was unplugged or lost its power, or another program"):
+        with raises(LinkError, match=r"port: the adapter was unplugged or lost its power, or another program"):
             use()
     line.close()
 
@@ -321,7 +322,7 @@ def test_a_plugged_in_adapter_opens_under_the_same_name(pty: Pty, line: SerialLi
 def test_a_stalled_line_is_told_without_burning_the_processor(pty: Pty, line: SerialLine) -> None:
     pty.fill()
     burnt_s, begun_s = time.thread_time(), time.monotonic()
-    with pytest.raises(LinkError, match=r"port: stalled, it took nothing for 0\.2 s; unplug the adapter"):
+    with raises(LinkError, match=r"port: stalled, it took nothing for 0\.2 s; unplug the adapter"):
         line.write(b"order")
     assert 0.2 <= time.monotonic() - begun_s < 1.0
     assert time.thread_time() - burnt_s < 0.1
@@ -331,7 +332,7 @@ def test_an_order_that_a_stalled_line_kept_does_not_come_out_later(pty: Pty, lin
     line.write(bytes(8192))  # the device's end of the pty has room for the first 4096 of these: they count as sent
     line.write(b"old order")
     filled = pty.fill()
-    with pytest.raises(LinkError, match="stalled"):
+    with raises(LinkError, match="stalled"):
         line.write(b"new order")
     left = pty.drain()
     assert len(left) < filled
@@ -341,7 +342,7 @@ def test_an_order_that_a_stalled_line_kept_does_not_come_out_later(pty: Pty, lin
 def test_a_port_that_is_gone_has_no_settings(pty: Pty, line: SerialLine) -> None:
     pty.unplug()
     for use in (line.restore, lambda: [line.locked_by(), line.read(0.0)]):
-        with pytest.raises(LinkError, match="unplugged"):
+        with raises(LinkError, match="unplugged"):
             use()
 
 
@@ -372,7 +373,7 @@ def test_whatever_pyserial_raises_is_translated(
         raise raised
 
     monkeypatch.setattr(serial.Serial, "fileno", fails)  # these come of races that no test can win reliably
-    with pytest.raises(LinkError, match="unplugged"):
+    with raises(LinkError, match="unplugged"):
         line.write(b"x")
 
 

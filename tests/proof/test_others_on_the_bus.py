@@ -11,6 +11,7 @@ from orchestrator.service.bay import BayRunner
 from orchestrator.sim.forger import Forger, Lie, When
 from orchestrator.sim.presets import PACKS
 from orchestrator.sim.second_master import EVERYTHING, SecondMaster
+from tests.core.said import say
 from tests.proof.play import POLICIES
 from tests.proof.virtual_rig import Nature
 from tests.proof.virtual_service import FIRST_NODE, World, station, world
@@ -133,13 +134,13 @@ def test_a_charge_goes_on_beside_others(come: Callable[[World], object], said: s
     course = played(come, main_loop=main_loop)
     assert course.stopped_s is None or course.stopped_s >= END_S - START_S - 0.1, course
     assert course.faults <= SAID
-    assert said in course.link.other_master
+    assert said in say(course.link.other_master)
     assert course.reads_s < 0.8
 
 
 def test_a_heartbeat_that_is_set_is_said_and_ours_again() -> None:
     course = played(sets_heartbeat_unheard)
-    assert "set the BMU's heartbeat to 5 s" in course.link.heartbeat_set
+    assert "set the BMU's heartbeat to 5 s" in say(course.link.heartbeat_set)
 
 
 @pytest.mark.parametrize("when", [When.FIRST, When.AFTER, When.UNASKED])

@@ -63,9 +63,8 @@ class Guardian:
 
     unwell = 0
 
-    def beat(self, _now_s: float, *, well: bool = True) -> str:
+    def beat(self, _now_s: float, *, well: bool = True) -> None:
         self.unwell += not well
-        return ""
 
     def hold(self, _port: str, _fd: int) -> None:
         """As the real one."""
@@ -150,14 +149,14 @@ class Shelf:
     def on_disk(self, place: Place) -> Persisted | None:
         return self.persisted.get(place.bay)
 
-    def unkept(self, _now_s: float) -> str:
-        return ""
+    def unkept(self, _now_s: float) -> None:
+        """It takes everything."""
 
     def stalled(self, _now_s: float) -> bool:
         return False
 
-    def close(self, _within_s: float) -> str:
-        return ""
+    def close(self, _within_s: float) -> None:
+        """Nothing is left to be written."""
 
 
 class Silence:

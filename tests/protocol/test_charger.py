@@ -8,6 +8,7 @@ from orchestrator.errors import OrchestratorError, ProtocolError
 from orchestrator.model import (
     STOP,
     Action,
+    Cause,
     ChargeMode,
     ChargerReading,
     Command,
@@ -36,6 +37,7 @@ from orchestrator.protocol.charger import (
     status_request,
 )
 from orchestrator.protocol.frame import ADDRESS, Frame, FrameDecoder
+from orchestrator.text.catalogue import say
 from tests.protocol.vectors import GOOD
 
 VECTOR = {vector.name: vector for vector in GOOD}
@@ -171,12 +173,14 @@ def test_every_documented_value_is_taken_and_every_other_one_said(
         words = [5011, 2311, 1, 1, 4, 4, 2, 1]
         words[at] = value
         reading = parse_status(reply(*words), STATUS_KINDS, 0.0)
-        got = getattr(reading, name)
+        got, row = getattr(reading, name), next(row for row in STATUS_VALUES if row.name == name)
         if value in documented:
             assert (got, reading.illegal) == (kind(value), ())
             assert isinstance(got, kind)
         else:
-            assert (got, reading.illegal) == (None, (sentence.format(value),))
+            assert (got, reading.illegal) == (None, (row.value(value),))
+            assert row.refused(value) == sentence.format(value)
+            assert say(reading.illegal[0]).endswith(sentence.partition("{}")[2].format(value))
 
 
 def test_every_illegal_value_is_said_at_once() -> None:
@@ -207,7 +211,9 @@ def test_all_sixteen_kinds_fill_the_largest_frame_with_the_void_ones_last() -> N
     values = parse_values(reply(*range(1, 17)), 0xFF, 0xFF)
     assert (reply_bytes(0xFF, 0xFF), len(STATUS_VALUES)) == (41, 16)
     assert [values[f"void_{bits}"] for bits in ("2000", "4000", "8000", "0020", "0040", "0080")] == [*range(11, 17)]
-    assert values["operation"] == "operation 6 (documented: 0, 1)"
+    operation = values["operation"]
+    assert isinstance(operation, Cause)
+    assert say(operation) == "operation 6 (documented: 0, 1)"
 
 
 @pytest.mark.parametrize(

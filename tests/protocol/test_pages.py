@@ -4,10 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.model import Measurement
+from orchestrator.model import Cause, Measurement
 from orchestrator.protocol.objects import Evidence
 from orchestrator.protocol.pages import PAGES, pages_request, pages_request_cob_id, parse_page
 from orchestrator.protocol.words import Decoded
+from orchestrator.text.catalogue import say
 
 
 def values(data: str) -> dict[str, Decoded | float]:
@@ -68,7 +69,9 @@ def test_a_page_is_of_no_known_time_and_so_never_fresh() -> None:
     ],
 )
 def test_what_cannot_be_is_told(data: str, name: str, sentence: str) -> None:
-    assert values(data)[name] == sentence
+    why = values(data)[name]
+    assert isinstance(why, Cause)
+    assert say(why) == sentence
 
 
 def test_nothing_on_a_page_is_documented() -> None:

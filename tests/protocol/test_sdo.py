@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.protocol.sdo import (
-    ABORT_MEANINGS,
+    ABORTS,
     NMT_COB_ID,
     NmtCommand,
     NmtState,
@@ -23,6 +23,7 @@ from orchestrator.protocol.sdo import (
     tpdo_cob_id,
     write_request,
 )
+from orchestrator.text.catalogue import LANGUAGES, say
 from tests.protocol.vectors import BMU, Exchange
 
 NODE = 0x10
@@ -64,31 +65,37 @@ def test_an_object_outside_the_dictionary_cannot_be_asked_for(index: int, sub: i
         read_request(index, sub)
 
 
-@pytest.mark.parametrize("code", ABORT_MEANINGS)
+@pytest.mark.parametrize("code", sorted(ABORTS))
 def test_a_refusal_has_its_meaning(code: int) -> None:
     abort = parse_reply(bytes.fromhex("80 04 60 00") + code.to_bytes(4, "little"))
     assert abort == SdoAbort(0x6004, 0, code)
-    assert str(abort) == f"0x6004:00 aborted with 0x{code:08X}: {ABORT_MEANINGS[code]}"
+    for language in LANGUAGES.values():
+        assert f"sdo_{code:08X}" in language.words
+    assert say(abort.cause).startswith(f"0x6004:00 aborted with 0x{code:08X}: ")
+    assert "sdo_" not in say(abort.cause)
 
 
 def test_a_refusal_for_no_known_reason_is_still_a_refusal() -> None:
     abort = parse_reply(bytes.fromhex("80 01 60 02 EF BE AD DE"))
-    assert str(abort) == "0x6001:02 aborted with 0xDEADBEEF: not a documented reason"
+    assert isinstance(abort, SdoAbort)
+    assert say(abort.cause) == "0x6001:02 aborted with 0xDEADBEEF: not a documented reason"
 
 
 @pytest.mark.parametrize(
     ("wire", "reason"),
     [
-        ("", "0 bytes, expected 8: "),
-        ("43 00 60", "3 bytes, expected 8: 43 00 60"),
-        ("43 00 60 00 F8 FF 40", "7 bytes, expected 8: 43 00 60 00 F8 FF 40"),
-        ("43 00 60 00 F8 FF 40 09 00", "9 bytes, expected 8: 43 00 60 00 F8 FF 40 09 00"),
+        ("", "a frame of 0 bytes, expected 8: "),
+        ("43 00 60", "a frame of 3 bytes, expected 8: 43 00 60"),
+        ("43 00 60 00 F8 FF 40", "a frame of 7 bytes, expected 8: 43 00 60 00 F8 FF 40"),
+        ("43 00 60 00 F8 FF 40 09 00", "a frame of 9 bytes, expected 8: 43 00 60 00 F8 FF 40 09 00"),
         ("41 00 60 00 FF FF FF 7F", "command 0x41, expected 43, 4B, 4F, 60 or 80: 41 00 60 00 FF FF FF 7F"),
         ("00 31 32 33 34 35 36 37", "command 0x00, expected 43, 4B, 4F, 60 or 80: 00 31 32 33 34 35 36 37"),
     ],
 )
 def test_what_is_no_expedited_reply_says_what_it_is(wire: str, reason: str) -> None:
-    assert parse_reply(bytes.fromhex(wire)) == SdoMalformed(reason)
+    reply = parse_reply(bytes.fromhex(wire))
+    assert isinstance(reply, SdoMalformed)
+    assert say(reply.cause) == reason
 
 
 @given(st.binary(max_size=70))

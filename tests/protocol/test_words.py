@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.keys import Range
-from orchestrator.model import BatteryReading, Measurement
+from orchestrator.model import BatteryReading, Cause, Measurement
 from orchestrator.protocol.objects import READING_FIELDS, Evidence, FieldMap, ObjectEntry, Sweep
 from orchestrator.protocol.words import Decoded, decode_word, raw_bits
+from orchestrator.text.catalogue import say
 
 EVERYTHING = Range(-1e12, 1e12)
 
@@ -35,6 +36,14 @@ TIMES = entry(
 )
 
 
+def outside(field: str, value: float, low: float, high: float, raw: str) -> Cause:
+    return Cause.of("value_outside", field=field, value=value, low=low, high=high, raw=raw)
+
+
+def test_what_is_outside_is_said_with_its_raw_bits() -> None:
+    assert say(outside("soc_pct", 255.0, 0, 100, "0xFF")) == "soc_pct 255 is outside 0 … 100 (raw 0xFF)"
+
+
 def test_the_documents_sample() -> None:
     word = int.from_bytes(bytes.fromhex("F8FF4009"), "little")
     assert decode_word(VOLTS_AMPS, word, 4, 7.0) == {
@@ -55,19 +64,19 @@ def test_not_available_is_no_value_and_no_fault() -> None:
 def test_a_value_outside_its_range_is_a_sentence_and_its_neighbours_stay() -> None:
     assert decode_word(TIMES, 0x0010_FF_64, 4, 1.0) == {
         "time_to_empty_min": Measurement(16, 1.0),
-        "soc_pct": "soc_pct 255 is outside 0 … 100 (raw 0xFF)",
+        "soc_pct": outside("soc_pct", 255.0, 0, 100, "0xFF"),
         "soh_pct": Measurement(100, 1.0),
     }
     assert decode_word(VOLTS_AMPS, 0x1771_8000, 4, 1.0) == {
-        "voltage_v": "voltage_v 60.01 is outside 0 … 60 (raw 0x1771)",
-        "current_a": "current_a -327.68 is outside -60 … 60 (raw 0x8000)",
+        "voltage_v": outside("voltage_v", 60.01, 0, 60, "0x1771"),
+        "current_a": outside("current_a", -327.68, -60, 60, "0x8000"),
     }
 
 
 @pytest.mark.parametrize(("width", "raw"), [(1, "1"), (8, "01"), (9, "001"), (12, "001"), (13, "0001"), (16, "0001")])
 def test_raw_bits_are_shown_with_all_their_digits(width: int, raw: str) -> None:
     narrow = entry(bits("status", 0, width, range=Range(2, 3)))
-    assert decode_word(narrow, 1, 4, 0.0) == {"status": f"status 1 is outside 2 … 3 (raw 0x{raw})"}
+    assert decode_word(narrow, 1, 4, 0.0) == {"status": outside("status", 1.0, 2, 3, f"0x{raw}")}
 
 
 def test_both_ends_of_a_range_belong_to_it() -> None:
@@ -77,9 +86,9 @@ def test_both_ends_of_a_range_belong_to_it() -> None:
     }
 
 
-@pytest.mark.parametrize(("size", "declared"), [(1, "1 byte"), (2, "2 bytes")])
-def test_a_reply_of_another_size_believes_no_field(size: int, declared: str) -> None:
-    why = f"0x6002:00 declared {declared}, the map says 4"
+@pytest.mark.parametrize("size", [1, 2])
+def test_a_reply_of_another_size_believes_no_field(size: int) -> None:
+    why = Cause.of("size_differs", index=0x6002, sub=0, size=size, expected=4)
     assert decode_word(TIMES, 0x00105063, size, 0.0) == dict.fromkeys(("time_to_empty_min", "soc_pct", "soh_pct"), why)
 
 

@@ -1,12 +1,15 @@
 """What was decided once is decided again: every journal that ships, taken again with its own rules."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from orchestrator.model import State
+from orchestrator.model.cause import from_plain, plain
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.recording import read
+from tests.core.said import say
 from tests.replay.record import JOURNALS, SEEDS
 
 PATHS = sorted(JOURNALS.glob("*.jsonl.gz"))
@@ -32,3 +35,12 @@ def test_they_have_all_that_matters_in_them() -> None:
     assert len(taken) > 2000
     assert {one.decision.state for one in taken} == set(State)
     assert len({fault.id for one in taken for fault in one.decision.faults}) >= 8
+
+
+def test_every_cause_that_was_decided_is_read_as_it_was_written_and_said_in_each_language() -> None:
+    taken = [one for path in PATHS for steps in read([path]).bays.values() for one in again(steps)]
+    causes = {cause for one in taken for cause in (one.decision.cause, *(fault.cause for fault in one.decision.faults))}
+    assert len(causes) > 100
+    for cause in causes:
+        assert from_plain(json.loads(json.dumps(plain(cause)))) == cause
+        say(cause)

@@ -35,6 +35,7 @@ from orchestrator.service.journal import Journal
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.store import Store
 from orchestrator.text.catalogue import say
+from tests.core.said import into
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 STEP_S = 0.2
@@ -147,7 +148,7 @@ class Bench:
         self.store = Store(directory, [place], lambda: self.now_s, time.time)
         self.store._begin([Entry(place, persisted or Persisted(), 1)])
         self.bay = BayRunner(
-            chosen, self.charger, self.battery, self.journal, self.store, self.said.append, contactor=contactor
+            chosen, self.charger, self.battery, self.journal, self.store, into(self.said), contactor=contactor
         )
 
     def step(self, count: int = 1) -> State:

@@ -8,17 +8,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 
-from orchestrator.errors import ServiceError
+from orchestrator.errors import RequestError
 from orchestrator.lastresort.asking import ask
 from orchestrator.service.client import CLIENT_S
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.reception import Answer, Handler, Later
+from tests.core.said import cause
 
 
 def answer(request: Mapping[str, object]) -> Mapping[str, object]:
     """Says what it heard; refuses and breaks when asked to."""
     if request.get("verb") == "refuse":
-        raise ServiceError("not today")
+        raise RequestError(cause("not today"))
     if request.get("verb") == "break":
         raise KeyError("lost")
     return {"heard": dict(request)}

@@ -11,7 +11,7 @@ from orchestrator.core.memory import Memory, with_values
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
-from orchestrator.model import STOP, Decision, Request, Snapshot, State
+from orchestrator.model import STOP, Cause, Decision, Request, Snapshot, State
 from orchestrator.model.cause import from_plain
 from orchestrator.service import bay as bay_module
 from orchestrator.service.asked import Asked
@@ -208,7 +208,7 @@ def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, mo
 
 def test_the_stop_at_the_end_is_no_operators(bench: Bench) -> None:
     bench.charging()
-    bench.bay.end("SIGTERM")
+    bench.bay.end(Cause.of("signal", name="SIGTERM"))
     bench.step()
     assert bench.bay.status()["reason"] == "the service ends: SIGTERM"
     bench.step(10)
@@ -220,7 +220,7 @@ def test_the_stop_at_the_end_is_no_operators(bench: Bench) -> None:
 
 def test_what_was_charging_when_the_guardian_died_waits_for_an_operator(bench: Bench) -> None:
     bench.charging()
-    bench.bay.end("the guardian has died", orderly=False)
+    bench.bay.end(Cause("guardian_died"), orderly=False)
     bench.step(10)
     assert bench.bay.verified
     hold = "the last run ended in mid-charge: the guardian has died"
@@ -229,7 +229,7 @@ def test_what_was_charging_when_the_guardian_died_waits_for_an_operator(bench: B
 
 def test_what_was_not_charging_when_the_guardian_died_waits_for_nobody(bench: Bench) -> None:
     bench.until(State.QUALIFYING)
-    bench.bay.end("the guardian has died", orderly=False)
+    bench.bay.end(Cause("guardian_died"), orderly=False)
     bench.step(10)
     assert kept(bench) == (False, "", False)
 
@@ -240,7 +240,7 @@ def test_the_end_of_the_service_and_an_operators_stop_are_two_things(bench: Benc
     bench.charging()
     if before:
         bench.ask(Request.STOP)
-    bench.bay.end("SIGTERM")
+    bench.bay.end(Cause.of("signal", name="SIGTERM"))
     bench.step()
     if not before:
         assert bench.ask(Request.STOP) == ""
@@ -252,7 +252,7 @@ def test_the_end_of_the_service_and_an_operators_stop_are_two_things(bench: Benc
 def test_an_end_during_the_start_leaves_no_hold_behind(bench: Bench, steps: int) -> None:
     if steps:
         bench.step(steps)
-    bench.bay.end("SIGTERM")
+    bench.bay.end(Cause.of("signal", name="SIGTERM"))
     bench.step(10)
     assert bench.bay.verified
     assert kept(bench) == (False, "", False)

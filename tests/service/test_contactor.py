@@ -7,10 +7,12 @@ from pathlib import Path
 import pytest
 
 from orchestrator.errors import LinkError
-from orchestrator.model import STOP, Request, State
+from orchestrator.model import STOP, Cause, Request, State
 from orchestrator.service import bay as bay_module
 from orchestrator.service.contactor import CLOSING_S, REOPEN_S, Contactor
 from orchestrator.service.guarded import GuardedOutput
+from orchestrator.text.catalogue import fields
+from tests.core.said import cause, say
 from tests.service.bench import Bench
 
 GONE = "/dev/gpiochip0 line 17: gone"
@@ -26,14 +28,14 @@ class Line:
 
     def take(self) -> "Line":
         if self.broken:
-            raise LinkError(GONE)
+            raise LinkError(cause(GONE))
         assert not self.held
         self.held, self.closed, self.taken = True, False, self.taken + 1
         return self
 
     def drive(self, *, closed: bool) -> None:
         if self.broken:
-            raise LinkError(GONE)
+            raise LinkError(cause(GONE))
         self.closed = closed
 
     def fileno(self) -> int:
@@ -86,12 +88,12 @@ def test_a_line_that_fails_is_given_back_and_taken_anew_every_second(contactor: 
     contactor.drive(0.0, closed=True)
     line.broken = True
     contactor.drive(0.1, closed=True)
-    assert (contactor.problem, contactor.closed_s, line.held) == (GONE, None, False)
+    assert (say(contactor.problem), contactor.closed_s, line.held) == (GONE, None, False)
     line.broken = False
     contactor.drive(0.0 + REOPEN_S, closed=True)
-    assert (contactor.problem, line.taken) == (GONE, 1)
+    assert (say(contactor.problem), line.taken) == (GONE, 1)
     contactor.drive(0.1 + REOPEN_S, closed=False)
-    assert (contactor.problem, contactor.closed_s, line.taken) == ("", None, 2)
+    assert (say(contactor.problem), contactor.closed_s, line.taken) == ("", None, 2)
 
 
 def test_at_the_end_it_is_opened_before_the_line_is_given_back(contactor: Contactor, line: Line) -> None:
@@ -128,12 +130,12 @@ def test_it_closes_when_standby_is_verified_and_opens_at_the_end(bench: Bench, l
     assert (line.taken, line.closed) == (1, False)
     bench.charging()
     assert line.closed
-    bench.bay.end("SIGTERM")
+    bench.bay.end(Cause.of("signal", name="SIGTERM"))
     bench.step(10)
     assert bench.bay.verified
     bench.bay.isolate()
     assert (line.closed, line.held) == (False, False)
-    assert told(bench) == [{"closed": closed, "problem": ""} for closed in (False, True, False)]
+    assert told(bench) == [{"closed": closed, "problem": "", "cause": None} for closed in (False, True, False)]
 
 
 def test_a_charger_that_does_not_obey_is_cut_off(bench: Bench, line: Line) -> None:
@@ -144,7 +146,7 @@ def test_a_charger_that_does_not_obey_is_cut_off(bench: Bench, line: Line) -> No
     bench.until(State.UNCONTROLLABLE)
     assert not line.closed
     status = json.loads(json.dumps(bench.bay.status()))
-    assert (status["alarm"], status["contactor"]) == ("danger", {"closed": False, "problem": ""})
+    assert (status["alarm"], status["contactor"]) == ("danger", {"closed": False, "problem": "", "cause": None})
 
 
 def test_an_exception_of_our_own_that_stays_opens_it_once_the_stop_has_had_its_time(
@@ -169,11 +171,11 @@ def test_a_line_that_fails_stops_the_charge_and_is_told(bench: Bench, line: Line
     status = json.loads(json.dumps(bench.bay.status()))
     assert [fault["id"] for fault in status["faults"]] == ["contactor_lost"]
     assert GONE in status["faults"][0]["text"]
-    assert status["contactor"] == {"closed": False, "problem": GONE}
-    assert told(bench)[-1] == {"closed": False, "problem": GONE}
+    assert status["contactor"] == {"closed": False, "problem": GONE, "cause": fields(cause(GONE))}
+    assert told(bench)[-1] == {"closed": False, "problem": GONE, "cause": fields(cause(GONE))}
     line.broken = False
     bench.step(round(2 * REOPEN_S / 0.2))
-    assert bench.bay.status()["contactor"] == {"closed": True, "problem": ""}
+    assert bench.bay.status()["contactor"] == {"closed": True, "problem": "", "cause": None}
     bench.until(State.CHARGING, 300)
 
 

@@ -10,11 +10,12 @@ from threading import Event
 
 import pytest
 
-from orchestrator.errors import ServiceError
+from orchestrator.errors import ServiceError, StartError
 from orchestrator.lastresort.asking import ask
 from orchestrator.service import control as control_module
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.socketfile import is_alive
+from tests.core.said import into, raises
 from tests.service.control_bench import answer, answered_soon, closing_all, listening
 from tests.waiting import wait_until
 
@@ -58,7 +59,7 @@ def test_a_dead_socket_is_replaced(tmp_path: Path) -> None:
 
 
 def test_a_second_service_is_refused_and_the_first_one_goes_on(path: Path) -> None:
-    with pytest.raises(ServiceError, match=r"another service answers on .*: stop it first"):
+    with raises(StartError, match=r"another service answers on .*: stop it first"):
         ControlSocket(path, answer, time.monotonic)
     assert ask(path, {})["ok"]
 
@@ -74,7 +75,7 @@ def test_a_service_that_is_behind_with_its_answers_is_alive(tmp_path: Path) -> N
                 clients.append(waiting)
                 waiting.setblocking(False)
                 waiting.connect(str(path))
-        with pytest.raises(ServiceError, match="another service answers"):
+        with raises(StartError, match="another service answers"):
             ControlSocket(path, answer, time.monotonic)
     assert path.exists()
 
@@ -82,7 +83,7 @@ def test_a_service_that_is_behind_with_its_answers_is_alive(tmp_path: Path) -> N
 def test_no_file_of_a_person_is_removed(tmp_path: Path) -> None:
     mine = tmp_path / "station.yaml"
     mine.write_text("station: x", encoding="utf-8")
-    with pytest.raises(ServiceError, match="is no socket"):
+    with raises(StartError, match="is no socket"):
         ControlSocket(mine, answer, time.monotonic)
     assert mine.read_text(encoding="utf-8") == "station: x"
 
@@ -90,7 +91,7 @@ def test_no_file_of_a_person_is_removed(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["file/control.sock", "x" * 200])
 def test_a_place_that_cannot_be_is_one_sentence(tmp_path: Path, name: str) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(ServiceError, match=r"the control socket .* cannot be opened: "):
+    with raises(StartError, match=r"the control socket .* cannot be opened: "):
         ControlSocket(tmp_path / name, answer, time.monotonic)
 
 
@@ -107,7 +108,7 @@ def test_a_name_that_somebody_removes_comes_back(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(control_module, "NAME_S", 0.05)
     said: list[str] = []
     path = tmp_path / "control.sock"
-    control = ControlSocket(path, answer, time.monotonic, said.append)
+    control = ControlSocket(path, answer, time.monotonic, into(said))
     control.start()
     try:
         path.unlink()
@@ -126,7 +127,7 @@ def test_a_name_that_is_anothers_by_now_is_left_to_him_and_that_is_said_once(
     monkeypatch.setattr(control_module, "NAME_S", 0.02)
     said: list[str] = []
     path = tmp_path / "control.sock"
-    control = ControlSocket(path, answer, time.monotonic, said.append)
+    control = ControlSocket(path, answer, time.monotonic, into(said))
     control.start()
     try:
         (tmp_path / "other").touch()
@@ -141,5 +142,5 @@ def test_a_name_that_is_anothers_by_now_is_left_to_him_and_that_is_said_once(
 
 def test_a_link_to_nowhere_in_its_place_is_left_to_its_owner(tmp_path: Path) -> None:
     (tmp_path / "control.sock").symlink_to(tmp_path / "nowhere")
-    with pytest.raises(ServiceError, match="is no socket"):
+    with raises(StartError, match="is no socket"):
         ControlSocket(tmp_path / "control.sock", answer, time.monotonic)

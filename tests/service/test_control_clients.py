@@ -17,6 +17,7 @@ from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.service.client import CLIENT_S, Client
 from orchestrator.service.control import MAX_CLIENTS, REST_S, RETRY_S, SAY_S, ControlSocket
+from tests.core.said import into
 from tests.service.control_bench import (
     SOON_S,
     Bays,
@@ -182,7 +183,7 @@ def test_a_stranger_is_turned_away_and_that_is_said_once_a_minute(
     said: list[str] = []
     now_s = [1000.0]
     path = tmp_path / "control.sock"
-    control = ControlSocket(path, answer, lambda: now_s[0], said.append)
+    control = ControlSocket(path, answer, lambda: now_s[0], into(said))
     control.start()
     try:
         monkeypatch.setattr(Client, "peer", lambda _: (4711, 12345, 12345))

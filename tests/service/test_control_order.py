@@ -11,9 +11,10 @@ import pytest
 
 from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
+from orchestrator.model import Cause
 from orchestrator.service import reception as reception_module
 from orchestrator.service.control import STALL_S
-from orchestrator.service.reception import PAUSE_S, SHARED_S, Answer, Later
+from orchestrator.service.reception import PAUSE_S, SHARED_S, Answer, Later, refused
 from tests.service.control_bench import Bays, answered_soon, client, closing_all, connected, listening, reply
 from tests.waiting import wait_until
 
@@ -62,7 +63,7 @@ def test_a_stop_goes_first_and_what_it_overtook_is_not_done_after_it(
         assert reply(say(path, clients, "stop", ["bay-1"]))["ok"]
         assert bays.asked == ["pause", "stop"]
         for one in early:
-            assert reply(one) == {"ok": False, "error": "a stop came meanwhile: ask again if it is still wanted"}
+            assert reply(one) == refused(Cause("overtaken"), "en")
         assert reply(other)["ok"]
         assert bays.asked == ["pause", "stop", "start"]
 

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.errors import ServiceError
+from orchestrator.errors import RequestError
 from orchestrator.lastresort.asking import ask
+from orchestrator.model import Cause
 from orchestrator.service.client import MAX_REQUEST, parse_request
+from orchestrator.service.reception import refused
 from tests.service.control_bench import client, reply
 
 
@@ -22,7 +24,7 @@ from tests.service.control_bench import client, reply
 def test_what_is_no_request_is_told_so(path: Path, line: bytes) -> None:
     with client(path) as connection:
         connection.sendall(line)
-        assert reply(connection) == {"ok": False, "error": "a request is one JSON object on one line"}
+        assert reply(connection) == refused(Cause("request_no_object"), "en")
     assert ask(path, {})["ok"]
 
 
@@ -42,7 +44,7 @@ def test_half_a_request_is_none(path: Path) -> None:
 
 @given(st.binary(max_size=200))
 def test_any_bytes_are_a_request_or_refused(line: bytes) -> None:
-    with suppress(ServiceError):
+    with suppress(RequestError):
         assert isinstance(parse_request(line), dict)
 
 
@@ -60,5 +62,5 @@ def test_every_object_is_a_request(request: dict[str, object]) -> None:
 
 @given(json_values.filter(lambda value: not isinstance(value, dict)))
 def test_everything_else_is_not(value: object) -> None:
-    with pytest.raises(ServiceError):
+    with pytest.raises(RequestError):
         parse_request(json.dumps(value).encode())

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from orchestrator.service import journal as journal_module
 from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal, rfc3339
 from orchestrator.service.rotating import FILES, RotatingFile
+from tests.core.said import say
 from tests.waiting import wait_until
 
 WALL_S = 1_700_000_000.0
@@ -38,7 +39,7 @@ def writing(directory: Path, max_mb: float = 1.0) -> Iterator[Journal]:
 
 
 def problem(journal: Journal) -> str:
-    return journal.problem(time.monotonic())
+    return say(journal.problem(time.monotonic()))
 
 
 def read(directory: Path, stream: str = "events") -> list[dict[str, Any]]:
@@ -188,7 +189,7 @@ def test_nobody_waits_for_a_disk_that_hangs(tmp_path: Path) -> None:
         assert time.monotonic() - began_s < 2
         assert journal.lost == 7
         assert not problem(journal)
-        hung = journal.problem(time.monotonic() + STALL_S)
+        hung = say(journal.problem(time.monotonic() + STALL_S))
         assert hung.startswith("the journal has not been written for 3")
         began_s = time.monotonic()
         journal.close()

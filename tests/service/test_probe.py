@@ -18,6 +18,7 @@ from orchestrator.model import Measurement
 from orchestrator.protocol.words import Decoded
 from orchestrator.service.control import ControlSocket
 from orchestrator.sim.client import PlantProcess
+from tests.core.said import cause
 from tests.link.strangers import holding
 from tests.sim.wires import on_bus, udp_keys
 from tests.whole.station import Document, orchestrator, station_document
@@ -249,7 +250,7 @@ def test_a_refused_object_is_an_answer(site: Site) -> None:
     finally:
         site.plant.inject("heal", 1)
     assert status == 0
-    assert "0x6004:00  refused: object does not exist in the object dictionary (0x06020000)" in shown
+    assert "0x6004:00  aborted with 0x06020000: object does not exist in the object dictionary" in shown
 
 
 def test_a_bay_that_is_not_there_and_a_service_that_runs_are_refused(site: Site) -> None:
@@ -299,7 +300,9 @@ def test_objects_that_were_not_answered_leave_gaps() -> None:
     ("page_v", "said"), [(48.1, ""), (47.0, ""), (40.0, "voltage_v 48.1, but 40 by the older protocol")]
 )
 def test_the_older_protocol_agrees_within_what_a_second_may_change(page_v: float, said: str) -> None:
-    shown = lines_of({"voltage_v": Measurement(page_v, 0.0), "status": None, "soc_pct": "soc_pct 140 is outside"})
+    shown = lines_of(
+        {"voltage_v": Measurement(page_v, 0.0), "status": None, "soc_pct": cause("soc_pct 140 is outside")}
+    )
     assert f"map tabos: {said or 'nothing speaks against it'}" in shown
 
 

@@ -123,8 +123,16 @@ def test_a_session_begins_and_ends_once() -> None:
 
 
 def plain(snapshot: Snapshot) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads(json.dumps(asdict(snapshot)))
+    document: dict[str, Any] = json.loads(json.dumps(causes_plain(asdict(snapshot))))
     return document
+
+
+def causes_plain(value: Any) -> Any:
+    """Causes as the journal has them: with their parameters as an object."""
+    if isinstance(value, dict):
+        found = {name: causes_plain(one) for name, one in value.items()}
+        return {**found, "params": dict(found["params"])} if "params" in found else found
+    return [causes_plain(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def rebuilt(lines: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -150,11 +158,13 @@ measurements = st.none() | st.builds(Measurement, st.sampled_from([20.0, 21.0]),
 snapshots = st.builds(
     Snapshot,
     st.sampled_from(
-        [None, READING, replace(READING, t_s=2.0), replace(READING, charge_mode=None, illegal=("mode 9",))]
+        [None, READING, replace(READING, t_s=2.0), replace(READING, charge_mode=None, illegal=(cause("mode 9"),))]
     ),
-    st.sampled_from([ChargerLink(), ChargerLink(online=True), ChargerLink(problem="gone"), ChargerLink(online=True)]),
+    st.sampled_from(
+        [ChargerLink(), ChargerLink(online=True), ChargerLink(problem=cause("gone")), ChargerLink(online=True)]
+    ),
     st.builds(BatteryReading, soc_pct=measurements, temperature_c=measurements, voltage_v=measurements),
-    st.sampled_from([BatteryLink(), BatteryLink(online=True, implausible={"soc_pct": "140"})]),
+    st.sampled_from([BatteryLink(), BatteryLink(online=True, implausible={"soc_pct": cause("140")})]),
     st.sampled_from([None, *Request]),
     st.sampled_from(["", "broken"]),
     st.booleans(),
@@ -225,7 +235,7 @@ def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
 def test_a_countdown_is_no_news() -> None:
     """The reason of a backoff says when it goes on: new words each second, and not one line of the journal."""
     world = charging()
-    world.battery_link = replace(world.battery_link, implausible={"soc_pct": "SOC 140 %"})
+    world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
     world.tick()
     world.battery_link = replace(world.battery_link, implausible={})
     world.run(5)

@@ -11,6 +11,7 @@ from orchestrator.config.shipped import shipped_dir
 from orchestrator.config.station import Station
 from orchestrator.model import Request, State
 from orchestrator.service.reload import Reload
+from tests.core.said import into
 from tests.service.bench import Bench
 from tests.waiting import wait_until
 
@@ -38,7 +39,7 @@ class Site:
         station = load_station(self.station_file)
         self.bench = Bench(directory, bay=station.bays[0])
         self.said: list[str] = []
-        self.reload = Reload(station, [self.bench.bay], self.said.append)
+        self.reload = Reload(station, [self.bench.bay], into(self.said))
 
     def edit(self, file: Path, old: str, new: str) -> None:
         text = file.read_text()

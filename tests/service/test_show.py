@@ -6,7 +6,7 @@ from typing import cast
 import pytest
 
 from orchestrator.model import Cause
-from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
+from orchestrator.show import figure, page, stands_by, strays, table, what_to_do, width_of
 from orchestrator.text.catalogue import fields
 
 
@@ -219,15 +219,25 @@ def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_w
     assert page({"bays": [], "journal": {"problem": ""}}) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"
 
 
+def test_the_columns_stand_below_each_other_in_every_language() -> None:
+    assert (width_of("48.10 V (old)"), width_of("48.10 V (이전 값)")) == (13, 17)
+    stale = bay(charger={"current_a": 14.0, "old": True, "age_s": 46.0})
+    for language in ("en", "ko"):
+        lines = table([stale, bay(name="bay-2")], language).splitlines()
+        steps = [width_of(line[: line.index("2 (5.0 A)  ")]) for line in lines if line.startswith("bay-")]
+        assert len(steps) == 2
+        assert len(set(steps)) == 1, language
+
+
 def test_the_page_is_in_the_readers_language() -> None:
     cause = fields(Cause.of("stopped_first"))
     told = bay(state="OFFLINE", alarm="danger", cause=cause, reason="the charger is being stopped", port="/dev/x")
     document = {"bays": [told], "strays": [{"bay": "bay-7", "port": "/dev/old", "problem": "", "state": "STOPPING",
                                             "verified": False}]}  # fmt: skip
     lines = page(document, "ko").splitlines()
-    assert lines[0].startswith("ALARM: bay-7의 것이었던 /dev/old의 충전기의 주전원을 차단하십시오")
+    assert lines[0].startswith("경보: bay-7의 것이었던 /dev/old의 충전기의 주전원을 차단하십시오")
     assert lines[1] == (
-        "ALARM: bay-1의 충전기(/dev/x)의 주전원을 차단하십시오: OFFLINE: 다른 무엇보다 먼저 충전기를 정지하고 있습니다"
+        "경보: bay-1의 충전기(/dev/x)의 주전원을 차단하십시오: OFFLINE: 다른 무엇보다 먼저 충전기를 정지하고 있습니다"
     )
     assert "the charger is being stopped" in page(document)
     assert "the charger is being stopped before anything else" in page(document, "en")

@@ -33,6 +33,7 @@ from orchestrator.model import (
     Step,
 )
 from orchestrator.service.status import bay_status, station_status
+from orchestrator.text.catalogue import fields
 from tests.core.said import cause
 
 READING = ChargerReading(
@@ -170,11 +171,12 @@ def test_a_cause_is_data_and_a_sentence_in_the_stations_language() -> None:
 def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
     station = load_station(shipped_dir() / Path("configs/stations/one-bay.yaml"))
     stray = {"bay": "bay-9", "port": "/dev/x", "state": "STOPPING", "verified": False, "problem": ""}
-    assert station_status(station, Alarm.DANGER, [], "disk full", "worn", [stray]) == {
+    assert station_status(station, Alarm.DANGER, [], cause("disk full"), cause("worn"), [stray]) == {
         "station": "depot-1",
+        "language": "en",
         "alarm": "danger",
         "bays": [],
         "strays": [stray],
-        "journal": {"problem": "disk full"},
-        "persisted": {"problem": "worn"},
+        "journal": {"problem": "disk full", "cause": fields(cause("disk full"))},
+        "persisted": {"problem": "worn", "cause": fields(cause("worn"))},
     }

@@ -15,13 +15,13 @@ import pytest
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.operator import OWN, STOPPED
 from orchestrator.core.persisted import COUNTERS_S, Persisted, PersistedFault
-from orchestrator.errors import ServiceError
+from orchestrator.errors import StartError
 from orchestrator.model import Cause, Session
 from orchestrator.service.loading import FILE, FIRST_FILE
 from orchestrator.service.past import Place
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.text.catalogue import say
-from tests.core.said import cause
+from tests.core.said import cause, raises
 from tests.service.disks import FULL, WornDisk
 from tests.waiting import wait_until
 
@@ -164,16 +164,16 @@ def test_a_disk_that_hangs_delays_nobody_and_is_told_after_two_seconds(
         assert time.monotonic() - began_s < 1
         assert store.kept_revision < revision
         assert store.on_disk(A) is None, "nobody knows which of both is there"
-        assert store.unkept(clock.now_s + KEPT_WITHIN_S) == ""
-        assert store.unkept(clock.now_s + KEPT_WITHIN_S + 0.1) == (
+        assert say(store.unkept(clock.now_s + KEPT_WITHIN_S)) == ""
+        assert say(store.unkept(clock.now_s + KEPT_WITHIN_S + 0.1)) == (
             f"a restart would forget what changes: {tmp_path / FILE} is not written within 2 s"
         )
         began_s = time.monotonic()
-        assert store.close(0.2) == f"{tmp_path / FILE} is not written within 0.2 s: its disk hangs"
+        assert say(store.close(0.2)) == f"{tmp_path / FILE} is not written within 0.2 s: its disk hangs"
         assert time.monotonic() - began_s < 1
         worn.heal()
         kept(store, revision + 1)
-        assert store.close(5) == ""
+        assert say(store.close(5)) == ""
     assert entries(tmp_path)["bay-1"]["running"] is True
 
 
@@ -187,11 +187,11 @@ def test_a_disk_that_refuses_is_told_at_once_and_asked_again(
         worn.fails[call] = FULL
         revision = store.put(A, HELD)
         wait_until(lambda: store.unkept(time.monotonic()), what="the problem")
-        assert store.unkept(time.monotonic()).endswith(f"{FILE}: No space left on device")
+        assert say(store.unkept(time.monotonic())).endswith(f"{FILE}: No space left on device")
         assert store.kept_revision < revision
         worn.heal()
         kept(store, revision)
-        assert store.unkept(time.monotonic()) == ""
+        assert say(store.unkept(time.monotonic())) == ""
 
 
 def test_an_end_on_a_full_disk_says_what_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -200,7 +200,7 @@ def test_an_end_on_a_full_disk_says_what_is_not_kept(tmp_path: Path, monkeypatch
         kept(store, 1)
         worn.fails["write"] = FULL
         store.put(A, HELD)
-        assert store.close(5) == f"{tmp_path / FILE}: No space left on device"
+        assert say(store.close(5)) == f"{tmp_path / FILE}: No space left on device"
 
 
 def test_a_change_that_comes_during_a_write_has_its_own_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,12 +213,12 @@ def test_a_change_that_comes_during_a_write_has_its_own_time(tmp_path: Path, mon
         clock.now_s += 1.5
         second = store.put(B, HELD)
         clock.now_s += 1.0
-        assert store.unkept(clock.now_s) != ""
+        assert say(store.unkept(clock.now_s)) != ""
         worn.hangs.discard("fsync")
         worn.hangs.add("replace")
         worn.go.set()
         kept(store, second)
-        assert store.unkept(clock.now_s) == ""
+        assert say(store.unkept(clock.now_s)) == ""
         worn.heal()
 
 
@@ -243,7 +243,7 @@ def test_a_fault_of_our_own_is_told_and_the_thread_lives_on(tmp_path: Path) -> N
     with running(tmp_path) as store:
         kept(store, 1)
         store.put(A, Persisted(full_pct=float("nan"), hold={1: 2, "a": object()}))  # type: ignore[arg-type]  # no JSON
-        wait_until(lambda: "internal error: TypeError" in store.unkept(time.monotonic()), what="the problem")
+        wait_until(lambda: "internal error: TypeError" in say(store.unkept(time.monotonic())), what="the problem")
         assert not store.stalled(time.monotonic())
         kept(store, store.put(A, HELD))
 
@@ -428,9 +428,9 @@ def test_a_disk_that_does_not_tell_the_past_holds_every_bay_and_is_left_alone(
     assert not store.wait(0.1)
     assert say(store.past(A).hold).startswith(f"the disk of {tmp_path} does not answer: nobody knows")
     store.put(B, Persisted(running=True))
-    assert "restart the service once it does" in store.unkept(time.monotonic())
+    assert "restart the service once it does" in say(store.unkept(time.monotonic()))
     worn.heal()
-    assert store.close(5) == f"the disk of {tmp_path} does not answer"
+    assert say(store.close(5)) == f"the disk of {tmp_path} does not answer"
     assert (tmp_path / FILE).read_bytes() == before
 
 
@@ -440,15 +440,16 @@ SECOND = """
 import sys, time
 from pathlib import Path
 from orchestrator.service.past import Place
+from orchestrator.errors import StartError
 from orchestrator.service.store import Store
-from tests.core.said import cause
+from orchestrator.text.catalogue import say
 store = Store(Path(sys.argv[1]), [Place("bay-1", "/dev/1", "can0", 16)], time.monotonic, time.time)
 store.start()
 try:
     print(store.wait(10), flush=True)
     sys.stdin.read()
-except Exception as error:
-    print(error)
+except StartError as error:
+    print(say(error.cause))
 """
 
 
@@ -474,7 +475,7 @@ def test_the_lock_goes_with_its_process_whatever_ends_it(tmp_path: Path) -> None
         assert owner.stdout.readline() == "True\n"
         refused = Store(tmp_path, [A], time.monotonic, time.time)
         refused.start()
-        with pytest.raises(ServiceError, match="another service keeps its state in"):
+        with raises(StartError, match="another service keeps its state in"):
             refused.wait(5)
         owner.kill()
         owner.wait()

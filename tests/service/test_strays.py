@@ -10,12 +10,13 @@ import pytest
 
 from orchestrator.core.persisted import Persisted
 from orchestrator.devices.charger import ChargerPort
-from orchestrator.errors import ServiceError
+from orchestrator.errors import RequestError
 from orchestrator.model import STOP, ChargerLink, ChargerReading, Command, ControlMode, Operation
 from orchestrator.service.past import Entry, Place
 from orchestrator.service.store import Store
 from orchestrator.service.strays import WATCHED_S, Strays
 from orchestrator.text.catalogue import say
+from tests.core.said import into, raises
 from tests.waiting import wait_until
 
 LOST = Place("bay-1", "/dev/lost", "can0", 16)
@@ -52,7 +53,7 @@ class Case:
         self.store = Store(directory, [Place("bay-2", "/dev/2", "can0", 17)], lambda: self.now_s, time.time)
         here = self.store._places[0]
         self.store._begin([Entry(here, Persisted(), 1), Entry(LOST, Persisted(running=True), 1)])
-        self.strays = Strays(self.store, lambda _: cast("ChargerPort", self.port), self.said.append)
+        self.strays = Strays(self.store, lambda _: cast("ChargerPort", self.port), into(self.said))
         self.strays.begin()
 
     def sees(
@@ -79,7 +80,7 @@ def _case(tmp_path: Path) -> Iterator[Case]:
 def test_it_is_told_to_stop_and_people_are_told_of_it(case: Case) -> None:
     assert case.port.started
     assert case.port.orders == [STOP]
-    assert case.strays.unverified == ["bay-1 on /dev/lost"]
+    assert [say(one) for one in case.strays.unverified] == ["bay-1 on /dev/lost"]
     assert case.said == [
         "bay-1 on /dev/lost: the station file has no bay on this port, but its charger may be running: stopping it"
     ]
@@ -132,10 +133,10 @@ def test_one_that_runs_again_was_not_stopped(case: Case) -> None:
 
 
 def test_one_that_is_gone_for_good_is_dropped_when_a_person_says_so(case: Case) -> None:
-    with pytest.raises(ServiceError, match=r"no charger without a bay is waited for there \(waited for: /dev/lost\)"):
+    with raises(RequestError, match=r"no charger without a bay is waited for there \(waited for: /dev/lost\)"):
         case.strays.drop("/dev/2")
     case.sees(stopped_s=case.now_s)
-    with pytest.raises(ServiceError, match="its charger answers, so it is not gone"):
+    with raises(RequestError, match="its charger answers, so it is not gone"):
         case.strays.drop("/dev/lost")
     case.sees(online=False)
     what, revision = case.strays.drop("/dev/lost")
@@ -156,5 +157,5 @@ def test_its_port_is_given_back_after_a_while(case: Case) -> None:
     assert case.now_s >= began_s + WATCHED_S
     assert case.strays.unverified == []
     assert case.strays.status() == [
-        {"bay": "bay-1", "port": "/dev/lost", "state": "HELD", "verified": True, "problem": ""}
+        {"bay": "bay-1", "port": "/dev/lost", "state": "HELD", "verified": True, "problem": "", "cause": None}
     ]  # fmt: skip

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.errors import ServiceError, UsageError
+from orchestrator.errors import ServiceError, StartError, UsageError
 from orchestrator.lastresort.asking import ask
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.where import find_socket
+from tests.core.said import say
 
 
 @pytest.fixture(name="folder")
@@ -58,6 +59,8 @@ def as_nobody(folder: Path, do: Callable[[Path], object]) -> str:
             do(closed / "control.sock")
         except ServiceError as error:
             os.write(writer, str(error).encode())
+        except StartError as error:
+            os.write(writer, say(error.cause).encode())
         finally:
             os._exit(0)
     os.close(writer)

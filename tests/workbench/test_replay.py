@@ -13,7 +13,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.core import course
-from orchestrator.model import Request, State
+from orchestrator.model import Cause, Request, State
 from orchestrator.service.records import WHOLE_EVERY
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import Difference, compare, told
@@ -185,7 +185,7 @@ def one_run(directory: Path, began_s: float, wall_s: float, *, trip: bool = Fals
     if trip:
         bench.battery.values["temperature_c"] = 80.0
     else:
-        bench.bay.end("SIGTERM")
+        bench.bay.end(Cause.of("signal", name="SIGTERM"))
     bench.step(20)
     bench.journal._write()
     bench.store._ownership.give_up()
@@ -295,11 +295,14 @@ def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: py
     )
 
 
-def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(journal: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [2, 3])
+def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(
+    journal: Path, tmp_path: Path, version: int
+) -> None:
     (tmp_path / "journal").mkdir()
     for path in journal.glob("*.jsonl"):
         lines = path.read_text(encoding="utf-8").splitlines()
-        old = [json.dumps(_with_sentences(json.loads(line))) for line in lines]
+        old = [json.dumps(_with_sentences(json.loads(line), version)) for line in lines]
         (tmp_path / "journal" / path.name).write_text("\n".join(old) + "\n", encoding="utf-8")
     record = read([tmp_path / "journal"])
     assert record.bays == {}
@@ -308,8 +311,10 @@ def test_steps_of_a_version_with_sentences_are_refused_in_one_sentence(journal: 
     }
 
 
-def _with_sentences(line: dict[str, Any]) -> dict[str, Any]:
+def _with_sentences(line: dict[str, Any], version: int) -> dict[str, Any]:
     if line.get("whole"):
-        del line["memory"]["cause"]
-        line["memory"]["reason"] = "no battery"
+        line["charger_link"]["problem"] = ""
+        if version == 2:
+            del line["memory"]["cause"]
+            line["memory"]["reason"] = "no battery"
     return line

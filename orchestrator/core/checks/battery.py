@@ -3,6 +3,7 @@
 from orchestrator.core.facts import Facts
 from orchestrator.core.witnesses.pack import another_pack
 from orchestrator.model import BatteryStatus, Cause
+from orchestrator.model.cause import together
 
 #: Hysteresis of the pauses for heat and for cold.
 HEAT_HYSTERESIS_K = 5.0
@@ -35,7 +36,7 @@ def bmu_silent(f: Facts) -> Cause | None:
     if (f.battery.online and not f.silent) or f.just_booted:
         return None
     if f.battery.problem:
-        return Cause.of("bmu_problem", problem=f.battery.problem)
+        return f.battery.problem
     return Cause.of("bmu_silent", node_id=f.rules.bay.battery.node_id)
 
 
@@ -49,17 +50,13 @@ def stale_reading(f: Facts) -> Cause | None:
 def sdo_refused(f: Facts) -> Cause | None:
     """FAULTS B3: the object is not there, or not like this."""
     link = f.battery
-    return _abort("sdo_refused", f) if link.abort and link.abort_code >> 16 in REFUSALS else None
+    return link.abort if link.abort_code >> 16 in REFUSALS else None
 
 
 def sdo_aborted(f: Facts) -> Cause | None:
     """FAULTS B4: the BMU cannot answer now."""
     link = f.battery
-    return _abort("sdo_aborted", f) if link.abort and link.abort_code >> 16 not in REFUSALS else None
-
-
-def _abort(id_: str, f: Facts) -> Cause:
-    return Cause.of(id_, problem=f.battery.abort, code=f.battery.abort_code)
+    return link.abort if link.abort_code >> 16 not in REFUSALS else None
 
 
 def heartbeat_lost(f: Facts) -> Cause | None:
@@ -107,7 +104,7 @@ def _status(id_: str, f: Facts, bits: tuple[BatteryStatus, ...]) -> Cause | None
 
 def emergency(f: Facts) -> Cause | None:
     """FAULTS B9."""
-    return Cause.of("emergency", emergency=f.battery.emergency) if f.battery.emergency else None
+    return f.battery.emergency
 
 
 def over_temperature(f: Facts) -> Cause | None:
@@ -161,7 +158,7 @@ def temperature_invalid(f: Facts) -> Cause | None:
         return None
     wrong = f.battery.implausible.get("temperature_c")
     if wrong:
-        return Cause.of("temperature_implausible", problem=wrong)
+        return wrong
     if f.memory.battery.sample is None or f.memory.battery.sample_before is None:
         return None
     (before_s, before_c), (newest_s, newest_c) = f.memory.battery.sample_before, f.memory.battery.sample
@@ -175,8 +172,8 @@ def implausible(f: Facts) -> Cause | None:
     """FAULTS B14, B17: a value that cannot be."""
     if not f.battery.implausible or f.just_booted:
         return None
-    wrong = {name: text for name, text in f.battery.implausible.items() if name != "temperature_c"}
-    return Cause.of("implausible", fields=tuple(wrong), problems=tuple(wrong.values())) if wrong else None
+    wrong = [cause for name, cause in f.battery.implausible.items() if name != "temperature_c"]
+    return together(wrong) if wrong else None
 
 
 def under_voltage(f: Facts) -> Cause | None:
@@ -208,7 +205,7 @@ def other_master(f: Facts) -> Cause | None:
     seen_s = f.battery.other_master_t_s
     if seen_s is None or f.now_s - seen_s >= NEWS_S:
         return None
-    return Cause.of("other_master", seen=f.battery.other_master)
+    return f.battery.other_master
 
 
 def heartbeat_set(f: Facts) -> Cause | None:
@@ -216,4 +213,4 @@ def heartbeat_set(f: Facts) -> Cause | None:
     seen_s = f.battery.heartbeat_set_t_s
     if seen_s is None or f.now_s - seen_s >= NEWS_S:
         return None
-    return Cause.of("heartbeat_set", seen=f.battery.heartbeat_set)
+    return f.battery.heartbeat_set

@@ -31,7 +31,7 @@ NEWS_S = 5.0
 def charger_silent(f: Facts) -> Cause | None:
     """FAULTS C23, C25."""
     if f.charger.problem:
-        return Cause.of("charger_problem", problem=f.charger.problem)
+        return f.charger.problem
     port = f.rules.bay.charger.port
     if not f.charger.online:
         return Cause.of("charger_silent", port=port, misses=f.charger.misses)
@@ -142,7 +142,7 @@ def setting_not_obeyed(f: Facts) -> Cause | None:
 
 def contactor_lost(f: Facts) -> Cause | None:
     """FAULTS C6: without it, nothing is left for a charger that does not obey."""
-    return Cause.of("contactor_lost", problem=f.snapshot.contactor_problem) if f.snapshot.contactor_problem else None
+    return f.snapshot.contactor_problem
 
 
 def _unconfirmed(id_: str, f: Facts, order: str, value: int | None) -> Cause | None:

@@ -40,4 +40,4 @@ def suspended(f: Facts) -> Cause | None:
 
 def unkept(f: Facts) -> Cause | None:
     """FAULTS G8: a charge goes on, but none begins of which a latched fault would be forgotten by a restart."""
-    return Cause.of("unkept", problem=f.snapshot.unkept) if f.snapshot.unkept else None
+    return f.snapshot.unkept

@@ -68,7 +68,6 @@ TEXTS: Mapping[str, str] = {
     "full_by_all": "{whats:and}",
     "rises": "a higher step is allowed, and taken after {hold_s:g} s{at}",
     "charges_by_itself": "the charger charges by itself (automatic mode)",
-    "limit": "{text}",
     "precharge_step": "precharge is always on the lowest step",
     # before a charge
     "checking": "checking charger and battery before a charge",
@@ -120,7 +119,7 @@ TEXTS: Mapping[str, str] = {
     "where",
     "bay_moved_bmu": "{bay} had the BMU on {old_can}, node 0x{old_node_id:02X}, when this service last ran, and has {can}, "
     "node 0x{node_id:02X}, now: see what is wired where",
-    "state_unreadable": "{file} cannot be read ({error}): nobody knows which faults were latched",
+    "state_unreadable": "{file} cannot be read ({error:word}): nobody knows which faults were latched",
     "state_lost": "{file} is lost, though this service has run here before: nobody knows which faults were latched",
     "state_disk_silent": "the disk of {directory} does not answer: nobody knows which faults were latched",
 }

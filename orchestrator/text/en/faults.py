@@ -9,7 +9,7 @@ TEXTS: Mapping[str, str] = {
     "polarity_contradicts": "the charger contradicts itself: mode 6 (battery reversed) with connection 1 (normal)",
     "error_stop": "the charger reports mode 8: stopped by an error of its own",
     "system_stop": "the charger reports mode 7: it stopped itself without being asked",
-    "illegal_value": "the charger reports {values}",
+    "illegal_value": "the charger reports {values:word}",
     "mode_taken_over": "the charger is in {shown:word} mode, the station file says {configured:word}: look at its rotary "
     "switch",
     "rejected_frame": "the charger answered with an error frame (0x1F): wrong {wrong:and} in what it received",
@@ -18,7 +18,6 @@ TEXTS: Mapping[str, str] = {
     "noisy_line": "{bad_pct:.0f} % of the last minute's exchanges with the charger went wrong, more than "
     "{limit_pct:g} %",
     # whether it obeys
-    "charger_problem": "{problem}",
     "charger_silent": "the charger on {port} has not answered {misses} polls",
     "charger_stale": "the charger on {port} has sent no status for {limit_s:g} s",
     "found_running": "the charger was found running though it was not commanded to",
@@ -34,7 +33,6 @@ TEXTS: Mapping[str, str] = {
     "did_not_stop": "before, it did not obey the stop for {lasted_s:.0f} s",
     "stop_was_contradicted": "before, the BMU saw current for {lasted_s:.0f} s while the charger said none: one of them "
     "was wrong",
-    "contactor_lost": "{problem}",
     "will_not_start": "the charger was told '{order:word}' for {waited_s:.1f} s and its status does not show it{held:after}",
     "stopped_by_itself": "the charger stopped though it was told to run",
     "stopped_not_full": "the charger stopped though it was told to run, and its mode 5 is not taken for full: the "
@@ -77,27 +75,21 @@ TEXTS: Mapping[str, str] = {
     "flowed: a cell or a contact has given way",
     "back_feed": "the BMU reports a discharge of {discharge_a:.2f} A while the charger runs",
     # the battery
-    "bmu_problem": "{problem}",
     "bmu_silent": "the BMU (node 0x{node_id:02X}) has stopped answering",
     "heartbeat_lost": "no heartbeat of the BMU for {age_s:.1f} s",
     "stale_reading": "no fresh {missing:word} from the BMU",
-    "sdo_refused": "{problem}",
-    "sdo_aborted": "{problem}",
     "not_operational": "the BMU's NMT state is {nmt_state:word}, not operational: it sends no TPDOs, and does not obey "
     "an NMT start",
     "bmu_rebooted": "the BMU has booted while charging: it must be qualified anew",
     "status_trip": "the BMU reports {bits:word} (status word 0x{status:04X})",
     "status_limit": "the BMU reports {bits:word} (status word 0x{status:04X})",
-    "emergency": "{emergency}",
     "hot_trip": "the pack has {pack_c:.1f} °C, at or above {limit_c:g} °C{at}",
     "over_temperature": "the pack has {pack_c:.1f} °C, the limit is {limit_c:g} °C{at}; it charges again below "
     "{again_c:g} °C",
     "under_temperature": "the pack has {pack_c:.1f} °C, the limit is {limit_c:g} °C{at}; it charges again at "
     "{again_c:g} °C",
     "runaway": "the pack warms by {rate_k_per_min:.2f} K/min, more than {limit_k_per_min:g} K/min",
-    "temperature_implausible": "{problem}",
     "temperature_jump": "the pack's temperature went from {before_c:.1f} to {pack_c:.1f} °C in {passed_s:.2f} s",
-    "implausible": "{problems:then}",
     "under_voltage": "the pack has {pack_v:.2f} V, below {limit_v:g} V{at}",
     "needs_precharge": "the BMU reports low voltage and the policy has no precharge",
     "soh_low": "SOH {soh_pct:.0f} %, below {limit_pct:g} %{at}",
@@ -118,9 +110,6 @@ TEXTS: Mapping[str, str] = {
     "below_lowest_step": "{rule}; the lowest step of this charger is {lowest_a:g} A",
     "precharge_too_strong": "the pack has {pack_v:.2f} V and needs precharge with at most {max_a:g} A{at}; the lowest step "
     "of this charger is {lowest_a:g} A",
-    # who else is on the bus
-    "other_master": "{seen}",
-    "heartbeat_set": "{seen}",
     # the charge
     "precharge_no_rise": "the pack rose by {rise_v:.2f} V in {lasted_min:.1f} min, {expected_v:g} V were expected{at}",
     "precharge_too_long": "continuous precharge has taken {lasted_min:.1f} min and the pack is below {below_v:g} V{at}",
@@ -131,7 +120,6 @@ TEXTS: Mapping[str, str] = {
     "late": "this bay was looked at {late_s:.2f} s late",
     "overrun": "nobody looked at this bay for {late_s:.1f} s: the machine stood still",
     "suspended": "the machine was suspended for {slept_s:.0f} s: nothing that is known of this bay holds any more",
-    "unkept": "{problem}",
     "internal": "{whats}",
     "internal_error": "{error}",
     "not_judged": "{fault} cannot be judged: {error}",

@@ -48,6 +48,7 @@ FRAMES: Mapping[str, str] = {
     "trip": "{do} – {what}",
     "strikes": "{do}; it came {strikes} times within an hour: reset by a person",
     "unknown": "{id} ({params})",
+    "where": "{where}: {what}",
     "list": ", ",
     "and": " and ",
     "then": "; ",

@@ -68,7 +68,6 @@ TEXTS: Mapping[str, str] = {
     "full_by_all": "{whats:and}",
     "rises": "더 높은 단계가 허용되어 {hold_s:g} s 후에 적용됩니다{at}",
     "charges_by_itself": "충전기가 스스로 충전합니다(자동 모드)",
-    "limit": "{text}",
     "precharge_step": "프리차지는 항상 가장 낮은 단계로 합니다",
     # before a charge
     "checking": "충전 전에 충전기와 배터리를 확인하고 있습니다",
@@ -119,7 +118,7 @@ TEXTS: Mapping[str, str] = {
     "bay_moved_port": "{bay}은(는) 지난 실행 때 {old_port}에 있었고 지금은 {port}에 있습니다: 배선을 확인하십시오",
     "bay_moved_bmu": "{bay}의 BMU는 지난 실행 때 {old_can}의 노드 0x{old_node_id:02X}였고 지금은 {can}의 노드 0x{node_id:02X}입니다: "
     "배선을 확인하십시오",
-    "state_unreadable": "{file}을(를) 읽을 수 없습니다({error}): 어떤 장애가 래치되어 있었는지 알 수 없습니다",
+    "state_unreadable": "{file}을(를) 읽을 수 없습니다({error:word}): 어떤 장애가 래치되어 있었는지 알 수 없습니다",
     "state_lost": "이 서비스가 여기서 실행된 적이 있는데 {file}이(가) 없습니다: 어떤 장애가 래치되어 있었는지 알 수 없습니다",
     "state_disk_silent": "{directory}의 디스크가 응답하지 않습니다: 어떤 장애가 래치되어 있었는지 알 수 없습니다",
 }

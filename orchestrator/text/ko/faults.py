@@ -9,7 +9,7 @@ TEXTS: Mapping[str, str] = {
     "polarity_contradicts": "충전기의 보고가 서로 모순됩니다: 모드 6(배터리 역결선)과 연결 상태 1(정상)",
     "error_stop": "충전기가 모드 8(에러 정지)을 보고합니다: 충전기 자체 에러로 정지했습니다",
     "system_stop": "충전기가 모드 7(시스템 정지)을 보고합니다: 명령 없이 스스로 정지했습니다",
-    "illegal_value": "충전기가 규격에 없는 값을 보고합니다: {values}",
+    "illegal_value": "충전기가 규격에 없는 값을 보고합니다: {values:word}",
     "mode_taken_over": "충전기는 {shown:word} 모드이고 스테이션 파일에는 {configured:word} 모드로 되어 있습니다: 로터리 "
     "스위치를 확인하십시오",
     "rejected_frame": "충전기가 에러 프레임(0x1F)으로 응답했습니다: 수신한 내용의 {wrong:and} 오류",
@@ -17,7 +17,6 @@ TEXTS: Mapping[str, str] = {
     "port_locked": "다른 프로그램이 {port}을(를) 점유하고 있습니다: {program}. 그래도 충전기 정지는 수행합니다",
     "noisy_line": "지난 1분간 충전기와의 통신 중 {bad_pct:.0f} %가 실패했습니다(기준 {limit_pct:g} %)",
     # whether it obeys
-    "charger_problem": "{problem}",
     "charger_silent": "{port}의 충전기가 상태 요청 {misses}회에 응답하지 않았습니다",
     "charger_stale": "{port}의 충전기가 {limit_s:g} s 동안 상태를 회신하지 않았습니다",
     "found_running": "기동 명령이 없었는데 충전기가 동작 중이었습니다",
@@ -32,7 +31,6 @@ TEXTS: Mapping[str, str] = {
     "did_not_stop": "앞서 {lasted_s:.0f} s 동안 정지 명령에 따르지 않았습니다",
     "stop_was_contradicted": "앞서 {lasted_s:.0f} s 동안 BMU에는 전류가 보이고 충전기는 전류가 없다고 했습니다: 둘 중 하나가 "
     "틀렸습니다",
-    "contactor_lost": "{problem}",
     "will_not_start": "충전기에 '{order:word}' 명령을 {waited_s:.1f} s 동안 보냈으나 상태에 나타나지 않습니다{held:after}",
     "stopped_by_itself": "기동을 명령했는데 충전기가 정지했습니다",
     "stopped_not_full": "기동을 명령했는데 충전기가 정지했습니다. 전류가 줄어들지 않았고 팩이 종료 전압에 도달하지 "
@@ -74,26 +72,20 @@ TEXTS: Mapping[str, str] = {
     "떨어졌습니다: 셀 또는 접점에 이상이 있습니다",
     "back_feed": "충전기가 동작하는 동안 BMU가 {discharge_a:.2f} A의 방전을 보고합니다",
     # the battery
-    "bmu_problem": "{problem}",
     "bmu_silent": "BMU(노드 0x{node_id:02X})가 더 이상 응답하지 않습니다",
     "heartbeat_lost": "BMU의 heartbeat가 {age_s:.1f} s 동안 없습니다",
     "stale_reading": "BMU의 최신 값이 없습니다: {missing:word}",
-    "sdo_refused": "{problem}",
-    "sdo_aborted": "{problem}",
     "not_operational": "BMU의 NMT 상태가 operational이 아닌 {nmt_state:word}입니다: TPDO를 보내지 않고 NMT start에도 따르지 "
     "않습니다",
     "bmu_rebooted": "충전 중에 BMU가 리부팅되었습니다: 처음부터 다시 확인해야 합니다",
     "status_trip": "BMU가 {bits:word}을(를) 보고합니다(상태 워드 0x{status:04X})",
     "status_limit": "BMU가 {bits:word}을(를) 보고합니다(상태 워드 0x{status:04X})",
-    "emergency": "{emergency}",
     "hot_trip": "팩 온도가 {pack_c:.1f} °C로 {limit_c:g} °C 이상입니다{at}",
     "over_temperature": "팩 온도가 {pack_c:.1f} °C이고 상한은 {limit_c:g} °C입니다{at}. {again_c:g} °C 아래에서 다시 "
     "충전합니다",
     "under_temperature": "팩 온도가 {pack_c:.1f} °C이고 하한은 {limit_c:g} °C입니다{at}. {again_c:g} °C부터 다시 충전합니다",
     "runaway": "팩 온도가 분당 {rate_k_per_min:.2f} K씩 올라갑니다(한계 {limit_k_per_min:g} K/min)",
-    "temperature_implausible": "{problem}",
     "temperature_jump": "팩 온도가 {passed_s:.2f} s 사이에 {before_c:.1f} °C에서 {pack_c:.1f} °C로 변했습니다",
-    "implausible": "{problems:then}",
     "under_voltage": "팩 전압이 {pack_v:.2f} V로 {limit_v:g} V보다 낮습니다{at}",
     "needs_precharge": "BMU가 저전압을 보고하지만 정책에 프리차지 항목이 없습니다",
     "soh_low": "SOH가 {soh_pct:.0f} %로 {limit_pct:g} %보다 낮습니다{at}",
@@ -112,9 +104,6 @@ TEXTS: Mapping[str, str] = {
     "below_lowest_step": "{rule}. 이 충전기의 가장 낮은 단계는 {lowest_a:g} A입니다",
     "precharge_too_strong": "팩 전압이 {pack_v:.2f} V이므로 {max_a:g} A 이하의 프리차지가 필요합니다{at}. 이 충전기의 가장 "
     "낮은 단계는 {lowest_a:g} A입니다",
-    # who else is on the bus
-    "other_master": "{seen}",
-    "heartbeat_set": "{seen}",
     # the charge
     "precharge_no_rise": "팩 전압이 {lasted_min:.1f}분 동안 {rise_v:.2f} V 올랐습니다. {expected_v:g} V가 올라야 합니다{at}",
     "precharge_too_long": "연속 프리차지가 {lasted_min:.1f}분 걸렸는데 팩 전압이 아직 {below_v:g} V 아래입니다{at}",
@@ -125,7 +114,6 @@ TEXTS: Mapping[str, str] = {
     "late": "이 베이의 점검이 {late_s:.2f} s 늦었습니다",
     "overrun": "이 베이가 {late_s:.1f} s 동안 점검되지 않았습니다: 컴퓨터가 멈추어 있었습니다",
     "suspended": "컴퓨터가 {slept_s:.0f} s 동안 절전 상태였습니다: 이 베이에 대해 알던 것은 더 이상 유효하지 않습니다",
-    "unkept": "{problem}",
     "internal": "{whats}",
     "internal_error": "{error}",
     "not_judged": "{fault} 장애를 판정할 수 없습니다: {error}",

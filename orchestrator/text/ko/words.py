@@ -48,6 +48,7 @@ FRAMES: Mapping[str, str] = {
     "trip": "{do} – {what}",
     "strikes": "{do}. 1시간 안에 {strikes}회 발생했으므로 사람이 리셋해야 합니다",
     "unknown": "{id} ({params})",
+    "where": "{where}: {what}",
     "list": ", ",
     "and": ", ",
     "then": ". ",

@@ -10,6 +10,7 @@ from orchestrator.core.cells import chemistry
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.model import BatteryLink, BatteryReading, BatteryStatus, Measurement
+from orchestrator.model.cause import said
 
 #: A value that was asked for right before the step, and one that is far too old.
 FRESH_S, OLD_S = 0.05, 30.0
@@ -207,24 +208,26 @@ def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
         "tapers": replace(base, takes=0.01, values={**base.values, **_with(rules, "voltage_v", rules.max_v - 0.1)}),
         "of another kind": replace(base, values={**base.values, "voltage_v": pack.voltage_v.low, "soc_pct": 50.0}),
         **{name: replace(base, values={**base.values, **value}) for name, value in _beyond(rules.bay.limits).items()},
-        "absent": replace(base, connected=False, link=_fixed(online=False, speaks=False, problem="no answer")),
-        "silent": replace(base, link=_fixed(online=False, speaks=False, problem="no answer")),
-        "not trusted": replace(base, link=_fixed(online=False, problem="answered twice")),
+        "absent": replace(base, connected=False, link=_fixed(online=False, speaks=False, problem=said("no answer"))),
+        "silent": replace(base, link=_fixed(online=False, speaks=False, problem=said("no answer"))),
+        "not trusted": replace(base, link=_fixed(online=False, problem=said("answered twice"))),
         "old fast values": replace(base, old=FAST),
         "old temperature": replace(base, old=frozenset({"temperature_c"})),
         "old slow values": replace(base, old=SLOW),
         "booted": replace(base, link=_booted),
         "no heartbeat": replace(base, link=_heartbeat_lost),
-        "refuses a read": replace(base, link=_fixed(abort="0x6004 refused", abort_code=0x06020000)),
-        "cannot answer now": replace(base, link=_fixed(abort="0x6004 not now", abort_code=0x08000022)),
-        "implausible SOC": replace(base, link=_fixed(implausible={"soc_pct": "SOC 140 %"})),
-        "implausible temperature": replace(base, link=_fixed(implausible={"temperature_c": "−40.0 °C"})),
+        "refuses a read": replace(base, link=_fixed(abort=said("0x6004 refused"), abort_code=0x06020000)),
+        "cannot answer now": replace(base, link=_fixed(abort=said("0x6004 not now"), abort_code=0x08000022)),
+        "implausible SOC": replace(base, link=_fixed(implausible={"soc_pct": said("SOC 140 %")})),
+        "implausible temperature": replace(base, link=_fixed(implausible={"temperature_c": said("−40.0 °C")})),
         "status bit that trips": replace(base, values=status),
         "status bit that limits": replace(base, values=limit),
-        "emergency": replace(base, link=_fixed(emergency="EMCY 0x5000")),
+        "emergency": replace(base, link=_fixed(emergency=said("EMCY 0x5000"))),
         "measured differently": replace(base, takes=1.0, differs_v=WITHIN_V, differs_a=WITHIN_A),
         "another voltage than the charger's": replace(base, differs_v=5.0),
         "another current than the charger's": replace(base, differs_a=5.0),
         "discharges": replace(base, differs_a=-20.0),
-        "read by another master": replace(base, link=lambda now_s, _: {"other_master": "a", "other_master_t_s": now_s}),
+        "read by another master": replace(
+            base, link=lambda now_s, _: {"other_master": said("a"), "other_master_t_s": now_s}
+        ),
     }

@@ -14,6 +14,7 @@ from orchestrator.core.rules import Rules
 from orchestrator.core.states import AT_WORK, ENERGISED
 from orchestrator.model import (
     Action,
+    Cause,
     ChargeMode,
     ChargerLink,
     ChargerReading,
@@ -27,6 +28,7 @@ from orchestrator.model import (
     Snapshot,
     State,
 )
+from orchestrator.model.cause import said
 from orchestrator.workbench.prove.batteries import Shown, batteries
 from orchestrator.workbench.prove.story import TICK_S, Move
 
@@ -75,9 +77,12 @@ def _both(*parts: Charger) -> Charger:
     return change
 
 
+NOT_OPENED = said("not opened yet")
+
+
 def _never(said: Said, _: float) -> None:
     said.silent = True
-    said.link.update(online=False, misses=0, stop_sent_s=None, sent=None, problem="not opened yet")
+    said.link.update(online=False, misses=0, stop_sent_s=None, sent=None, problem=NOT_OPENED)
 
 
 def _ran_by_itself(said: Said, _: float) -> None:
@@ -97,8 +102,10 @@ CHARGERS: Mapping[str, Charger] = {
     "stands by, no stop written yet": _both(_STANDBY, _link(stop_sent_s=None, sent=None)),
     "runs, whatever it is told": _ran_by_itself,
     "delivers, though it says stopped": _reading(operation=Operation.STOPPED, current_a=2.0),
-    "stands by and was set up anew": _both(_STANDBY, _link(taken_over="9600 baud", taken_over_t_s=lambda now_s: now_s)),
-    "shares its port": _link(locked_by="gpsd (pid 812)"),
+    "stands by and was set up anew": _both(
+        _STANDBY, _link(taken_over=said("9600 baud"), taken_over_t_s=lambda now_s: now_s)
+    ),
+    "shares its port": _link(locked_by=said("gpsd (pid 812)")),
     "runs without current": _both(_ran_by_itself, _reading(current_a=0.0)),
     "searches": _reading(charge_mode=ChargeMode.BATTERY_SEARCH, current_a=0.0),
     "recovers": _reading(charge_mode=ChargeMode.BATTERY_RECOVERY, current_a=0.0),
@@ -106,15 +113,15 @@ CHARGERS: Mapping[str, Charger] = {
     "stopped by an error": _both(_STANDBY, _reading(charge_mode=ChargeMode.ERROR_STOP)),
     "stopped by its system": _both(_STANDBY, _reading(charge_mode=ChargeMode.SYSTEM_STOP)),
     "reversed": _both(_STANDBY, _reading(charge_mode=ChargeMode.REVERSED, connection=Connection.REVERSED)),
-    "undocumented mode": _reading(charge_mode=None, illegal=("charge mode 9 (documented: 1 … 8)",)),
-    "undocumented operation": _reading(operation=None, illegal=("operation 2 (documented: 0, 1)",)),
+    "undocumented mode": _reading(charge_mode=None, illegal=(said("charge mode 9"),)),
+    "undocumented operation": _reading(operation=None, illegal=(said("operation 2"),)),
     "in the other control mode": _switched,
     "too much current": _both(_ran_by_itself, _reading(current_a=40.0)),
     "complains of commands": _link(error_bits=2, error_t_s=lambda now_s: now_s - READ_AGE_S),
     "complains of checksums": _link(error_bits=8, error_t_s=lambda now_s: now_s - READ_AGE_S),
-    "silent": _both(_reading(age_s=OLD_S), _link(online=False, misses=9, problem="no answer")),
-    "just fell silent": _both(_reading(age_s=0.9), _link(online=False, misses=3, problem="no answer")),
-    "port gone": _both(_reading(age_s=OLD_S), _link(online=False, misses=9, problem="gone", stop_sent_s=None)),
+    "silent": _both(_reading(age_s=OLD_S), _link(online=False, misses=9, problem=said("no answer"))),
+    "just fell silent": _both(_reading(age_s=0.9), _link(online=False, misses=3, problem=said("no answer"))),
+    "port gone": _both(_reading(age_s=OLD_S), _link(online=False, misses=9, problem=said("gone"), stop_sent_s=None)),
     "never heard": _never,
 }  # fmt: skip
 
@@ -145,7 +152,7 @@ class StationInputs:
                     if charger in self.chargers and battery in self.batteries:
                         yield Move(TICK_S, charger, battery, request)
         yield Move(TICK_S, "obeys", "healthy", internal="seen by the checker")
-        yield Move(TICK_S, "obeys", "healthy", ending="the service ends: SIGTERM")
+        yield Move(TICK_S, "obeys", "healthy", ending=Cause.of("signal", name="SIGTERM"))
         for charger in ("obeys", "runs, whatever it is told", "silent"):
             if charger in self.chargers:
                 yield Move(TICK_S, charger, "healthy", restart=True)

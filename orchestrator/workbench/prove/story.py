@@ -5,7 +5,7 @@ from itertools import groupby
 
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
-from orchestrator.model import Action, Decision, Measurement, Request, Snapshot
+from orchestrator.model import Action, Cause, Decision, Measurement, Request, Snapshot
 from orchestrator.text.catalogue import say
 
 #: Where time begins in a story; not 0, so that nobody takes "never" for a time.
@@ -24,7 +24,7 @@ class Move:
     battery: str
     request: Request | None = None
     internal: str = ""
-    ending: str = ""
+    ending: Cause | None = None
     restart: bool = False  #: the service has died, and begins again with what it had written down
 
     @property

@@ -141,7 +141,7 @@ class _Reader:
         rules: Rules | None = None
         bay, at_s, parts = line["bay"], float(line["at_s"]), self._stream.parts
         if line.get("whole"):
-            if "cause" not in line["memory"]:
+            if "cause" not in line["memory"] or isinstance(line["charger_link"]["problem"], str):
                 raise _OlderError
             plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
             memory = _CONVERTER.structure(in_parts(line["memory"]), Memory)

@@ -35,8 +35,8 @@ BUS: tuple[Seed, ...] = (
         ("on the bus, heartbeat",),
         (
             f"{DEVICES}bmu_setup.py",
-            '        if period_ms == round(self._heartbeat_s * 1000):\n            return ""\n',
-            '        if True:\n            return ""\n',
+            "        if period_ms == round(self._heartbeat_s * 1000):\n            return None\n",
+            "        if True:\n            return None\n",
         ),
     ),
     part(

@@ -40,12 +40,12 @@ DISK: tuple[Seed, ...] = (
         ),
         (
             f"{SERVICE}store.py",
-            '        if self._problem:\n            return f"a restart',
-            '        if False:\n            return f"a restart',
+            "        pending_s, problem = self._pending_s, self._blind or self._problem\n",
+            "        pending_s, problem = self._pending_s, self._blind\n",
         ),
         (
             f"{SERVICE}store.py",
-            "        if pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:",
+            "        if problem is None and pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:",
             "        if False:",
         ),
     ),
@@ -63,8 +63,8 @@ DISK: tuple[Seed, ...] = (
         ("tests/service/test_store.py",),
         (
             f"{SERVICE}store.py",
-            '        """Why a restart would forget something; "" while it would not."""\n',
-            '        """Why a restart would forget something; "" while it would not."""\n        return ""\n',
+            '        """Why a restart would forget something; None while it would not."""\n',
+            '        """Why a restart would forget something; None while it would not."""\n        return None\n',
         ),
     ),
     hostile(
@@ -75,7 +75,7 @@ DISK: tuple[Seed, ...] = (
         (
             f"{SERVICE}supervisor.py",
             "        unkept = self._store.close(KEEP_S)\n",
-            '        self._store.close(KEEP_S)\n        unkept = ""\n',
+            "        self._store.close(KEEP_S)\n        unkept = None\n",
         ),
     ),
     scene(

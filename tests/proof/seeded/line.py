@@ -8,7 +8,7 @@ LINES: tuple[Seed, ...] = (
         "line",
         "the controller never sets a port up again that another program has changed",
         ("another speed",),
-        (f"{DEVICES}charger.py", "            return line.restore()\n", '            return ""\n'),
+        (f"{DEVICES}charger.py", "            return line.restore()\n", "            return None\n"),
     ),
     part(
         "settings are not compared each second",
@@ -22,7 +22,7 @@ LINES: tuple[Seed, ...] = (
         "line",
         "a port that was set up again is not reported",
         ("another speed",),
-        (f"{DEVICES}charger.py", "        if taken_over:\n", "        if False:\n"),
+        (f"{DEVICES}charger.py", "        if taken_over is not None:\n", "        if False:\n"),
     ),
     scene(
         "estop leaves the line as it is",

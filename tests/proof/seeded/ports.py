@@ -54,7 +54,7 @@ PORTS: tuple[Seed, ...] = (
         ("restarted in order",),
         (
             f"{SERVICE}supervisor.py",
-            "            bay.end(self._ending, orderly=not self._lost)\n",
+            "            bay.end(why, orderly=self._lost is None)\n",
             "            return 0\n",
         ),
     ),

@@ -38,8 +38,8 @@ WORDS: tuple[Seed, ...] = (
         ("tests/whole/test_operator.py::test_a_stop_that_is_not_obeyed_begins_with_what_to_do",),
         (
             f"{SERVICE}verbs.py",
-            "        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), ",
-            "        unverified, then = dict[str, str](), ",
+            "        unverified = _wait_for_standby(path, looked_at, language, every=arguments.all)\n",
+            "        unverified = {}\n",
         ),
     ),
     hostile(

@@ -1,0 +1,26 @@
+"""What limits the current, with its evidence and the line that says so."""
+
+from collections.abc import Mapping
+
+TEXTS: Mapping[str, str] = {
+    "limit_none": "the highest step, nothing limits it",
+    "limit_fault": "the fault {fault}",
+    "limit_pack": "the pack bears {allowed_a:.1f} A, {place}",
+    "limit_station": "the station's current limit, {place}",
+    "limit_unknown": "{quantity:word} unknown, {place}",
+    "limit_outside": "{value} outside of its table, {place}",
+    "limit_row": "{spans:and} {allows}, {place}",
+    # a quantity with its value, and the row that it is in
+    "value_temperature_c": "temperature {pack_c:.1f} °C",
+    "value_soc_pct": "SOC {soc_pct:.0f} %",
+    "value_soh_pct": "SOH {soh_pct:.0f} %",
+    "value_voltage_v": "pack voltage {pack_v:.2f} V",
+    "span_unknown": "{quantity:word} unknown",
+    "span_in": "{value} in {low:g} … {high:g}",
+    "span_near": "{value} not yet {well:g} beyond {low:g} … {high:g}",
+    "span_kept": "{value} beyond {low:g} … {high:g}, to which it came back too often in this charge:",
+    # what the row allows
+    "allows_nothing": "allows no current",
+    "allows_a": "allows {allowed_a:.1f} A",
+    "allows_c": "allows {allowed_a:.1f} A ({max_c:g} C)",
+}
