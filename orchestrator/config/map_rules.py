@@ -1,18 +1,14 @@
 """What must hold between the keys of one object map."""
 
-import dataclasses
 from itertools import pairwise
 
 from orchestrator.config.names import name_problem
 from orchestrator.config.rules import Problems, Rule
 from orchestrator.config.yaml.scalars import did_you_mean
-from orchestrator.model import BatteryReading
-from orchestrator.protocol.objects import ObjectEntry, Sweep, TpdoEntry
+from orchestrator.protocol.objects import READING_FIELDS, ObjectEntry, Sweep, TpdoEntry
 
 SIZES = (1, 2, 4)  #: bytes that an expedited SDO answer of this BMU can have (CANopen manual §3.2)
 TPDO_BYTES = 8  #: of one CAN frame
-#: The values of a battery reading: all that a map may name.
-READING_FIELDS = tuple(field.name for field in dataclasses.fields(BatteryReading))
 #: Without these no charge can be supervised. Those in FAST stop one, so they are read in every sweep.
 FAST = ("voltage_v", "current_a", "temperature_c", "status")
 REQUIRED = (*FAST, "soc_pct", "soh_pct")
