@@ -123,7 +123,7 @@ def test_who_is_hung_up_on_asks_again_if_that_does_no_harm(tmp_path: Path, verb:
                     connection.recv(100)
                     connection.sendall(b'{"ok": true}\n')
 
-        waiting = Thread(target=serve)
+        waiting = Thread(target=serve, daemon=True)
         waiting.start()
         if goes_on:
             assert ask(path, {"verb": verb})["ok"]
