@@ -26,7 +26,7 @@ COVERING := tests/core tests/guardian tests/interlock tests/protocol tests/link/
 	--deselect=tests/core/test_step.py::test_whatever_comes_it_decides_soberly \
 	--deselect=tests/core/test_step.py::test_whatever_happened_a_person_gets_it_charging_again
 
-cover: .venv/dev.stamp  ## hold the coverage of what decides and what stops: every branch of it, two minutes
+cover: .venv/dev.stamp  ## hold the coverage of what decides and what stops: every branch of it, three minutes
 	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(COVERING) \
 		$(COVERED:%=--cov=orchestrator.%) --cov-report=term-missing --cov-fail-under=100
 

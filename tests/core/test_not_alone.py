@@ -1,4 +1,4 @@
-"""A bay among others: it waits for its turn to begin, and current that it has not ordered is stopped."""
+"""A bay among others: it waits for its turn and for the disk, and current that it has not ordered is stopped."""
 
 import pytest
 
@@ -21,6 +21,18 @@ def test_a_bay_that_is_ready_waits_for_its_turn_and_says_for_whom() -> None:
     assert world.decision.cause == turn
     assert {order.action for order in world.orders if order is not None} == {Action.STOP}
     world.ours["waits"] = None
+    world.charging()
+
+
+def test_nothing_runs_before_it_is_on_disk_that_it_may() -> None:
+    world = World()
+    world.ours["running_kept"] = False
+    world.until(S.QUALIFYING)
+    world.run(30)
+    assert world.is_in(S.QUALIFYING)
+    assert world.decision.cause == Cause("writing_down")
+    assert {order.action for order in world.orders if order is not None} == {Action.STOP}
+    world.ours["running_kept"] = True
     world.charging()
 
 

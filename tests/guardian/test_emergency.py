@@ -258,7 +258,7 @@ def test_a_service_that_drips_costs_neither_the_stop_nor_the_end(tmp_path: Path)
         assert time.monotonic() - began_s < 6.0
         stop_s = bench.wire.counters.first_stop_s
         assert stop_s is not None
-        assert stop_s - began_s < 0.5
+        assert stop_s - began_s < 1.0
         assert asked
         assert (done.returncode, done.stdout) == (0, f"{bench.name}: standby verified\n{DONE}")
         assert done.stderr.startswith("the service has not ")
@@ -343,7 +343,7 @@ sys.exit(main(["--port", *sys.argv[1:]]))
         assert time.monotonic() - began_s < 8.0
         stop_s = bench.wire.counters.first_stop_s
         assert stop_s is not None
-        assert stop_s - began_s < 0.5
+        assert stop_s - began_s < 1.0
         assert done.stdout.splitlines() == [
             f"CUT THE MAINS of {pty.path}: nothing proves that they stand by",
             f"{pty.path}: the port's driver hangs",
