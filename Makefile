@@ -3,7 +3,7 @@
 # for a new .venv; `make clean` removes an old one.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-guest lint check format campaign fuzz mutation soak bench reference lock clean
+.PHONY: help demo test cover test-guest lint check format campaign fuzz mutation soak bench reference lock clean
 
 BIN := .venv/bin
 SETUP := pyproject.toml requirements/install.sh
@@ -17,6 +17,19 @@ demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, abou
 test: .venv/dev.stamp  ## all tests, three files at a time; ARGS='tests/core -k taper' chooses some
 	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
 
+# Measuring makes tests that compute three times as slow, so it is done with the tests of these parts alone, and with as
+# few as reach everything: two of the core's only try much more of the same, and two files start whole stations and
+# time them. The other tests run in `make test`.
+COVERED := core interlock lastresort protocol
+COVERING := tests/core tests/guardian tests/interlock tests/protocol tests/link/test_serial.py \
+	tests/service/test_asking.py --ignore=tests/guardian/test_estop.py --ignore=tests/guardian/test_kills.py \
+	--deselect=tests/core/test_step.py::test_whatever_comes_it_decides_soberly \
+	--deselect=tests/core/test_step.py::test_whatever_happened_a_person_gets_it_charging_again
+
+cover: .venv/dev.stamp  ## hold the coverage of what decides and what stops: every branch of it, three minutes
+	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(COVERING) \
+		$(COVERED:%=--cov=orchestrator.%) --cov-report=term-missing --cov-fail-under=100
+
 test-guest: .venv/dev.stamp  ## the tests that need a kernel with SocketCAN and systemd, in a User Mode Linux
 	$(BIN)/python -m tests.guest $(ARGS)
 
@@ -26,7 +39,7 @@ lint: .venv/dev.stamp  ## format, lint, types and import rules, about half a min
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q tests/test_imports.py
 
-check: lint  ## the same, then all tests with branch coverage
+check: lint cover  ## both, then all tests with the branch coverage of everything
 	$(BIN)/python -m pytest --cov --cov-report=term-missing $(ARGS)
 
 format: .venv/dev.stamp  ## rewrite the files as `make check` wants them

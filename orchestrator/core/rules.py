@@ -100,10 +100,6 @@ class Rules:
         """The cause with this key of the policy, and the line where that stands."""
         return Cause(id_, tuple(params.items()), key, self.policy.source.at(key))
 
-    def by_station(self, id_: str, key: str, /, **params: Any) -> Cause:  # noqa: ANN401 - as those of a cause
-        """The same for a key of the bay in the station file."""
-        return Cause(id_, tuple(params.items()), key, self.bay.source.at(key))
-
     @property
     def hottest_at(self) -> tuple[str, str]:
         """Key and place of what says how warm a pack may be: the policy, or the station if its limit is lower."""

@@ -86,6 +86,8 @@ class LastPort:
             if not listener.poll(left_s * 1000):
                 break
             time.sleep(GATHER_S)
+            if not listener.poll(0):
+                continue  # another process has read it: read() would return nothing, as of a line that is gone
             heard = (heard + self._read(self._fd))[-KEEP:]
             standby = stands_by(heard)
             if standby is not None:
@@ -97,8 +99,6 @@ class LastPort:
             data = os.read(fd, 4096)
             if not data:
                 raise OSError(GONE)
-        except BlockingIOError:
-            return b""  # somebody else has read it
         except OSError as error:
             self._failed(error)
             return b""

@@ -181,6 +181,38 @@ def test_once_in_so_many_days_it_goes_all_the_way() -> None:
     assert world.now_s - world.memory.battery.full_s < 120
 
 
+def interrupted_at(world: World, soc_pct: float) -> None:
+    """A person pauses the charge; the BMU corrects its SOC meanwhile."""
+    world.ask(Request.PAUSE)
+    world.until(S.SUSPENDED)
+    world.values["soc_pct"] = soc_pct
+    world.run(5)
+    world.ask(Request.START)
+    world.run(20)
+
+
+def test_a_pause_does_not_end_a_charge_that_is_due_to_go_all_the_way() -> None:
+    """It has passed the target, and the target does not count today."""
+    world = at_target()
+    world.now_s += 14 * DAY_S
+    world.until(S.CHARGING, 30)
+    world.values["soc_pct"] = 85.0
+    world.run(5)
+    interrupted_at(world, 86.0)
+    assert world.is_in(S.CHARGING), world.decision
+
+
+@pytest.mark.parametrize(("soc_pct", "state"), [(79.0, S.CHARGING), (80.0, S.IDLE)])
+def test_a_charge_that_was_interrupted_goes_on_to_its_target(soc_pct: float, state: State) -> None:
+    """Neither does the threshold for a new charge (75 %) end it, nor does it pass the target to see the pack full."""
+    policy, full = long_life(), replace(POLICY.finish.full, soc_pct=None)
+    world = World(bay(replace(policy, finish=replace(policy.finish, full=full)))).charging()
+    world.values["soc_pct"] = 78.0
+    world.run(5)
+    interrupted_at(world, soc_pct)
+    assert world.is_in(state), world.decision
+
+
 def test_the_days_are_counted_over_a_restart_and_over_a_departure() -> None:
     world = at_target()
     world.now_s += 10 * DAY_S

@@ -281,6 +281,31 @@ def test_a_latch_does_not_leave_with_the_battery() -> None:
     assert world.is_in(State.HELD)
 
 
+def test_strikes_do_not_leave_with_the_battery() -> None:
+    """Its leaving is no strike, but those from before count on."""
+    world = charging()
+
+    def falls_silent() -> None:
+        world.battery_answers = False
+        world.run(5)
+        world.battery_answers = True
+
+    for _ in range(2):
+        falls_silent()
+        world.until(State.CHARGING, 400)
+        world.charging()
+    world.leave()
+    world.until(State.IDLE, 10)
+    world.arrive()
+    world.charging()
+    falls_silent()
+    world.until(State.CHARGING, 400)
+    world.charging()
+    falls_silent()
+    world.until(State.TRIPPED, 30)
+    assert "it came 4 times within an hour" in reason_of(world.decision)
+
+
 # --- what a person may clear ------------------------------------------------------------------------------------------
 
 

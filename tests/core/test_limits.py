@@ -356,6 +356,17 @@ def test_what_is_not_known_is_the_lowest_step() -> None:
     assert (step.index, say(step.rule), raise_s) == (0, f"temperature unknown, {at}", None)
 
 
+def test_a_rule_about_what_is_not_known_holds_and_says_so() -> None:
+    """Nobody knows whether the pack is in there, so it is taken to be."""
+    rule = Where(voltage_v=Range(53, 55.2), temperature_c=Range(0, 45), max_a=0.0)
+    world = World(bay(with_current(where=(rule,)))).charging()
+    assert index(world) == 4, "at 48 V the rule says nothing"
+    world.values["voltage_v"] = None
+    world.run(2)
+    text = world.raised["current_paused"]
+    assert text.startswith("temperature 20.0 °C in 0 … 45 and pack voltage unknown allows no current"), text
+
+
 # --- faults that limit ------------------------------------------------------------------------------------------------
 
 
@@ -417,6 +428,20 @@ def test_a_row_that_comes_back_again_and_again_stays_for_the_rest_of_the_charge(
     world.charging()
     world.run(62)
     assert index(world) == 4, "another charge begins anew"
+
+
+def test_a_row_that_stays_says_that_it_came_back_too_often() -> None:
+    """The value that people see is far from the row, so the sentence says why the row counts all the same."""
+    world = World(bay(policy()), soc_pct=85.0, voltage_v=53.0).charging()
+    there_and_back(world)
+    world.ask(Request.PAUSE)
+    world.until(State.SUSPENDED)
+    world.ask(Request.START)
+    world.charging()
+    assert world.decision.step is not None
+    rule = say(world.decision.step.rule)
+    assert rule.startswith("pack voltage 53.00 V beyond 54 … 55.2, to which it came back too often in this charge")
+    assert "allows 8.0 A" in rule
 
 
 def test_a_pause_may_come_back_as_often_as_it_must() -> None:

@@ -447,6 +447,12 @@ def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
     assert memory.operator.hold == cause("something")
 
 
+def test_such_a_fault_that_was_kept_without_its_cause_is_named() -> None:
+    memory = Persisted(faults={"of_tomorrow": PersistedFault(None, latched=True, raised=1.0)}).memory(100.0)
+    assert memory.faults == {}
+    assert say(memory.hold) == "of_tomorrow"
+
+
 @pytest.mark.parametrize(
     ("name", "latched", "strikes"), [("internal", True, 0), ("system_stop", False, 0), ("implausible", True, 4)]
 )

@@ -1,5 +1,6 @@
-"""Other programs that use a charger's port: each a process of its own, as on a real machine."""
+"""Other programs that use a charger's port: each a process of its own, as on a real machine; and other users."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -34,3 +35,15 @@ def holding(port: str, how: str = "flock", name: str = sys.executable) -> Iterat
 def stty(port: str, *words: str) -> None:
     """As a person would, or a program that opens the port for itself."""
     subprocess.run(["stty", "-F", port, *words], check=True, capture_output=True)
+
+
+@contextmanager
+def somebody_else() -> Iterator[None]:
+    """Root may open anything, so be nobody for a while."""
+    before = os.geteuid()
+    if before == 0:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(before)

@@ -19,7 +19,7 @@ from orchestrator.lastresort import line_settings, port_owner
 from orchestrator.link.serial import BYTE_S, SerialLine
 from tests.core.said import raises, say
 from tests.link.ptys import Pty, plugged
-from tests.link.strangers import holding, stty
+from tests.link.strangers import holding, somebody_else, stty
 from tests.waiting import wait_until
 
 
@@ -271,7 +271,7 @@ def test_a_port_that_is_not_there(tmp_path: Path) -> None:
 def test_a_port_that_the_user_may_not_open(pty: Pty) -> None:
     device = os.path.realpath(pty.path)
     Path(device).chmod(0)
-    with _somebody_else():
+    with somebody_else():
         text = failure(device)
     assert text == f"{device}: permission denied: add the user that runs this to the group dialout, then log in again"
 
@@ -395,17 +395,5 @@ def without_privileges(pty: Pty) -> Iterator[str]:
     """Root may open what is one program's alone, so be somebody else who may use this device."""
     device = os.path.realpath(pty.path)
     Path(device).chmod(0o666)
-    with _somebody_else():
+    with somebody_else():
         yield device
-
-
-@contextmanager
-def _somebody_else() -> Iterator[None]:
-    """Root may open anything, so be nobody for a while."""
-    before = os.geteuid()
-    if before == 0:
-        os.seteuid(65534)
-    try:
-        yield
-    finally:
-        os.seteuid(before)

@@ -1,6 +1,8 @@
 """The other side of the control socket: who asks is answered, refused, or told why not."""
 
+import os
 import socket
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -9,8 +11,9 @@ from threading import Event, Thread
 
 import pytest
 
-from orchestrator.errors import ServiceError
+from orchestrator.errors import NoServiceError, ServiceError
 from orchestrator.lastresort.asking import ask
+from tests.link.strangers import somebody_else
 from tests.service.control_bench import SOON_S, closing_all, connected
 
 
@@ -103,3 +106,43 @@ def test_who_asks_gets_through_when_too_many_wait(tmp_path: Path) -> None:
         serving.start()
         assert ask(path, {})["ok"]
         serving.join()
+
+
+@pytest.mark.parametrize(("verb", "goes_on"), [("status", True), ("stop", True), ("start", False)])
+def test_who_is_hung_up_on_asks_again_if_that_does_no_harm(tmp_path: Path, verb: str, *, goes_on: bool) -> None:
+    path = tmp_path / "control.sock"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        listener.bind(str(path))
+        listener.listen()
+
+        def serve() -> None:
+            listener.accept()[0].close()  # with a request unread, so that the other end is reset
+            if goes_on:
+                connection, _ = listener.accept()
+                with connection:
+                    connection.recv(100)
+                    connection.sendall(b'{"ok": true}\n')
+
+        waiting = Thread(target=serve, daemon=True)
+        waiting.start()
+        if goes_on:
+            assert ask(path, {"verb": verb})["ok"]
+        else:
+            with pytest.raises(ServiceError, match=r"Connection reset by peer|Broken pipe"):
+                ask(path, {"verb": verb})
+        waiting.join()
+
+
+@pytest.mark.parametrize(("seen", "who"), [(True, "its owner, .*,"), (False, "the service's own user")])
+def test_who_may_not_ask_is_told_who_may(*, seen: bool, who: str) -> None:
+    """By name, where the folder lets us look."""
+    open_folder, closed_folder = (0o711, 0o700) if os.geteuid() == 0 else (0o700, 0)
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        path = Path(folder, "control.sock")
+        listener.bind(str(path))
+        listener.listen()
+        path.chmod(0)
+        Path(folder).chmod(open_folder if seen else closed_folder)
+        with somebody_else(), pytest.raises(NoServiceError, match=f"permission denied: only {who} and root may use it"):
+            ask(path, {})
+        Path(folder).chmod(0o700)

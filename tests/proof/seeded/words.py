@@ -64,7 +64,7 @@ WORDS: tuple[Seed, ...] = (
         "a success reads like a failure",
         "words",
         "an estop without a service ends with a complaint",
-        ("tests/guardian/test_estop.py::test_ports_without_a_service",),
+        ("tests/guardian/test_estop_alone.py::test_ports_without_a_service",),
         (f"{LASTRESORT}running_service.py", "        if not _listens(self._named):\n", "        if False:\n"),
     ),
 )
