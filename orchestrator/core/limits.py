@@ -7,7 +7,7 @@ after a hold. Which rows apply, `core/rows.py` follows.
 from collections.abc import Iterator
 
 from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ranges
-from orchestrator.config.policy import Band
+from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
 from orchestrator.core.rows import values
 from orchestrator.core.rules import Bound

@@ -190,7 +190,7 @@ def _plain(record: ChargerReading | BatteryLink | Measurement | None) -> dict[st
     }
 
 
-def _record(record: Snapshot | Memory | ChargerLink) -> dict[str, object]:
+def _record(record: Snapshot | ChargerLink) -> dict[str, object]:
     """The same for a record with others in it, however deep."""
     return {one.name: _bare(getattr(record, one.name)) for one in fields(record)}
 

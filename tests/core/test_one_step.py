@@ -19,6 +19,7 @@ from orchestrator.core.sequence import RESUME, RUN, next_order
 from orchestrator.core.step import step
 from orchestrator.model import (
     STOP,
+    Cause,
     ChargeMode,
     Command,
     ControlMode,

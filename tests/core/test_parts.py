@@ -24,7 +24,7 @@ from orchestrator.core.memory import (
     in_parts,
     names,
     paths,
-    plain,
+    side_by_side,
     value_of,
     with_values,
 )
@@ -178,7 +178,7 @@ def test_what_has_not_changed_is_the_same_object(state: State) -> None:
 
 def test_values_side_by_side_and_in_their_parts() -> None:
     world: World = IN[State.CHARGING]()
-    values = plain(world.memory)
+    values = side_by_side(world.memory)
     assert set(values) == set(names())
     assert in_parts(values)["stage"]["ran"] is values["ran"] is True
     other = with_values(world.memory, ran=False, hold=None, state=State.IDLE)

@@ -450,7 +450,7 @@ def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
 def test_such_a_fault_that_was_kept_without_its_cause_is_named() -> None:
     memory = Persisted(faults={"of_tomorrow": PersistedFault(None, latched=True, raised=1.0)}).memory(100.0)
     assert memory.faults == {}
-    assert say(memory.hold) == "of_tomorrow"
+    assert say(memory.operator.hold) == "of_tomorrow"
 
 
 @pytest.mark.parametrize(
