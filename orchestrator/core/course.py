@@ -6,7 +6,6 @@ the charger be trusted to stand by, does something keep us from charging, does t
 
 from dataclasses import replace
 
-from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import finished, full_due, goes_full, goes_on, target
@@ -168,12 +167,12 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, Cause]:
     worst = faults[0] if faults else None
     lost = not f.charger.online or f.reading is None
     if worst is not None and worst.effect is Effect.TRIP and (memory.state is State.TRIPPED or not lost):
-        return Trigger.TRIP, _then(worst.cause, latches.goes_on(f))
+        return Trigger.TRIP, worst.told
     if lost:  # a trip promises a stop that was verified: first the line
         return Trigger.LOSE, _offline(f)
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
-    if waits is not None:  # its advice ends with the start
-        return Trigger.HOLD, waits.cause.with_(how=_start(f))
+    if waits is not None:
+        return Trigger.HOLD, waits.told
     if memory.hold is not None:
         return Trigger.HOLD, _held(f, memory.hold)
     ending = _ending(f)
@@ -190,12 +189,8 @@ def _resting_place(f: Facts, faults: Faults) -> tuple[Trigger, Cause]:
     if f.soc is not None and not wanted:
         return Trigger.REST, why
     if worst is not None and worst.effect >= Effect.NO_START:
-        return Trigger.SUSPEND, _then(worst.cause, latches.goes_on(f))
+        return Trigger.SUSPEND, worst.told
     return (Trigger.QUALIFY if wanted else Trigger.REST), why
-
-
-def _then(cause: Cause, then: Cause | None) -> Cause:
-    return cause.with_(then=then) if then is not None else cause
 
 
 def _held(f: Facts, hold: Cause) -> Cause:

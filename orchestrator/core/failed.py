@@ -4,8 +4,8 @@ Nothing is judged here but the plainest words of the charger. The memory knows s
 that the next step, if it does not raise, goes on from there.
 """
 
+from orchestrator.core.active import active_faults
 from orchestrator.core.contactor import closes
-from orchestrator.core.latches import shown
 from orchestrator.core.machine import UNVERIFIED
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.operator import STOPPED
@@ -15,8 +15,8 @@ from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, 
 FAULT = "internal"
 
 
-def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tuple[Decision, Memory]:
-    """The decision and the memory after an exception, whose words are `error`."""
+def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str, bay: str = "BAY") -> tuple[Decision, Memory]:
+    """The decision and the memory after an exception, whose words are `error`; `bay` is the name for commands."""
     memory = memory.copy()
     memory.last_s = now_s
     if memory.state not in UNVERIFIED or memory.stopping_s is None:
@@ -26,7 +26,7 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     known = memory.faults.get(FAULT)
     since_s = known.raised_s if known is not None and known.raised_s is not None else now_s
     what = Cause.of("internal_error", error=error)
-    memory.faults[FAULT] = FaultMemory(present=True, raised_s=since_s, cause=what, latched=True)
+    memory.faults[FAULT] = FaultMemory(present=True, raised_s=since_s, cause=what, latched=True, now=what)
     if snapshot.request is Request.STOP:
         memory.hold = STOPPED
     tried_s = now_s - memory.stopping_s
@@ -41,7 +41,7 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     answer = Cause.of("failed_request", error=error) if refused else None
     level = Alarm.DANGER if out else Alarm.NONE
     decision = Decision(
-        memory.state, memory.cause, STOP, faults=shown(memory.faults, now_s), alarm=level, closed=memory.closed,
+        memory.state, memory.cause, STOP, faults=active_faults(memory, now_s, bay), alarm=level, closed=memory.closed,
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory

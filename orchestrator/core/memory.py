@@ -19,6 +19,8 @@ class FaultMemory:
     cause: Cause | None = None  #: what was seen when it was raised
     latched: bool = False  #: a person must reset it
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
+    now: Cause | None = None  #: what was seen at the last look; None: it was not there
+    worst: float | None = None  #: the worst value of its one figure since it was raised, if it has one
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,9 @@ the bay does, or waits for; a stop alone is always accepted.
 from collections.abc import Callable
 
 from orchestrator.core import latches
+from orchestrator.core.active import evidence, times
+from orchestrator.core.acts import MAX_RESETS, RESETS_S, refused_for, refusing
+from orchestrator.core.faults import ROW
 from orchestrator.core.memory import Memory
 from orchestrator.core.safestop import LASTS_S
 from orchestrator.model import ENERGISED, Cause, Request, State
@@ -15,8 +18,6 @@ from orchestrator.model.cause import together
 #: A charge has been started already.
 AT_WORK = ENERGISED | {State.QUALIFYING}
 STOPPED = Cause("operator_stop")
-#: So many resets of one fault are allowed within this time.
-MAX_RESETS, RESETS_S = 3, 3600.0
 RESET = Cause("operator_reset")
 #: The holds that are an operator's own doing.
 OWN = frozenset({STOPPED, RESET})
@@ -29,7 +30,7 @@ def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Ca
     What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
     """
     if unkept and request in (Request.START, Request.RESET):
-        return Cause.of("not_done", problem=unkept)
+        return Cause.of("not_done", advice="unkept", problem=unkept)
     return VERBS[request](memory, now_s)
 
 
@@ -52,9 +53,9 @@ def _start(memory: Memory, now_s: float) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
         return OUT_OF_CONTROL
     before = memory.faults
-    memory.faults, refusals = latches.release(before, now_s, by_reset=False)
-    if refusals:
+    if refusals := _refusals(memory, now_s, Request.START):
         return together(refusals)
+    memory.faults, _ = latches.release(before, now_s, by_reset=False)
     if not (memory.hold or memory.paused) and len(memory.faults) == len(before) and memory.state not in AT_WORK:
         return Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause)
     memory.hold, memory.paused = None, False
@@ -65,26 +66,30 @@ def _reset(memory: Memory, now_s: float) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
         return OUT_OF_CONTROL
     before = memory.faults
-    faults, refusals = latches.release(before, now_s, by_reset=True)
-    cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
-    resets = tuple(reset for reset in memory.resets if now_s - reset[0] < RESETS_S)
-    refusals = refusals or [cause for name in cleared if (cause := _too_often(name, resets, now_s))]
-    if refusals:
+    if refusals := _refusals(memory, now_s, Request.RESET):
         return together(refusals)
+    faults, _ = latches.release(before, now_s, by_reset=True)
     if len(faults) == len(before):
         return Cause.of("nothing_to_reset", state=memory.state.value, what=memory.cause)
+    resets = tuple(reset for reset in memory.resets if now_s - reset[0] < RESETS_S)
+    cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
     memory.faults, memory.resets = faults, resets + tuple((now_s, name) for name in cleared)
     memory.hold = RESET  # in whatever state: the way on is a start, also while the stop is verified
     return None
 
 
-def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> Cause | None:
-    """FAULTS P6: what comes again after every reset is not mended by resetting it."""
-    times = [t_s for t_s, fault in resets if fault == name]
-    if len(times) < MAX_RESETS:
-        return None
-    wait_min = (times[-MAX_RESETS] + RESETS_S - now_s) / 60
-    return Cause.of("reset_too_often", fault=name, times=len(times), wait_min=wait_min)
+def _refusals(memory: Memory, now_s: float, request: Request) -> list[Cause]:
+    """Why it cannot be done now, and until when: of each fault that stands in the way, and what to do about it."""
+    return [
+        Cause.of("refused", fault=name, why=why, what=_what(memory, now_s, name))
+        for name in refusing(memory, now_s, request)
+        if (why := refused_for(memory, now_s, name, request)) is not None
+    ]
+
+
+def _what(memory: Memory, now_s: float, name: str) -> Cause:
+    row, fault = ROW[name], memory.faults[name]
+    return evidence(row, fault).with_(**dict(times(row, fault, now_s)))
 
 
 VERBS: dict[Request, Callable[[Memory, float], Cause | None]] = {

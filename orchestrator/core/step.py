@@ -6,6 +6,7 @@ facts → what has lasted → the operator's request → faults → the trigger,
 from dataclasses import replace
 
 from orchestrator.core import latches, limits
+from orchestrator.core.active import active_faults
 from orchestrator.core.alarm import alarm
 from orchestrator.core.contactor import closes
 from orchestrator.core.course import course
@@ -64,7 +65,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     follow(f, last_s)
     answer = hear(memory, snapshot.request, now_s, snapshot.unkept) if snapshot.request is not None else None
     memory.faults = latches.update(f)
-    faults = latches.shown(memory.faults, now_s, at_rest=stands_by(f))
+    faults = active_faults(memory, now_s, rules.bay.name, f, at_rest=stands_by(f))
     ended = _move(f, faults)
     setpoint, chosen = _setpoint(f, faults)
     memory.closed = closes(memory.state, closed=memory.closed, standby=f.standby)

@@ -21,6 +21,7 @@ from orchestrator.model import (
     Step,
 )
 from orchestrator.model.cause import plain
+from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import say
 
 Line = tuple[str, dict[str, object]]  #: kind, fields
@@ -38,17 +39,26 @@ OURS = (
 WHOLE_EVERY = 250
 
 
-def decision_lines(before: Decision | None, now: Decision, language: str = "en") -> Iterator[Line]:
-    """What has changed from one decision to the next, for programs and, in `language`, for people."""
-    cause = {"reason": say(now.cause, language), "cause": plain(now.cause)}
+def decision_lines(
+    before: Decision | None, now: Decision, language: str = "en", clock: WallClock | None = None
+) -> Iterator[Line]:
+    """What has changed from one decision to the next, for programs and, in `language`, for people.
+
+    A line has its own time, on both clocks: only sentences need the time of day (`clock`).
+    """
+
+    def why() -> dict[str, object]:
+        told = clock.told(now.cause) if clock is not None else now.cause
+        return {"reason": say(told, language), "cause": plain(now.cause)}
+
     if before is None or now.state is not before.state:
-        yield "transition", {"from": before.state if before else None, "to": now.state, **cause}
+        yield "transition", {"from": before.state if before else None, "to": now.state, **why()}
     if before is None or now.command != before.command:
         yield "command", command_fields(now.command)
     yield from _fault_lines(before, now, language)
     yield from _session_lines(before, now, language)
     if before is None or _gist(now) != _gist(before):
-        yield "decision", {"state": now.state, **cause, "step": _step_fields(now.step, language)}
+        yield "decision", {"state": now.state, **why(), "step": _step_fields(now.step, language)}
 
 
 def command_fields(command: Command | None) -> dict[str, object]:
