@@ -13,7 +13,7 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear, Row
 from orchestrator.core.latches import effect, raised
 from orchestrator.core.memory import FaultMemory, Memory
-from orchestrator.model import ActiveFault, Cause
+from orchestrator.model import ActiveFault, Cause, State
 
 #: What is known now of the quantities that stand in evidence, by the names of its parameters.
 LIVE: Mapping[str, Callable[[Facts], float | None]] = {
@@ -35,9 +35,7 @@ def active_faults(
 
     `at_rest`: the charger stands by, verified.
     """
-    return tuple(
-        _active(memory, now_s, bay, name, f, at_rest=at_rest) for name, _ in raised(memory.faults)
-    )  # fmt: skip
+    return tuple(_active(memory, now_s, bay, name, f, at_rest=at_rest) for name, _ in raised(memory.faults))
 
 
 def evidence(row: Row, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
@@ -54,7 +52,7 @@ def evidence(row: Row, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
     return (seen or Cause(row.id)).with_(advice, **more)
 
 
-def times(row: Row, fault: FaultMemory, now_s: float, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:
+def times(row: Row, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:
     """Since when it is, or when it was; and its figures then and now."""
     names, raised_s = row.figures.split(), fault.raised_s
     then = figures(fault.cause, names)
@@ -91,11 +89,12 @@ def _worse(fault: FaultMemory, then: list[tuple[str, float]]) -> Cause | None:
 def _active(memory: Memory, now_s: float, bay: str, name: str, f: Facts | None, *, at_rest: bool) -> ActiveFault:
     row, fault = ROW[name], memory.faults[name]
     return ActiveFault(
-        name,
-        effect(name, fault),
-        evidence(row, fault, at_rest=at_rest),
-        fault.raised_s or 0.0,
-        fault.clean_s,
-        act(memory, now_s, bay, name),
-        times(row, fault, now_s, f),
+        id=name,
+        effect=effect(name, fault),
+        cause=evidence(row, fault, at_rest=at_rest),
+        since_s=fault.raised_s or 0.0,
+        gone_s=fault.clean_s,
+        next=act(memory, now_s, bay, name, out=memory.state is State.UNCONTROLLABLE and not at_rest),
+        when=times(row, fault, f),
+        raised=fault.cause,
     )

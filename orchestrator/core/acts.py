@@ -24,12 +24,12 @@ UNKEPT = "unkept"
 DONE = frozenset({State.IDLE, State.HELD, State.FULL})
 
 
-def act(memory: Memory, now_s: float, bay: str, name: str) -> Cause:
-    """What ends the fault `name`, which is in force."""
+def act(memory: Memory, now_s: float, bay: str, name: str, *, out: bool = False) -> Cause:
+    """What ends the fault `name`, which is in force. `out`: its charger is out of control."""
     fault = memory.faults[name]
     wait_s = clear_after_s(ROW[name], fault)
     if wait_s is None:
-        return _by_person(memory, now_s, bay, name)
+        return _by_person(memory, now_s, bay, name, out=out)
     return _by_itself(memory, now_s, name, wait_s)
 
 
@@ -76,11 +76,11 @@ def _ends_s(name: str, fault: FaultMemory) -> float | None:
 # --- by a person ------------------------------------------------------------------------------------------------------
 
 
-def _by_person(memory: Memory, now_s: float, bay: str, name: str) -> Cause:
+def _by_person(memory: Memory, now_s: float, bay: str, name: str, *, out: bool) -> Cause:
     fault = memory.faults[name]
     latched = any(other.latched for _, other in raised(memory.faults))
     request = Request.RESET if latched or ROW[name].clear is Clear.RESET else Request.START
-    if memory.state is State.UNCONTROLLABLE:
+    if out:
         return Cause.of("after_standby", request=request.value, lasts_s=LASTS_S)
     if refused := refused_for(memory, now_s, name, request):
         return refused
@@ -112,7 +112,8 @@ def refused_for(memory: Memory, now_s: float, name: str, request: Request) -> Ca
         ends_s = row.until(memory) if row.until is not None else None
         if ends_s is not None:
             return Cause.of("refused_until", request=word, until_t_s=ends_s)
-        return Cause.of("refused_while", request=word, **({"then": locked} if locked else {}))
+        lasts = Cause.of("refused_while", request=word)
+        return lasts if locked is None else lasts.with_(then=locked)
     left_s = row.clean_s - (now_s - fault.clean_s)
     if left_s > 0 and locked is None:
         return Cause.of("refused_for", request=word, gone_t_s=fault.clean_s, left_s=ceil(left_s))

@@ -90,10 +90,10 @@ def _present(row: Row, fault: FaultMemory, seen: Cause, f: Facts, passed_s: floa
 
 def _worst(row: Row, seen: Cause, worst: float | None) -> float | None:
     """The worst value so far of the one figure of the evidence, where it has one."""
-    figures = [seen.param(name) for name in row.figures.split()]
-    known = [value for value in (worst, *figures) if value is not None]
-    if not known or sum(value is not None for value in figures) > 1:
+    figures: list[float] = [value for name in row.figures.split() if (value := seen.param(name)) is not None]
+    if len(figures) != 1:
         return None
+    known = [*figures, *([worst] if worst is not None else [])]
     return min(known) if row.lowest else max(known)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from orchestrator.core import latches
 from orchestrator.core.active import evidence, times
-from orchestrator.core.acts import MAX_RESETS, RESETS_S, refused_for, refusing
+from orchestrator.core.acts import RESETS_S, act, refused_for, refusing
 from orchestrator.core.faults import ROW
 from orchestrator.core.memory import Memory
 from orchestrator.core.safestop import LASTS_S
@@ -24,22 +24,22 @@ OWN = frozenset({STOPPED, RESET})
 OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 
-def hear(memory: Memory, request: Request, now_s: float, unkept: str = "") -> Cause | None:
+def hear(memory: Memory, request: Request, now_s: float, unkept: str = "", bay: str = "BAY") -> Cause | None:
     """Change the memory as the operator asks; None when it was done, else why not.
 
     What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
     """
     if unkept and request in (Request.START, Request.RESET):
         return Cause.of("not_done", advice="unkept", problem=unkept)
-    return VERBS[request](memory, now_s)
+    return VERBS[request](memory, now_s, bay)
 
 
-def _stop(memory: Memory, _now_s: float) -> Cause | None:
+def _stop(memory: Memory, _now_s: float, _bay: str) -> Cause | None:
     memory.hold = STOPPED
     return None
 
 
-def _pause(memory: Memory, _now_s: float) -> Cause | None:
+def _pause(memory: Memory, _now_s: float, _bay: str) -> Cause | None:
     latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
     if latched:  # its reset leads to a start, which would end the pause
         return Cause.of("reset_first", faults=latched)
@@ -49,11 +49,11 @@ def _pause(memory: Memory, _now_s: float) -> Cause | None:
     return None
 
 
-def _start(memory: Memory, now_s: float) -> Cause | None:
+def _start(memory: Memory, now_s: float, bay: str) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
         return OUT_OF_CONTROL
     before = memory.faults
-    if refusals := _refusals(memory, now_s, Request.START):
+    if refusals := _refusals(memory, now_s, bay, Request.START):
         return together(refusals)
     memory.faults, _ = latches.release(before, now_s, by_reset=False)
     if not (memory.hold or memory.paused) and len(memory.faults) == len(before) and memory.state not in AT_WORK:
@@ -62,11 +62,11 @@ def _start(memory: Memory, now_s: float) -> Cause | None:
     return None
 
 
-def _reset(memory: Memory, now_s: float) -> Cause | None:
+def _reset(memory: Memory, now_s: float, bay: str) -> Cause | None:
     if memory.state is State.UNCONTROLLABLE:
         return OUT_OF_CONTROL
     before = memory.faults
-    if refusals := _refusals(memory, now_s, Request.RESET):
+    if refusals := _refusals(memory, now_s, bay, Request.RESET):
         return together(refusals)
     faults, _ = latches.release(before, now_s, by_reset=True)
     if len(faults) == len(before):
@@ -78,21 +78,27 @@ def _reset(memory: Memory, now_s: float) -> Cause | None:
     return None
 
 
-def _refusals(memory: Memory, now_s: float, request: Request) -> list[Cause]:
+def _refusals(memory: Memory, now_s: float, bay: str, request: Request) -> list[Cause]:
     """Why it cannot be done now, and until when: of each fault that stands in the way, and what to do about it."""
     return [
-        Cause.of("refused", fault=name, why=why, what=_what(memory, now_s, name))
+        Cause.of("refused", fault=name, why=why, what=_what(memory, name), then=_instead(memory, now_s, bay, name))
         for name in refusing(memory, now_s, request)
         if (why := refused_for(memory, now_s, name, request)) is not None
     ]
 
 
-def _what(memory: Memory, now_s: float, name: str) -> Cause:
+def _what(memory: Memory, name: str) -> Cause:
     row, fault = ROW[name], memory.faults[name]
-    return evidence(row, fault).with_(**dict(times(row, fault, now_s)))
+    return evidence(row, fault).with_(**dict(times(row, fault)))
 
 
-VERBS: dict[Request, Callable[[Memory, float], Cause | None]] = {
+def _instead(memory: Memory, now_s: float, bay: str, name: str) -> Cause | None:
+    """What ends it, where that is another command than the one that was refused."""
+    following = act(memory, now_s, bay, name)
+    return following if following.param("bay") is not None else None
+
+
+VERBS: dict[Request, Callable[[Memory, float, str], Cause | None]] = {
     Request.START: _start,
     Request.PAUSE: _pause,
     Request.STOP: _stop,

@@ -63,7 +63,9 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
         memory.since_s = now_s
     f = Facts(now_s, snapshot, memory, rules)
     follow(f, last_s)
-    answer = hear(memory, snapshot.request, now_s, snapshot.unkept) if snapshot.request is not None else None
+    answer = None
+    if snapshot.request is not None:
+        answer = hear(memory, snapshot.request, now_s, snapshot.unkept, rules.bay.name)
     memory.faults = latches.update(f)
     faults = active_faults(memory, now_s, rules.bay.name, f, at_rest=stands_by(f))
     ended = _move(f, faults)

@@ -92,12 +92,14 @@ class ActiveFault:
     since_s: float
     gone_s: float | None = None  #: since when what raised it is gone; None: it is there
     next: Cause | None = None  #: what ends it: a command, a time, or what must happen first
+    raised: Cause | None = None  #: the evidence alone, as it was when it was raised
     when: tuple[tuple[str, Any], ...] = ()  #: its times and figures, as parameters of a cause
 
     @property
     def told(self) -> Cause:
         """All that a person reads of it: `cause` with its times and figures, and what ends it."""
-        return self.cause.with_(**dict(self.when), **({"then": self.next} if self.next is not None else {}))
+        then = {"then": self.next} if self.next is not None else {}
+        return self.cause.with_("", **dict(self.when), **then)
 
 
 @dataclass(frozen=True, slots=True)

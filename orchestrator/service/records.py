@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory
@@ -96,8 +96,9 @@ def _fault_lines(before: Decision | None, now: Decision, language: str) -> Itera
         if name not in old or old[name].effect is not fault.effect:
             yield "fault", _fault_fields(fault, "raised", language)
     for name, fault in old.items():
-        if name not in new:
-            yield "fault", _fault_fields(fault, "cleared", language)
+        if name not in new:  # what it was; what was seen of it last, nobody may have written down
+            was = (fault.raised or fault.cause).with_(past=True)
+            yield "fault", _fault_fields(replace(fault, cause=was), "cleared", language)
 
 
 def _session_lines(before: Decision | None, now: Decision, language: str) -> Iterator[Line]:

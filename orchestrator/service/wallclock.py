@@ -52,4 +52,3 @@ class WallClock:
         if isinstance(value, Cause):
             return self.told(value)
         return tuple(map(self._value, value)) if isinstance(value, tuple) else value
-

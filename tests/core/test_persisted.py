@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.config.policy import Policy
+from orchestrator.core.acts import MAX_RESETS
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory
-from orchestrator.core.operator import MAX_RESETS, STOPPED
+from orchestrator.core.operator import STOPPED
 from orchestrator.core.persisted import COUNTERS_S, RUNNING, UNFINISHED, Persisted, PersistedFault, from_first_format
 from orchestrator.model import ENERGISED, STOP, Action, Alarm, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle

@@ -72,7 +72,7 @@ def stop_is_not_heard(patch: Patch) -> None:
 def reset_starts(patch: Patch) -> None:
     def reset(memory: Memory, now_s: float) -> Cause | None:
         memory.hold = None
-        return operator._start(memory, now_s)
+        return operator._start(memory, now_s, "bay-1")
 
     hear = operator.hear
     patch.setattr(

@@ -89,7 +89,7 @@ TEXTS: Mapping[str, str] = {
     "reset_first": "not running: {faults} must be reset first",
     "nothing_to_start": "nothing to start: {state}: {what}",
     "nothing_to_reset": "nothing to reset: {state}: {what}",
-    "refused": "{why}: {fault}: {what}",
+    "refused": "{fault}: {why}: {what}",
     # what ends a fault, or stands in the way
     "needs_reset": "{request:word} is refused before a reset",
     "refused_while": "{request:word} is refused while it lasts",

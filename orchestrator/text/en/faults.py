@@ -30,8 +30,8 @@ TEXTS: Mapping[str, str] = {
     "will_not_stop": "the charger {does|did} not obey the stop, which {is|was} repeated: it still {delivers|delivered} {charger_a:.2f} A",
     "stop_contradicted": "the stop, which {is|was} repeated, {is|was} not seen by both: the BMU still {sees|saw} "
     "{pack_a:.2f} A, the charger {says|said} {charger_a:.2f} A; one of them {is|was} wrong",
-    "did_not_stop": "before, it did not obey the stop for {lasted_s:.0f} s",
-    "stop_was_contradicted": "before, the BMU saw current for {lasted_s:.0f} s while the charger said none: one of them "
+    "did_not_stop": "it did not obey the stop for {lasted_s:.0f} s",
+    "stop_was_contradicted": "the BMU saw current for {lasted_s:.0f} s while the charger said none: one of them "
     "was wrong",
     "contactor_lost": "{problem}",
     "will_not_start": "the charger was told '{order:word}' for {waited_s:.1f} s and its status {does|did} not show it{held:after}",

@@ -28,8 +28,8 @@ TEXTS: Mapping[str, str] = {
     "will_not_stop": "충전기가 반복되는 정지 명령에 따르지 {않습니다|않았습니다}: {아직|그때까지} {charger_a:.2f} A를 {출력합니다|출력했습니다}",
     "stop_contradicted": "반복되는 정지가 한쪽에서만 {확인됩니다|확인되었습니다}: BMU에는 {아직|그때까지} {pack_a:.2f} A가 {보이고|보였고} 충전기는 "
     "{charger_a:.2f} A라고 {보고합니다|보고했습니다}. 둘 중 하나가 틀렸습니다",
-    "did_not_stop": "앞서 {lasted_s:.0f} s 동안 정지 명령에 따르지 않았습니다",
-    "stop_was_contradicted": "앞서 {lasted_s:.0f} s 동안 BMU에는 전류가 보이고 충전기는 전류가 없다고 했습니다: 둘 중 하나가 "
+    "did_not_stop": "{lasted_s:.0f} s 동안 정지 명령에 따르지 않았습니다",
+    "stop_was_contradicted": "{lasted_s:.0f} s 동안 BMU에는 전류가 보이고 충전기는 전류가 없다고 했습니다: 둘 중 하나가 "
     "틀렸습니다",
     "contactor_lost": "{problem}",
     "will_not_start": "충전기에 '{order:word}' 명령을 {waited_s:.1f} s 동안 보냈으나 상태에 나타나지 {않습니다|않았습니다}{held:after}",
