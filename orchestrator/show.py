@@ -1,9 +1,13 @@
 """The status document as text for a terminal: what to do first, then one line a bay, and why."""
 
 import os
+import re
+import shutil
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
+from unicodedata import east_asian_width
 
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
@@ -22,6 +26,10 @@ CUT_THE_MAINS = frozenset({
 RESTING = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"})
 #: The levels of `alarm`, worst first, as the table has its bays; all others come after them.
 LEVELS = ("danger", "attention")
+#: In a narrower column nobody reads why: it goes below its bay.
+LEAST_WHY = 40
+#: What is not torn in two at the end of a line: a command that somebody may copy, a figure and its unit, a word.
+WORD = re.compile(r"orchestrator \S+ \S+|\d\S* (?:°C|Ah|V|A|%|s|min|h)\S*|\S+")
 #: Standby may show so much at the charger, and so much at the BMU.
 STANDBY_A, BMU_A = 0.5, 1.0
 
@@ -33,11 +41,19 @@ def own_language() -> str:
     return language_of(os.environ)
 
 
-def page(document: Mapping[str, object], language: str = "") -> str:
-    """The whole status: what to do, the bays, and what is wrong with the station itself."""
+def own_width() -> int:
+    """How many columns the terminal has; 0 where it is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
+
+
+def page(document: Mapping[str, object], language: str = "", width: int = 0) -> str:
+    """The whole status: what to do, the bays, and what is wrong with the station itself.
+
+    Its lines are folded to `width` columns; 0 leaves each as long as it is.
+    """
     document = in_language(document, language)
-    lines = [f"ALARM: {text}" for text in strays(document, language)]
-    lines.append(table(cast("Sequence[Bay]", document["bays"]), language))
+    lines = [_folded(f"ALARM: {text}", width) for text in strays(document, language)]
+    lines.append(table(cast("Sequence[Bay]", document["bays"]), language, width))
     problems = (
         cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
     )
@@ -55,18 +71,39 @@ def strays(document: Mapping[str, object], language: str = "") -> list[str]:
     return [say(cause, language) for cause in causes]
 
 
-def table(bays: Sequence[Bay], language: str = "") -> str:
+def table(bays: Sequence[Bay], language: str = "", width: int = 0) -> str:
     """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
     bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
     rows = [HEAD, *(_row(bay) for bay in bays)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
-    lines = [f"ALARM: {what_to_do(bay, language)}" for bay in bays if is_alarming(bay)]
+    lines = [_folded(f"ALARM: {what_to_do(bay, language)}", width) for bay in bays if is_alarming(bay)]
     for row, bay in zip(rows, [None, *bays], strict=True):
-        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=False)]
-        lines.append("  ".join([*cells, row[-1]]).rstrip())
+        cells = "".join(f"{cell.ljust(columns)}  " for cell, columns in zip(row, widths, strict=False))
+        narrow = width and width - len(cells) < LEAST_WHY
+        lines.append(cells.rstrip() if narrow else _folded(f"{cells}{row[-1]}", width, len(cells)).rstrip())
         if bay is not None:
-            lines.extend(f"  {line}" for line in _below(bay, language))
+            below = [row[-1], *_below(bay, language)] if narrow else _below(bay, language)
+            lines.extend(_folded(f"  {line}", width) for line in below)
     return "\n".join(lines)
+
+
+def _folded(line: str, width: int, indent: int = 4) -> str:
+    """The line in as many as it takes at this width, all but the first one indented."""
+    if not width or _columns(line) <= width:
+        return line
+    head = max(len(line) - len(line.lstrip()), indent if indent > 4 else 0)  # what is aligned already stays
+    lines, now = [], line[:head]
+    for word in WORD.findall(line[head:]):
+        if now.strip() and _columns(now) + _columns(word) > width:
+            lines.append(now.rstrip())
+            now = " " * indent
+        now += f"{word} "
+    return "\n".join([*lines, now.rstrip()])
+
+
+def _columns(text: str) -> int:
+    """How wide it is on a terminal: Korean takes two columns a character."""
+    return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
 
 
 def other_faults(bay: Bay) -> list[Mapping[str, object]]:

@@ -81,7 +81,7 @@ def _reset(memory: Memory, now_s: float, bay: str) -> Cause | None:
 def _refusals(memory: Memory, now_s: float, bay: str, request: Request) -> list[Cause]:
     """Why it cannot be done now, and until when: of each fault that stands in the way, and what to do about it."""
     return [
-        Cause.of("refused", fault=name, why=why, what=_what(memory, name), then=_instead(memory, now_s, bay, name))
+        Cause.of("refused", fault=name, why=why, what=_what(memory, name), then=_first(memory, now_s, bay, name, why))
         for name in refusing(memory, now_s, request)
         if (why := refused_for(memory, now_s, name, request)) is not None
     ]
@@ -92,10 +92,10 @@ def _what(memory: Memory, name: str) -> Cause:
     return evidence(row, fault).with_(**dict(times(row, fault)))
 
 
-def _instead(memory: Memory, now_s: float, bay: str, name: str) -> Cause | None:
-    """What ends it, where that is another command than the one that was refused."""
-    following = act(memory, now_s, bay, name)
-    return following if following.param("bay") is not None else None
+def _first(memory: Memory, now_s: float, bay: str, name: str, why: Cause) -> Cause | None:
+    """What ends it, where that is something else than the wait for which the request was refused."""
+    ends = act(memory, now_s, bay, name)
+    return None if ends.same_as(why) else ends
 
 
 VERBS: dict[Request, Callable[[Memory, float, str], Cause | None]] = {
