@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterator
 
-from orchestrator.core.faults import FAULTS, Clear, Row
+from orchestrator.core.faults import FAULTS, RANK, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.model import Effect
 from orchestrator.text.catalogue import advise
@@ -23,6 +23,22 @@ seen, the limit, and the line of the file that sets it. This page is made from t
 | PAUSE | charging stops, and goes on by itself |
 | STOP | charging stops; how it goes on, says the last column |
 | TRIP | charging stops, and the bay stays stopped until a person resets and then starts it |
+
+What `status` says of a fault is in the tense that is true. While it is there: the evidence as it is now, since when, and
+its figure then and at its worst. Once it is gone: what it was, when, and the same quantity now. It ends with what comes
+next, which is also what a refused `start` or `reset` is answered: a command to type, a time, or what must happen first.
+
+| | what `status` says |
+| --- | --- |
+| there | the pack has 46.1 °C, the limit is 45 °C (policy.yaml:12); it charges again below 40 °C; 45.3 °C at 21:02:14; let it cool down; goes on by itself 10 s after it is gone |
+| gone | at 21:02:14, the pack had 45.3 °C, the limit is 45 °C (policy.yaml:12); it charges again below 40 °C; up to 46.8 °C, 39.8 °C now; gone since 21:09:40, goes on by itself in 8 s |
+| there, latched | inspect the pack, then reset – the BMU reports high temperature (status word 0x0010); since 21:02:14; reset is refused while it lasts |
+| gone, latched | inspect the pack, then reset – at 21:02:14, the BMU reported high temperature (status word 0x0010); gone since 21:09:40: orchestrator reset bay-1, then orchestrator start bay-1 |
+| reset too often | … reset is locked until 22:05, because it was reset 3 times within an hour and came again |
+| counts for a time | the SOC went from 50 to 57 % in 1 s; the BMU has 10.00 Ah and 100.0 Wh available …; since 21:02:14; have the BMU calibrated, then start; start is refused until 21:18: what was seen counts for so long |
+
+Of several faults the one with the worst effect is told first, and of those with the same effect the most dangerous one,
+however old it is. The table below is in this order.
 
 No fault waits for its condition to last without a break: the time that it was seen for drains at a quarter of its speed
 while it is away. And no word counts alone where a second witness can be heard: what the charger says and what the BMU
@@ -68,7 +84,7 @@ def page() -> str:
 def _table() -> Iterator[str]:
     yield "| fault | effect | what to do | how it ends |"
     yield "| --- | --- | --- | --- |"
-    for row in sorted(FAULTS, key=lambda row: (-row.effect, row.id)):
+    for row in sorted(FAULTS, key=lambda row: (-row.effect, RANK[row.id])):
         yield f"| `{row.id}` | {Effect(row.effect).name} | {_advice(row)} | {_end(row)} |"
 
 
@@ -95,7 +111,8 @@ def _end(row: Row) -> str:
         return f"by itself, {row.clean_s:g} s after it has gone"
     gone = f" for {row.clean_s:g} s" if row.clean_s else ""
     departs = "; also when the battery has left" if row.departs else ""
-    return ENDS[row.clear].replace("has gone,", f"has gone{gone},") + departs
+    counts = "; until when it counts, `status` says" if row.until else ""
+    return ENDS[row.clear].replace("has gone,", f"has gone{gone},") + departs + counts
 
 
 if __name__ == "__main__":
