@@ -59,11 +59,12 @@ def times(row: Row, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[s
     if fault.clean_s is not None or row.moment:
         known = [(name, LIVE[name](f)) for name, _ in then if name in LIVE] if f is not None else []
         now = _figures([(name, value) for name, value in known if value is not None])
-        more = {"raised_t_s": raised_s, "worst": _worse(fault, then), "now": now if len(now) == len(then) else ()}
+        more = {"raised_t_s": raised_s, "worst": _worse(row, fault, then), "now": now if len(now) == len(then) else ()}
     else:
         now_seen = figures(fault.now, names)
-        was = _figures(then) if then != now_seen else ()
-        worst = None if not now_seen or fault.worst in dict(now_seen).values() else _worse(fault, then)
+        alike = dict(then).keys() == dict(now_seen).keys()  # evidence may be about another quantity by now
+        was = _figures(then) if alike and then != now_seen else ()
+        worst = None if not now_seen or fault.worst in dict(now_seen).values() else _worse(row, fault, then)
         more = {"since_t_s": raised_s, "was": was, "worst": worst}
     return tuple((name, value) for name, value in more.items() if value)
 
@@ -78,12 +79,11 @@ def _figures(known: list[tuple[str, float]]) -> tuple[Cause, ...]:
     return tuple(Cause.of(f"figure_{name.partition('_')[2]}", value=value) for name, value in known)
 
 
-def _worse(fault: FaultMemory, then: list[tuple[str, float]]) -> Cause | None:
+def _worse(row: Row, fault: FaultMemory, then: list[tuple[str, float]]) -> Cause | None:
     """The worst value, where it was another one than at the beginning."""
     if fault.worst is None or len(then) != 1 or fault.worst == then[0][1]:
         return None
-    (name, first), worst = then[0], fault.worst
-    return Cause.of("up_to" if worst > first else "down_to", figure=_figures([(name, worst)])[0])
+    return Cause.of("down_to" if row.lowest else "up_to", figure=_figures([(then[0][0], fault.worst)])[0])
 
 
 def _active(memory: Memory, now_s: float, bay: str, name: str, f: Facts | None, *, at_rest: bool) -> ActiveFault:

@@ -77,23 +77,23 @@ def _present(row: Row, fault: FaultMemory, seen: Cause, f: Facts, passed_s: floa
     seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
     fault = replace(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
     if fault.raised_s is not None:
-        return replace(fault, now=seen, worst=_worst(row, seen, fault.worst))
+        return replace(fault, now=seen, worst=_worst(row, seen, fault.worst, fault.cause or seen))
     if seen_s < row.for_s or polls < row.polls:
         return fault
     strikes = fault.strikes
     if row.clear is Clear.BACKOFF:
         strikes = (*(t for t in strikes if f.now_s - t < STRIKES_S), f.now_s)
     latched = row.clear is Clear.RESET or len(strikes) > len(BACKOFF_S)
-    worst = _worst(row, seen, None)
+    worst = _worst(row, seen, None, seen)
     return replace(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes, now=seen, worst=worst)
 
 
-def _worst(row: Row, seen: Cause, worst: float | None) -> float | None:
-    """The worst value so far of the one figure of the evidence, where it has one."""
-    figures: list[float] = [value for name in row.figures.split() if (value := seen.param(name)) is not None]
-    if len(figures) != 1:
+def _worst(row: Row, seen: Cause, worst: float | None, first: Cause) -> float | None:
+    """The worst value so far of the one figure of the evidence, where it has one, and is about the same as at first."""
+    names = [name for name in row.figures.split() if seen.param(name) is not None]
+    if len(names) != 1 or first.param(names[0]) is None:
         return None
-    known = [*figures, *([worst] if worst is not None else [])]
+    known: list[float] = [seen.param(names[0]), first.param(names[0]) if worst is None else worst]
     return min(known) if row.lowest else max(known)
 
 

@@ -48,17 +48,20 @@ def decision_lines(
     """
 
     def why() -> dict[str, object]:
-        told = clock.told(now.cause) if clock is not None else now.cause
-        return {"reason": say(told, language), "cause": plain(now.cause)}
+        return {"reason": say(_at(clock, now.cause), language), "cause": plain(now.cause)}
 
     if before is None or now.state is not before.state:
         yield "transition", {"from": before.state if before else None, "to": now.state, **why()}
     if before is None or now.command != before.command:
         yield "command", command_fields(now.command)
     yield from _fault_lines(before, now, language)
-    yield from _session_lines(before, now, language)
+    yield from _session_lines(before, now, language, clock)
     if before is None or _gist(now) != _gist(before):
         yield "decision", {"state": now.state, **why(), "step": _step_fields(now.step, language)}
+
+
+def _at(clock: WallClock | None, cause: Cause | None) -> Cause | None:
+    return cause if clock is None else clock.told(cause)
 
 
 def command_fields(command: Command | None) -> dict[str, object]:
@@ -101,17 +104,17 @@ def _fault_lines(before: Decision | None, now: Decision, language: str) -> Itera
             yield "fault", _fault_fields(replace(fault, cause=was), "cleared", language)
 
 
-def _session_lines(before: Decision | None, now: Decision, language: str) -> Iterator[Line]:
+def _session_lines(before: Decision | None, now: Decision, language: str, clock: WallClock | None) -> Iterator[Line]:
     was = before.session if before and before.session and not before.session.result else None
     if now.session is None:
         return
     if was is None and not now.session.result:
-        yield "session", {"event": "begin", **session_fields(now.session, language)}
+        yield "session", {"event": "begin", **session_fields(now.session, language, clock)}
     elif now.session.result:
-        yield "session", {"event": "end", **session_fields(now.session, language)}
+        yield "session", {"event": "end", **session_fields(now.session, language, clock)}
 
 
-def session_fields(session: Session, language: str = "en") -> dict[str, object]:
+def session_fields(session: Session, language: str = "en", clock: WallClock | None = None) -> dict[str, object]:
     """A session in figures that a person can read."""
     return {
         "elapsed_s": round(session.elapsed_s, 1),
@@ -121,7 +124,7 @@ def session_fields(session: Session, language: str = "en") -> dict[str, object]:
         "soc_start_pct": session.soc_start_pct,
         "soc_pct": session.soc_pct,
         "step_changes": session.step_changes,
-        "result": say(session.result, language),
+        "result": say(_at(clock, session.result), language),
         "cause": plain(session.result) if session.result else None,
     }
 

@@ -61,7 +61,7 @@ def bay_status(
         },
         "faults": [_fault(fault, clock, language) for fault in decision.faults],
         "alarm": _level(decision.alarm),
-        "session": session_fields(session, language) if session else None,
+        "session": session_fields(session, language, clock) if session else None,
     }
 
 

@@ -442,6 +442,30 @@ def test_evidence_is_told_in_the_tense_that_is_true() -> None:
     )  # fmt: skip
 
 
+def test_evidence_about_another_quantity_is_told_without_the_first_ones_figure() -> None:
+    world = charging()
+    world.volts = 55.5
+    world.run(0.5)
+    world.volts, world.values["voltage_v"] = None, 55.8
+    world.shows["voltage_v"] = 50.0
+    world.run(2)
+    told = world.told["over_voltage"]
+    assert "55.80 V at the pack, the limit is 55.2 V" in told
+    assert "; since 1004 s; reset is refused while it lasts" in told
+
+
+def test_a_restart_forgets_no_first_figure() -> None:
+    world = World(temperature_c=44.0).charging()
+    world.values["temperature_c"] = 46.0
+    world.run(3)
+    world.memory = Persisted.of(world.memory, world.now_s).memory(world.now_s)
+    for celsius in (45.0, 43.0):
+        world.values["temperature_c"] = celsius
+        world.run(5)
+    assert "the pack has 43.0 °C, the limit is 45 °C" in world.told["over_temperature"]
+    assert "; 46.0 °C at 1004 s; let it cool down; " in world.told["over_temperature"]
+
+
 def test_a_figure_that_falls_is_told_at_its_lowest() -> None:
     world = charging()
     for celsius in (-0.5, -2.0, 1.0):

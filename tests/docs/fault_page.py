@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 from orchestrator.core.faults import FAULTS, RANK, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
-from orchestrator.model import Effect
-from orchestrator.text.catalogue import advise
+from orchestrator.model import Cause, Effect
+from orchestrator.text.catalogue import advise, say
 from tests.docs.catalogue import CATALOGUE
 
 HEAD = """\
@@ -28,14 +28,7 @@ What `status` says of a fault is in the tense that is true. While it is there: t
 its figure then and at its worst. Once it is gone: what it was, when, and the same quantity now. It ends with what comes
 next, which is also what a refused `start` or `reset` is answered: a command to type, a time, or what must happen first.
 
-| | what `status` says |
-| --- | --- |
-| there | the pack has 46.1 °C, the limit is 45 °C (policy.yaml:12); it charges again below 40 °C; 45.3 °C at 21:02:14; let it cool down; goes on by itself 10 s after it is gone |
-| gone | at 21:02:14, the pack had 45.3 °C, the limit is 45 °C (policy.yaml:12); it charges again below 40 °C; up to 46.8 °C, 39.8 °C now; gone since 21:09:40, goes on by itself in 8 s |
-| there, latched | inspect the pack, then reset – the BMU reports high temperature (status word 0x0010); since 21:02:14; reset is refused while it lasts |
-| gone, latched | inspect the pack, then reset – at 21:02:14, the BMU reported high temperature (status word 0x0010); gone since 21:09:40: orchestrator reset bay-1, then orchestrator start bay-1 |
-| reset too often | … reset is locked until 22:05, because it was reset 3 times within an hour and came again |
-| counts for a time | the SOC went from 50 to 57 % in 1 s; the BMU has 10.00 Ah and 100.0 Wh available …; since 21:02:14; have the BMU calibrated, then start; start is refused until 21:18: what was seen counts for so long |
+{samples}
 
 Of several faults the one with the worst effect is told first, and of those with the same effect the most dangerous one,
 however old it is. The table below is in this order.
@@ -68,6 +61,32 @@ A rule that stops good charges is switched off by the people who have to live wi
 high-temperature bit, its own protection below all of this, and current steps that suit the pack. A BMU of which *every*
 word stands still while a charge goes in is found (`bmu_frozen`).
 """
+HOT = Cause.of("over_temperature", place="policy.yaml:12", pack_c=46.1, limit_c=45, again_c=40)
+BITS = Cause.of("status_trip", advice="status_trip", bits=("high_temperature",), status=0x10, effect="TRIP")
+DOUBTS = Cause.of(
+    "soc_not_believed", advice="soc_not_believed",
+    whats=(
+        Cause.of("soc_step", before_pct=50, soc_pct=57, passed_s=1),
+        Cause.of("energy_disagrees", remaining_ah=10, available_wh=100, implied_v=10, pack_v=48),
+    ),
+)  # fmt: skip
+AT = {"raised_at": "21:02:14", "past": True}
+SAMPLES = {
+    "there": HOT.with_(
+        "over_temperature", since_at="21:02:14", was=(Cause.of("figure_c", value=45.3),),
+        then=Cause.of("goes_on_after", wait_s=10, strike=None),
+    ),
+    "gone": HOT.with_(
+        "", **AT, worst=Cause.of("up_to", figure=Cause.of("figure_c", value=46.8)), now=(Cause.of("figure_c", value=39.8),),
+        then=Cause.of("goes_on_in", gone_at="21:09:40", left_s=8, strike=None),
+    ),
+    "there, latched": BITS.with_("", since_at="21:02:14", then=Cause.of("refused_while", request="reset")),
+    "gone, latched": BITS.with_("", **AT, then=Cause.of("reset_now", gone_at="21:09:40", bay="bay-1")),
+    "reset too often": BITS.with_("", **AT, then=Cause.of("reset_locked", until_at="22:05", times=3)),
+    "counts for a time": DOUBTS.with_(
+        "", since_at="21:02:14", then=Cause.of("refused_until", request="start", until_at="21:18")
+    ),
+}  # fmt: skip
 BACKOFFS = ", ".join(f"{CLEAN_S + wait_s:g}" for wait_s in BACKOFF_S)
 ENDS = {
     Clear.BACKOFF: f"by itself, {BACKOFFS} s after it has gone (first, second, third time in an hour), then by `reset`",
@@ -78,7 +97,21 @@ ENDS = {
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "\n".join(_table()) + "\n" + NUMBERS + "\n".join(_numbers()) + "\n" + STUCK
+    return (
+        HEAD.format(samples="\n".join(_samples()))
+        + "\n".join(_table())
+        + "\n"
+        + NUMBERS
+        + "\n".join(_numbers())
+        + "\n"
+        + STUCK
+    )
+
+
+def _samples() -> Iterator[str]:
+    yield "| | what `status` says |"
+    yield "| --- | --- |"
+    yield from (f"| {stage} | {say(cause)} |" for stage, cause in SAMPLES.items())
 
 
 def _table() -> Iterator[str]:
