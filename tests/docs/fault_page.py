@@ -24,9 +24,10 @@ seen, the limit, and the line of the file that sets it. This page is made from t
 | STOP | charging stops; how it goes on, says the last column |
 | TRIP | charging stops, and the bay stays stopped until a person resets and then starts it |
 
-What `status` says of a fault is in the tense that is true. While it is there: the evidence as it is now, since when, and
-its figure then and at its worst. Once it is gone: what it was, when, and the same quantity now. It ends with what comes
-next, which is also what a refused `start` or `reset` is answered: a command to type, a time, or what must happen first.
+What `status` says of a fault is in the tense that is true. While it is there: the evidence as it is now, since when,
+and its figure then and at its worst. Once it is gone: what it was, when, and the same quantity now. It ends with what
+comes next, which is also what a refused `start` or `reset` is answered: a command to type, a time, or what must happen
+first.
 
 {samples}
 
@@ -61,7 +62,10 @@ A rule that stops good charges is switched off by the people who have to live wi
 high-temperature bit, its own protection below all of this, and current steps that suit the pack. A BMU of which *every*
 word stands still while a charge goes in is found (`bmu_frozen`).
 """
-HOT = Cause.of("over_temperature", place="policy.yaml:12", pack_c=46.1, limit_c=45, again_c=40)
+HOT, WAS_HOT = (
+    Cause.of("over_temperature", place="policy.yaml:12", pack_c=pack_c, limit_c=45, again_c=40)
+    for pack_c in (46.1, 45.3)
+)
 BITS = Cause.of("status_trip", advice="status_trip", bits=("high_temperature",), status=0x10, effect="TRIP")
 DOUBTS = Cause.of(
     "soc_not_believed", advice="soc_not_believed",
@@ -76,8 +80,9 @@ SAMPLES = {
         "over_temperature", since_at="21:02:14", was=(Cause.of("figure_c", value=45.3),),
         then=Cause.of("goes_on_after", wait_s=10, strike=None),
     ),
-    "gone": HOT.with_(
-        "", **AT, worst=Cause.of("up_to", figure=Cause.of("figure_c", value=46.8)), now=(Cause.of("figure_c", value=39.8),),
+    "gone": WAS_HOT.with_(
+        "", **AT,
+        worst=Cause.of("up_to", figure=Cause.of("figure_c", value=46.8)), now=(Cause.of("figure_c", value=39.8),),
         then=Cause.of("goes_on_in", gone_at="21:09:40", left_s=8, strike=None),
     ),
     "there, latched": BITS.with_("", since_at="21:02:14", then=Cause.of("refused_while", request="reset")),
