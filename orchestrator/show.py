@@ -29,7 +29,7 @@ LEVELS = ("danger", "attention")
 #: In a narrower column nobody reads why: it goes below its bay.
 LEAST_WHY = 40
 #: What is not torn in two at the end of a line: a command that somebody may copy, a figure and its unit, a word.
-WORD = re.compile(r"orchestrator \S+ \S+|\d\S* (?:°C|Ah|V|A|%|s|min|h)\S*|\S+")
+WORD = re.compile(r"orchestrator \S+ \S+|\d\S* (?:°C|Ah|Wh|V|A|%|s|min|h|K)\S*|\S+")
 #: Standby may show so much at the charger, and so much at the BMU.
 STANDBY_A, BMU_A = 0.5, 1.0
 

@@ -157,7 +157,7 @@ def test_a_soc_that_is_not_believed_says_why_and_until_when_a_start_is_refused()
     world = doubted()
     jump_s = world.memory.charge_step[0] if world.memory.charge_step else 0.0
     until_s = jump_s + STEP_NEWS_S + ROW["soc_jump"].clean_s
-    why = f"is refused until {until_s:.0f} s: what was seen counts for so long"
+    why = f"is refused until {until_s:.0f} s, as long as what was seen counts"
     assert reason_of(world.decision).endswith(f"; start {why}")
     for request in (Request.START, Request.RESET):
         refused = world.ask(request)

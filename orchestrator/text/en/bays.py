@@ -93,7 +93,7 @@ TEXTS: Mapping[str, str] = {
     # what ends a fault, or stands in the way
     "needs_reset": "{request:word} is refused before a reset",
     "refused_while": "{request:word} is refused while it lasts",
-    "refused_until": "{request:word} is refused until {until_at}: what was seen counts for so long",
+    "refused_until": "{request:word} is refused until {until_at}, as long as what was seen counts",
     "refused_for": "gone since {gone_at}, {request:word} is refused for another {left_s} s",
     "reset_locked": "reset is locked until {until_at}, because it was reset {times} times within an hour and came again",
     "waits_for_fault": "gone since {gone_at}, but {request:word} is refused because of {fault}",
