@@ -1,13 +1,15 @@
 """The status document as text for a terminal: what to do first, then one line a bay, and why."""
 
 import os
+import shutil
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
-from unicodedata import east_asian_width
 
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
+from orchestrator.text.columns import folded, width_of
 from orchestrator.text.document import in_language, language_of_answer
 from orchestrator.text.language import language_of
 
@@ -23,6 +25,8 @@ CUT_THE_MAINS = frozenset({
 RESTING = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"})
 #: The levels of `alarm`, worst first, as the table has its bays; all others come after them.
 LEVELS = ("danger", "attention")
+#: In a narrower column nobody reads why: it goes below its bay.
+LEAST_WHY = 40
 #: Standby may show so much at the charger, and so much at the BMU.
 STANDBY_A, BMU_A = 0.5, 1.0
 
@@ -34,12 +38,20 @@ def own_language() -> str:
     return language_of(os.environ)
 
 
-def page(document: Mapping[str, object], language: str = "") -> str:
-    """The whole status: what to do, the bays, and what is wrong with the station itself."""
+def own_width() -> int:
+    """How many columns the terminal has; 0 where it is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
+
+
+def page(document: Mapping[str, object], language: str = "", width: int = 0) -> str:
+    """The whole status: what to do, the bays, and what is wrong with the station itself.
+
+    Its lines are folded to `width` columns; 0 leaves each as long as it is.
+    """
     language = language_of_answer(document, language)
     document = in_language(document, language)
-    lines = [_labelled("alarm", text, language) for text in strays(document, language)]
-    lines.append(table(cast("Sequence[Bay]", document["bays"]), language))
+    lines = [folded(_labelled("alarm", text, language), width) for text in strays(document, language)]
+    lines.append(table(cast("Sequence[Bay]", document["bays"]), language, width))
     problems = (
         cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
     )
@@ -57,17 +69,19 @@ def strays(document: Mapping[str, object], language: str = "") -> list[str]:
     return [say(cause, language) for cause in causes]
 
 
-def table(bays: Sequence[Bay], language: str = "") -> str:
+def table(bays: Sequence[Bay], language: str = "", width: int = 0) -> str:
     """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
     bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
     rows = [HEAD, *(_row(bay, language) for bay in bays)]
     widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
-    lines = [_labelled("alarm", what_to_do(bay, language), language) for bay in bays if is_alarming(bay)]
+    lines = [folded(_labelled("alarm", what_to_do(bay, language), language), width) for bay in bays if is_alarming(bay)]
     for row, bay in zip(rows, [None, *bays], strict=True):
-        cells = [cell + " " * (width - width_of(cell)) for cell, width in zip(row, widths, strict=False)]
-        lines.append("  ".join([*cells, row[-1]]).rstrip())
+        cells = "".join(cell + " " * (columns - width_of(cell) + 2) for cell, columns in zip(row, widths, strict=False))
+        narrow = width and width - width_of(cells) < LEAST_WHY
+        lines.append(cells.rstrip() if narrow else folded(f"{cells}{row[-1]}", width, width_of(cells)).rstrip())
         if bay is not None:
-            lines.extend(f"  {line}" for line in _below(bay, language))
+            below = [row[-1], *_below(bay, language)] if narrow else _below(bay, language)
+            lines.extend(folded(f"  {line}", width) for line in below)
     return "\n".join(lines)
 
 
@@ -174,11 +188,6 @@ def _row(bay: Bay, language: str) -> tuple[str, ...]:
         step_of(step, bay.get("step_current_a")),
         say(Cause("see_alarm"), language) if is_alarming(bay) else str(bay["reason"]),
     )
-
-
-def width_of(text: str) -> int:
-    """How many columns of a terminal it takes: a Korean letter takes two."""
-    return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
 
 
 def step_of(index: object, current_a: object) -> str:

@@ -5,9 +5,9 @@ that the next step, if it does not raise, goes on from there.
 """
 
 from orchestrator.core import operator, safestop, sequence
+from orchestrator.core.active import active_faults
 from orchestrator.core.contactor import closes
 from orchestrator.core.history import stage
-from orchestrator.core.latches import shown
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.parts import changed
 from orchestrator.core.safestop import OBEY_STOP_S
@@ -17,8 +17,8 @@ from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, 
 FAULT = "internal"
 
 
-def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tuple[Decision, Memory]:
-    """The decision and the memory after an exception, whose words are `error`."""
+def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str, bay: str = "BAY") -> tuple[Decision, Memory]:
+    """The decision and the memory after an exception, whose words are `error`; `bay` is the name for commands."""
     since_s, cause = memory.stop.stopping_s, None
     state = memory.state
     if state not in UNVERIFIED or since_s is None:
@@ -47,7 +47,7 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str) -> tu
     answer = Cause.of("failed_request", error=error) if refused else None
     level = Alarm.DANGER if out else Alarm.NONE
     decision = Decision(
-        memory.state, memory.cause, STOP, faults=shown(memory.faults, now_s), alarm=level, closed=memory.closed,
+        memory.state, memory.cause, STOP, faults=active_faults(memory, now_s, bay), alarm=level, closed=memory.closed,
         session=memory.session, answer=answer,
     )  # fmt: skip
     return decision, memory
@@ -58,4 +58,5 @@ def _latched(memory: Memory, now_s: float, error: str) -> dict[str, FaultMemory]
     known = memory.faults.get(FAULT)
     raised_s = known.raised_s if known is not None and known.raised_s is not None else now_s
     what = Cause.of("internal_error", error=error)
-    return {**memory.faults, FAULT: FaultMemory(present=True, raised_s=raised_s, cause=what, latched=True)}
+    ours = FaultMemory(present=True, raised_s=raised_s, cause=what, latched=True, now=what)
+    return {**memory.faults, FAULT: ours}

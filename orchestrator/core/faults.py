@@ -6,14 +6,19 @@ Faults name effects, not states; the worst effect wins. `clear` says how a fault
 - BACKOFF: after 10 s without it, and 10, 60, 300 s for the first, second, third time in an hour; the fourth latches.
 - OPERATOR: when an operator starts the bay (or resets it).
 - RESET: when a person resets it; never while the condition is there.
+
+Of several faults the one with the worst effect is told first, and of those with the same effect the most dangerous one
+(`RANK`), however old it is.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
+from math import inf, isfinite
 
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.facts import Facts
+from orchestrator.core.memory import Memory
 from orchestrator.core.safestop import OBEY_STOP_S
 from orchestrator.core.states import AT_REST, AT_WORK, ENERGISED, UNSEEN, UNVERIFIED
 from orchestrator.core.witnesses import measured, pack, paired, standby
@@ -21,6 +26,7 @@ from orchestrator.model import Cause, Effect, State
 
 Check = Callable[[Facts], Cause | None]
 Past = Callable[[Cause, float], Cause]
+Until = Callable[[Memory], float | None]
 
 
 class Clear(Enum):
@@ -54,9 +60,25 @@ class Row:
     polls: int = 1  #: … and be seen in this many charger readings; both drain while it is away
     clean_s: float = 0.0  #: AUTO, RESET: how long the condition must be gone
     departs: bool = False  #: a battery that leaves in mid-charge looks like this; once it has left, it was no fault
-    moment: bool = False  #: it tells of a moment, not of what is: said with how long ago
+    moment: bool = False  #: it tells of a moment, not of what is: in the past tense from the beginning
+    figures: str = ""  #: the parameters of its evidence that are told anew while it is there, and still when it is gone
+    lowest: bool = False  #: the worst value of its figure is the lowest one
+    until: Until | None = None  #: when its condition ends by the mere passing of time; None: nobody knows
     at_rest: str = ""  #: the id of what to do once the charger stands by, verified, where that is something else
     past: Past | None = None  #: what is said of it from then on, made of its evidence and of how long it lasted, in s
+
+
+def _doubts_end_s(memory: Memory) -> float | None:
+    """When so many doubts are gone that not two of them are left; None where nobody knows."""
+    ends_s = []
+    for name in state_of_charge.DOUBTS:
+        row, fault = ROW[name], memory.faults.get(name)
+        if fault is None or fault.raised_s is None:
+            continue
+        gone_s = fault.clean_s if row.until is None or fault.clean_s is not None else row.until(memory)
+        ends_s.append(inf if gone_s is None else gone_s + row.clean_s)
+    end_s = sorted(ends_s)[-2] if len(ends_s) > 1 else inf
+    return end_s if isfinite(end_s) else None
 
 
 E = Effect
@@ -68,44 +90,50 @@ FAULTS: tuple[Row, ...] = (
     Row("system_stop", "C4", E.STOP, Clear.OPERATOR, reports.system_stop, ALWAYS),
     Row("illegal_value", "C19", E.STOP, Clear.BACKOFF, reports.illegal_value, ALWAYS, polls=2),
     Row("mode_taken_over", "C8", E.STOP, Clear.OPERATOR, reports.mode_taken_over, ALWAYS, polls=2),
-    Row("rejected_frame", "C22", E.TRIP, Clear.RESET, reports.rejected_frame, ALWAYS),
-    Row("line_taken_over", "C26", E.STOP, Clear.BACKOFF, obedience.line_taken_over, AT_WORK),
-    Row("line_changed", "C26", E.WARN, Clear.AUTO, obedience.line_taken_over, ALWAYS - AT_WORK, clean_s=10),
+    Row("rejected_frame", "C22", E.TRIP, Clear.RESET, reports.rejected_frame, ALWAYS, moment=True),
+    Row("line_taken_over", "C26", E.STOP, Clear.BACKOFF, obedience.line_taken_over, AT_WORK, moment=True),
+    Row("line_changed", "C26", E.WARN, Clear.AUTO, obedience.line_taken_over, ALWAYS - AT_WORK, clean_s=10,
+        moment=True),
     Row("port_locked", "C27", E.STOP, Clear.AUTO, obedience.port_locked, ALWAYS, clean_s=2),
-    Row("noisy_line", "C21", E.WARN, Clear.AUTO, reports.noisy_line, ALWAYS, clean_s=10),
+    Row("noisy_line", "C21", E.WARN, Clear.AUTO, reports.noisy_line, ALWAYS, clean_s=10, figures="bad_pct"),
     # whether it obeys
     Row("charger_silent", "C23, C25", E.STOP, Clear.BACKOFF, obedience.charger_silent, AT_WORK),
-    Row("found_running", "G10", E.STOP, Clear.OPERATOR, obedience.found_running, UNSEEN),
-    Row("rogue_run", "C5", E.TRIP, Clear.RESET, obedience.rogue_run, AT_REST),
+    Row("found_running", "G10", E.STOP, Clear.OPERATOR, obedience.found_running, UNSEEN, moment=True),
+    Row("rogue_run", "C5", E.TRIP, Clear.RESET, obedience.rogue_run, AT_REST, figures="charger_a"),
     Row("current_without_order", "C29", E.TRIP, Clear.RESET, standby.current_without_order, AT_REST | UNSEEN,
-        clean_s=5),
+        clean_s=5, figures="pack_a charger_a"),
     Row("will_not_stop", "C6", E.TRIP, Clear.RESET, obedience.will_not_stop, UNVERIFIED,
-        for_s=OBEY_STOP_S, at_rest="stands_by_now", past=obedience.did_not_stop),
+        for_s=OBEY_STOP_S, at_rest="stands_by_now", past=obedience.did_not_stop, figures="charger_a"),
     Row("contactor_lost", "C6", E.STOP, Clear.BACKOFF, obedience.contactor_lost, ALWAYS),
     Row("will_not_start", "C7", E.STOP, Clear.BACKOFF, obedience.will_not_start, ENERGISED),
     Row("stopped_by_itself", "C4", E.STOP, Clear.OPERATOR, obedience.stopped_by_itself, ENERGISED,
-        polls=2, departs=True),
+        polls=2, departs=True, moment=True),
     Row("setting_not_obeyed", "C9, C16", E.TRIP, Clear.RESET, obedience.setting_not_obeyed, ENERGISED),
-    Row("limit_reverted", "C28", E.TRIP, Clear.RESET, obedience.limit_reverted, ENERGISED),
-    Row("above_step", "C28", E.TRIP, Clear.RESET, obedience.above_step, ENERGISED, for_s=2, polls=2),
-    Row("over_current", "C11", E.TRIP, Clear.RESET, obedience.over_current, ALWAYS, polls=2),
-    Row("early_full", "C18", E.STOP, Clear.OPERATOR, obedience.early_full, ENERGISED, polls=2, departs=True),
+    Row("limit_reverted", "C28", E.TRIP, Clear.RESET, obedience.limit_reverted, ENERGISED, moment=True),
+    Row("above_step", "C28", E.TRIP, Clear.RESET, obedience.above_step, ENERGISED, for_s=2, polls=2,
+        figures="charger_a"),
+    Row("over_current", "C11", E.TRIP, Clear.RESET, obedience.over_current, ALWAYS, polls=2, figures="charger_a"),
+    Row("early_full", "C18", E.STOP, Clear.OPERATOR, obedience.early_full, ENERGISED, polls=2, departs=True,
+        figures="soc_pct"),
     Row("open_circuit", "C13", E.STOP, Clear.BACKOFF, obedience.open_circuit, ENERGISED, departs=True),
     Row("no_battery", "C14", E.STOP, Clear.BACKOFF, obedience.no_battery, ENERGISED, departs=True),
-    Row("loose_plug", "C13", E.STOP, Clear.BACKOFF, obedience.loose_plug, ALWAYS),
+    Row("loose_plug", "C13", E.STOP, Clear.BACKOFF, obedience.loose_plug, ALWAYS, moment=True),
     Row("wakes_too_long", "C15", E.TRIP, Clear.RESET, obedience.wakes_too_long, ENERGISED),
     # charger and battery side by side
-    Row("over_voltage", "C10, B14", E.TRIP, Clear.RESET, measured.over_voltage, ALWAYS),
-    Row("volts_disagree", "B15", E.TRIP, Clear.RESET, measured.volts_disagree, ENERGISED, for_s=3),
+    Row("over_voltage", "C10, B14", E.TRIP, Clear.RESET, measured.over_voltage, ALWAYS, figures="charger_v pack_v"),
+    Row("volts_disagree", "B15", E.TRIP, Clear.RESET, measured.volts_disagree, ENERGISED, for_s=3,
+        figures="charger_v pack_v"),
     Row("pairing_not_proved", "P8", E.STOP, Clear.OPERATOR, paired.pairing_not_proved, ENERGISED),
-    Row("not_paired", "B15", E.NO_START, Clear.AUTO, measured.volts_disagree, QUALIFYING, for_s=1, clean_s=1),
-    Row("amps_disagree", "B16", E.TRIP, Clear.RESET, measured.amps_disagree, ENERGISED, for_s=5),
+    Row("not_paired", "B15", E.NO_START, Clear.AUTO, measured.volts_disagree, QUALIFYING, for_s=1, clean_s=1,
+        figures="charger_v pack_v"),
+    Row("amps_disagree", "B16", E.TRIP, Clear.RESET, measured.amps_disagree, ENERGISED, for_s=5,
+        figures="charger_a pack_a"),
     Row("charger_frozen", "C20", E.STOP, Clear.BACKOFF, measured.charger_frozen, ENERGISED, for_s=FOLLOWS_S),
     Row("charger_frozen_at_rest", "C31", E.NO_START, Clear.BACKOFF, measured.charger_frozen_at_rest, AT_REST,
         for_s=FOLLOWS_S),
     Row("bmu_frozen", "B23", E.STOP, Clear.BACKOFF, measured.bmu_frozen, ENERGISED, for_s=FOLLOWS_S),
-    Row("pack_collapsed", "B24", E.TRIP, Clear.RESET, pack.collapsed, ENERGISED),
-    Row("back_feed", "C12", E.TRIP, Clear.RESET, measured.back_feed, ENERGISED, for_s=2),
+    Row("pack_collapsed", "B24", E.TRIP, Clear.RESET, pack.collapsed, ENERGISED, figures="pack_v", lowest=True),
+    Row("back_feed", "C12", E.TRIP, Clear.RESET, measured.back_feed, ENERGISED, for_s=2, figures="discharge_a"),
     # the battery
     Row("bmu_silent", "B1, B5, B19, B21", E.STOP, Clear.BACKOFF, battery.bmu_silent, AT_WORK, departs=True),
     Row("heartbeat_lost", "B6", E.STOP, Clear.BACKOFF, battery.heartbeat_lost, AT_WORK, departs=True),
@@ -113,31 +141,39 @@ FAULTS: tuple[Row, ...] = (
     Row("sdo_refused", "B3", E.TRIP, Clear.RESET, battery.sdo_refused, ALWAYS),
     Row("sdo_aborted", "B4", E.STOP, Clear.BACKOFF, battery.sdo_aborted, ALWAYS, for_s=0.5),
     Row("not_operational", "B8", E.STOP, Clear.BACKOFF, battery.not_operational, ENERGISED, for_s=NMT_OBEY_S),
-    Row("bmu_rebooted", "B7", E.STOP, Clear.BACKOFF, battery.bmu_rebooted, ENERGISED),
+    Row("bmu_rebooted", "B7", E.STOP, Clear.BACKOFF, battery.bmu_rebooted, ENERGISED, moment=True),
     Row("status_trip", "B9", E.TRIP, Clear.RESET, battery.status_trip, ALWAYS),
     Row("status_limit", "B9", E.LIMIT, Clear.AUTO, battery.status_limit, ALWAYS, clean_s=10),
     Row("emergency", "B9", E.STOP, Clear.OPERATOR, battery.emergency, ALWAYS),
-    Row("hot_trip", "B10", E.TRIP, Clear.RESET, battery.hot_trip, ALWAYS),
-    Row("over_temperature", "B10", E.PAUSE, Clear.AUTO, battery.over_temperature, ALWAYS, clean_s=10),
-    Row("under_temperature", "B11", E.PAUSE, Clear.AUTO, battery.under_temperature, ALWAYS, clean_s=10),
+    Row("hot_trip", "B10", E.TRIP, Clear.RESET, battery.hot_trip, ALWAYS, figures="pack_c"),
+    Row("over_temperature", "B10", E.PAUSE, Clear.AUTO, battery.over_temperature, ALWAYS, clean_s=10, figures="pack_c"),
+    Row("under_temperature", "B11", E.PAUSE, Clear.AUTO, battery.under_temperature, ALWAYS, clean_s=10,
+        figures="pack_c", lowest=True),
     Row("current_paused", "P12", E.PAUSE, Clear.AUTO, charge.no_step_allowed, ENERGISED, clean_s=10),
-    Row("runaway", "B12", E.TRIP, Clear.RESET, battery.runaway, ENERGISED, for_s=1),
-    Row("temperature_invalid", "B13", E.TRIP, Clear.RESET, battery.temperature_invalid, ALWAYS, clean_s=5),
+    Row("runaway", "B12", E.TRIP, Clear.RESET, battery.runaway, ENERGISED, for_s=1, figures="rate_k_per_min"),
+    Row("temperature_invalid", "B13", E.TRIP, Clear.RESET, battery.temperature_invalid, ALWAYS, clean_s=5,
+        figures="pack_c"),
     Row("implausible", "B14, B17", E.STOP, Clear.BACKOFF, battery.implausible, ALWAYS),
-    Row("under_voltage", "B14", E.NO_START, Clear.AUTO, battery.under_voltage, ALWAYS, for_s=1, clean_s=5),
+    Row("under_voltage", "B14", E.NO_START, Clear.AUTO, battery.under_voltage, ALWAYS, for_s=1, clean_s=5,
+        figures="pack_v", lowest=True),
     Row("needs_precharge", "B14", E.NO_START, Clear.AUTO, battery.needs_precharge, ALWAYS, for_s=1, clean_s=5),
-    Row("soh_low", "B17", E.NO_START, Clear.AUTO, battery.soh_low, ALWAYS, clean_s=5),
-    Row("soc_jump", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_jump, ALWAYS, clean_s=5, moment=True),
-    Row("soc_falls", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_falls, ENERGISED, clean_s=60),
+    Row("soh_low", "B17", E.NO_START, Clear.AUTO, battery.soh_low, ALWAYS, clean_s=5, figures="soh_pct", lowest=True),
+    Row("soc_jump", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_jump, ALWAYS, clean_s=5, moment=True,
+        until=state_of_charge.jump_ends_s),
+    Row("soc_falls", "B17", E.WARN, Clear.AUTO, state_of_charge.soc_falls, ENERGISED, clean_s=60, figures="soc_pct",
+        lowest=True),
     Row("figures_disagree", "B17", E.WARN, Clear.AUTO, state_of_charge.figures_disagree, ENERGISED,
         for_s=300, clean_s=60),
-    Row("soc_not_believed", "B17", E.STOP, Clear.OPERATOR, state_of_charge.soc_not_believed, ENERGISED),
-    Row("battery_exchanged", "B18", E.STOP, Clear.OPERATOR, state_of_charge.battery_exchanged, ALWAYS),
-    Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, pack.another_pack, ALWAYS - ENERGISED, for_s=1, clean_s=5),
-    Row("another_pack", "B25", E.STOP, Clear.OPERATOR, pack.another_pack, ENERGISED, for_s=5),
+    Row("soc_not_believed", "B17", E.STOP, Clear.OPERATOR, state_of_charge.soc_not_believed, ENERGISED,
+        until=_doubts_end_s),
+    Row("battery_exchanged", "B18", E.STOP, Clear.OPERATOR, state_of_charge.battery_exchanged, ALWAYS, moment=True,
+        until=state_of_charge.exchange_ends_s),
+    Row("wrong_policy", "P3", E.NO_START, Clear.AUTO, pack.another_pack, ALWAYS - ENERGISED, for_s=1, clean_s=5,
+        figures="pack_v soc_pct"),
+    Row("another_pack", "B25", E.STOP, Clear.OPERATOR, pack.another_pack, ENERGISED, for_s=5, figures="pack_v soc_pct"),
     Row("no_step_allowed", "P12", E.NO_START, Clear.AUTO, charge.no_step_allowed, QUALIFYING, for_s=1, clean_s=5),
     Row("precharge_too_strong", "P12", E.NO_START, Clear.AUTO, charge.precharge_too_strong, QUALIFYING,
-        for_s=1, clean_s=5),
+        for_s=1, clean_s=5, figures="pack_v"),
     # who else is on the bus
     Row("other_master", "B27", E.WARN, Clear.AUTO, battery.other_master, ALWAYS, clean_s=10),
     Row("heartbeat_set", "B28", E.WARN, Clear.AUTO, battery.heartbeat_set, ALWAYS, clean_s=10),
@@ -147,12 +183,22 @@ FAULTS: tuple[Row, ...] = (
     Row("time_limit", "C17", E.TRIP, Clear.RESET, charge.time_limit, ENERGISED),
     Row("ah_limit", "C17", E.TRIP, Clear.RESET, charge.ah_limit, ENERGISED),
     # ourselves
-    Row("late", "G6", E.WARN, Clear.AUTO, ourselves.late, ALWAYS, clean_s=10),
-    Row("overrun", "G6", E.STOP, Clear.BACKOFF, ourselves.overrun, AT_WORK),
-    Row("suspended", "G7", E.STOP, Clear.BACKOFF, ourselves.suspended, AT_WORK),
+    Row("late", "G6", E.WARN, Clear.AUTO, ourselves.late, ALWAYS, clean_s=10, moment=True),
+    Row("overrun", "G6", E.STOP, Clear.BACKOFF, ourselves.overrun, AT_WORK, moment=True),
+    Row("suspended", "G7", E.STOP, Clear.BACKOFF, ourselves.suspended, AT_WORK, moment=True),
     Row("unkept", "G8, P9", E.NO_START, Clear.AUTO, ourselves.unkept, ALWAYS, clean_s=10),
     # Last, since it tells of rows above that could not be judged.
     Row("internal", "G5, P11", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS),
 )  # fmt: skip
 
 ROW = {row.id: row for row in FAULTS}
+
+#: What is told before all other faults with the same effect, the most dangerous first: current that nobody controls,
+#: then what may burn, then what destroys. All others follow as they stand in the table.
+DANGERS = (
+    "will_not_stop", "current_without_order", "rogue_run", "port_locked", "found_running",
+    "hot_trip", "runaway", "pack_collapsed", "over_voltage", "over_current", "above_step", "status_trip",
+    "temperature_invalid", "reverse_polarity", "polarity_contradicts", "volts_disagree", "amps_disagree", "back_feed",
+    "another_pack", "pairing_not_proved", "bmu_silent", "charger_silent", "over_temperature", "under_temperature",
+)  # fmt: skip
+RANK = {name: rank for rank, name in enumerate(dict.fromkeys((*DANGERS, *ROW)))}

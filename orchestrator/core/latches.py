@@ -11,20 +11,18 @@ which is judged last, and all the others go on.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import ceil
 
 from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
-from orchestrator.core.faults import FAULTS, ROW, Clear, Row
+from orchestrator.core.faults import FAULTS, RANK, ROW, Clear, Row
 from orchestrator.core.memory import FaultMemory
 from orchestrator.core.safestop import verified
 from orchestrator.core.states import UNVERIFIED
-from orchestrator.model import ActiveFault, Cause, Effect, State
+from orchestrator.model import Cause, Effect, State
 
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
 BACKOFF_S = (10.0, 60.0, 300.0)
-MINUTE_S = 60.0
 #: Strikes are forgotten after this long; one more than there are backoffs latches.
 STRIKES_S = 3600.0
 
@@ -91,13 +89,25 @@ def _present(row: Row, fault: FaultMemory, seen: Cause, f: Facts, passed_s: floa
     # The time before its first look is nobody's: the condition may have come just now.
     seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
     fault = replace(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
-    if fault.raised_s is not None or seen_s < row.for_s or polls < row.polls:
+    if fault.raised_s is not None:
+        return replace(fault, now=seen, worst=_worst(row, seen, fault.worst, fault.cause or seen))
+    if seen_s < row.for_s or polls < row.polls:
         return fault
     strikes = fault.strikes
     if row.clear is Clear.BACKOFF:
         strikes = (*(t for t in strikes if f.now_s - t < STRIKES_S), f.now_s)
     latched = row.clear is Clear.RESET or len(strikes) > len(BACKOFF_S)
-    return replace(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes)
+    worst = _worst(row, seen, None, seen)
+    return replace(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes, now=seen, worst=worst)
+
+
+def _worst(row: Row, seen: Cause, worst: float | None, first: Cause) -> float | None:
+    """The worst value so far of the one figure of the evidence, where it has one, and is about the same as at first."""
+    names = [name for name in row.figures.split() if seen.param(name) is not None]
+    if len(names) != 1 or first.param(names[0]) is None:
+        return None
+    known: list[float] = [seen.param(names[0]), first.param(names[0]) if worst is None else worst]
+    return min(known) if row.lowest else max(known)
 
 
 def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMemory | None:
@@ -117,7 +127,7 @@ def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMem
     cause = fault.cause
     if row.past is not None and cause is not None and f.memory.state in UNVERIFIED and verified(f):
         cause = row.past(cause, row.for_s + clean_s - fault.raised_s)
-    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause)
+    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause, now=None)
 
 
 def clear_after_s(row: Row, fault: FaultMemory) -> float | None:
@@ -135,89 +145,29 @@ def effect(name: str, fault: FaultMemory) -> Effect:
 
 
 def raised(faults: Mapping[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
-    """The faults in force, worst effect first, then the oldest."""
+    """The faults in force, the most dangerous first."""
     live = [(name, fault) for name, fault in faults.items() if fault.raised_s is not None]
-    live.sort(key=lambda item: (-effect(*item), item[1].raised_s))
+    live.sort(key=lambda item: (-effect(*item), RANK[item[0]]))
     return live
-
-
-def shown(faults: Mapping[str, FaultMemory], now_s: float, *, at_rest: bool = False) -> tuple[ActiveFault, ...]:
-    """The faults in force: what was seen, and the id of what to do.
-
-    `at_rest`: the charger stands by, verified.
-    """
-    return tuple(
-        ActiveFault(name, effect(name, fault), _cause(ROW[name], fault, now_s, at_rest=at_rest), fault.raised_s or 0.0)
-        for name, fault in raised(faults)
-    )
-
-
-def _cause(row: Row, fault: FaultMemory, now_s: float, *, at_rest: bool) -> Cause:
-    """What a person reads of it: the evidence, the advice, and what bears on either."""
-    more: dict[str, object] = {"effect": effect(row.id, fault).name}
-    if fault.latched and row.clear is not Clear.RESET:
-        more["strikes"] = len(fault.strikes)
-    if row.moment:
-        more["ago_min"] = _whole_min(now_s - (fault.raised_s or 0.0))
-    return (fault.cause or Cause(row.id)).with_(row.at_rest if at_rest and row.at_rest else row.id, **more)
-
-
-def _whole_min(age_s: float) -> int:
-    return round(age_s / MINUTE_S) if age_s >= MINUTE_S else 0
-
-
-def goes_on(f: Facts) -> Cause | None:
-    """When a bay goes on whose worst fault has a backoff, or what a person types for that.
-
-    None for all other faults, whose own words say it. Made anew in each step, and part of no fault: who looks for news
-    compares ids.
-    """
-    name, fault = raised(f.memory.faults)[0]
-    if ROW[name].clear is not Clear.BACKOFF:
-        return None
-    if fault.latched:
-        return Cause.of("goes_on_by_reset", bay=f.rules.bay.name) if fault.clean_s is not None else None
-    others = [(one, other) for one, other in raised(f.memory.faults) if effect(one, other) >= Effect.NO_START]
-    lefts_s = [_left_s(ROW[one], other, f.now_s) for one, other in others]
-    own_s, strike = _left_s(ROW[name], fault, f.now_s), max(len(fault.strikes), 1)
-    if own_s is None:
-        wait_s = clear_after_s(ROW[name], fault)
-        return Cause.of("goes_on_after", wait_s=wait_s, strike=strike, of=len(BACKOFF_S))
-    known_s = [left_s for left_s in lefts_s if left_s is not None]
-    id_ = "goes_on_in_at_the_earliest" if len(known_s) < len(lefts_s) else "goes_on_in"
-    return Cause.of(id_, left_s=ceil(max(known_s)), strike=strike, of=len(BACKOFF_S))
-
-
-def _left_s(row: Row, fault: FaultMemory, now_s: float) -> float | None:
-    """After how long a fault clears by itself, by what is known now."""
-    wait_s = clear_after_s(row, fault)
-    return None if wait_s is None or fault.clean_s is None else max(0.0, wait_s - (now_s - fault.clean_s))
 
 
 def release(
     faults: Mapping[str, FaultMemory], now_s: float, *, by_reset: bool
-) -> tuple[dict[str, FaultMemory], list[Cause]]:
+) -> tuple[dict[str, FaultMemory], list[str]]:
     """Clear what a person may clear: by a reset everything, by a start what waits for a start.
 
-    Returns the faults that are left and the causes why some of them cannot be cleared; then none is.
+    Returns the faults that are left, and those that cannot be cleared now; then none is.
     """
-    waiting = {
-        name: fault
-        for name, fault in faults.items()
-        if fault.raised_s is not None and clear_after_s(ROW[name], fault) is None
-    }
-    causes = [cause for name, fault in waiting.items() if (cause := _kept_by(name, fault, now_s, by_reset=by_reset))]
-    left = {name: fault for name, fault in faults.items() if causes or name not in waiting}
-    return left, causes
+    waiting = {name for name, fault in raised(faults) if clear_after_s(ROW[name], fault) is None}
+    kept = in_the_way(faults, now_s, by_reset=by_reset)
+    return {name: fault for name, fault in faults.items() if kept or name not in waiting}, kept
 
 
-def _kept_by(name: str, fault: FaultMemory, now_s: float, *, by_reset: bool) -> Cause | None:
-    """Why a person may not clear this fault now; None if they may."""
-    row = ROW[name]
-    if not by_reset and fault.latched:
-        return Cause.of("needs_reset", fault=name, what=fault.cause)
-    if fault.clean_s is None:
-        return Cause.of("still_there", fault=name, what=fault.cause)
-    if now_s - fault.clean_s < row.clean_s:
-        return Cause.of("gone_first", fault=name, clean_s=row.clean_s)
-    return None
+def in_the_way(faults: Mapping[str, FaultMemory], now_s: float, *, by_reset: bool) -> list[str]:
+    """The faults for which a person cannot start, or reset, now, the most dangerous first."""
+    return [
+        name
+        for name, fault in raised(faults)
+        if clear_after_s(ROW[name], fault) is None
+        and ((fault.latched and not by_reset) or fault.clean_s is None or now_s - fault.clean_s < ROW[name].clean_s)
+    ]

@@ -31,6 +31,8 @@ class FaultMemory:
     cause: Cause | None = None  #: what was seen when it was raised
     latched: bool = False  #: a person must reset it
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
+    now: Cause | None = None  #: what was seen at the last look; None: it was not there
+    worst: float | None = None  #: the worst value of its one figure since it was raised, if it has one
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +176,7 @@ PART_OF = {one.name: part for part in FLAT for one in fields(PARTS[part])}
 RECORDS: Mapping[type[Any], Mapping[Kind, tuple[str, ...]]] = {
     FaultMemory: {
         Kind.EVENT: ("present", "raised_s", "clean_s", "latched", "strikes"),
-        Kind.MEASURED: ("seen_s", "polls", "poll_t_s", "cause"),
+        Kind.MEASURED: ("seen_s", "polls", "poll_t_s", "cause", "now", "worst"),
     },
     Session: {
         Kind.EVENT: ("rise_v", "full"),

@@ -8,6 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from orchestrator.core import latches
+from orchestrator.core.active import evidence, times
+from orchestrator.core.acts import RESETS_S, act, refused_for, refusing
+from orchestrator.core.faults import ROW
 from orchestrator.core.memory import FaultMemory, Memory, Operator
 from orchestrator.core.parts import changed
 from orchestrator.core.safestop import LASTS_S
@@ -16,8 +19,6 @@ from orchestrator.model import Cause, Request, State
 from orchestrator.model.cause import together
 
 STOPPED = Cause("operator_stop")
-#: So many resets of one fault are allowed within this time.
-MAX_RESETS, RESETS_S = 3, 3600.0
 RESET = Cause("operator_reset")
 #: The holds that are an operator's own doing.
 OWN = frozenset({STOPPED, RESET})
@@ -33,14 +34,14 @@ class Heard:
     refusal: Cause | None = None
 
 
-def hear(memory: Memory, request: Request, now_s: float, unkept: Cause | None = None) -> Heard:
-    """What becomes of the request.
+def hear(memory: Memory, request: Request, now_s: float, unkept: Cause | None = None, bay: str = "BAY") -> Heard:
+    """What becomes of the request; `bay` is the name for commands.
 
     What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
     """
     if unkept is not None and request in (Request.START, Request.RESET):
-        return _refused(memory, Cause.of("not_done", problem=unkept))
-    return VERBS[request](memory, now_s)
+        return _refused(memory, Cause.of("not_done", advice="unkept", problem=unkept))
+    return VERBS[request](memory, now_s, bay)
 
 
 def stopped(known: Operator) -> Operator:
@@ -52,11 +53,11 @@ def _refused(memory: Memory, why: Cause) -> Heard:
     return Heard(memory.operator, memory.faults, why)
 
 
-def _stop(memory: Memory, _now_s: float) -> Heard:
+def _stop(memory: Memory, _now_s: float, _bay: str) -> Heard:
     return Heard(stopped(memory.operator), memory.faults)
 
 
-def _pause(memory: Memory, _now_s: float) -> Heard:
+def _pause(memory: Memory, _now_s: float, _bay: str) -> Heard:
     latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
     if latched:  # its reset leads to a start, which would end the pause
         return _refused(memory, Cause.of("reset_first", faults=latched))
@@ -65,45 +66,55 @@ def _pause(memory: Memory, _now_s: float) -> Heard:
     return Heard(changed(memory.operator, paused=True), memory.faults)
 
 
-def _start(memory: Memory, now_s: float) -> Heard:
+def _start(memory: Memory, now_s: float, bay: str) -> Heard:
     if memory.state is State.UNCONTROLLABLE:
         return _refused(memory, OUT_OF_CONTROL)
-    before, known = memory.faults, memory.operator
-    faults, refusals = latches.release(before, now_s, by_reset=False)
-    if refusals:
+    if refusals := _refusals(memory, now_s, bay, Request.START):
         return _refused(memory, together(refusals))
+    before, known = memory.faults, memory.operator
+    faults, _ = latches.release(before, now_s, by_reset=False)
     if not (known.hold or known.paused) and len(faults) == len(before) and memory.state not in AT_WORK:
         return _refused(memory, Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause))
     return Heard(changed(known, hold=None, paused=False), faults)
 
 
-def _reset(memory: Memory, now_s: float) -> Heard:
+def _reset(memory: Memory, now_s: float, bay: str) -> Heard:
     if memory.state is State.UNCONTROLLABLE:
         return _refused(memory, OUT_OF_CONTROL)
-    before, known = memory.faults, memory.operator
-    faults, refusals = latches.release(before, now_s, by_reset=True)
-    cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
-    resets = tuple(reset for reset in known.resets if now_s - reset[0] < RESETS_S)
-    refusals = refusals or [cause for name in cleared if (cause := _too_often(name, resets, now_s))]
-    if refusals:
+    if refusals := _refusals(memory, now_s, bay, Request.RESET):
         return _refused(memory, together(refusals))
+    before, known = memory.faults, memory.operator
+    faults, _ = latches.release(before, now_s, by_reset=True)
     if len(faults) == len(before):
         return _refused(memory, Cause.of("nothing_to_reset", state=memory.state.value, what=memory.cause))
+    cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
+    resets = tuple(reset for reset in known.resets if now_s - reset[0] < RESETS_S)
     resets += tuple((now_s, name) for name in cleared)
     # in whatever state: the way on is a start, also while the stop is verified
     return Heard(changed(known, hold=RESET, resets=resets), faults)
 
 
-def _too_often(name: str, resets: tuple[tuple[float, str], ...], now_s: float) -> Cause | None:
-    """FAULTS P6: what comes again after every reset is not mended by resetting it."""
-    times = [t_s for t_s, fault in resets if fault == name]
-    if len(times) < MAX_RESETS:
-        return None
-    wait_min = (times[-MAX_RESETS] + RESETS_S - now_s) / 60
-    return Cause.of("reset_too_often", fault=name, times=len(times), wait_min=wait_min)
+def _refusals(memory: Memory, now_s: float, bay: str, request: Request) -> list[Cause]:
+    """Why it cannot be done now, and until when: of each fault that stands in the way, and what to do about it."""
+    return [
+        Cause.of("refused", fault=name, why=why, what=_what(memory, name), then=_first(memory, now_s, bay, name, why))
+        for name in refusing(memory, now_s, request)
+        if (why := refused_for(memory, now_s, name, request)) is not None
+    ]
 
 
-VERBS: Mapping[Request, Callable[[Memory, float], Heard]] = {
+def _what(memory: Memory, name: str) -> Cause:
+    row, fault = ROW[name], memory.faults[name]
+    return evidence(row, fault).with_(**dict(times(row, fault)))
+
+
+def _first(memory: Memory, now_s: float, bay: str, name: str, why: Cause) -> Cause | None:
+    """What ends it, where that is something else than the wait for which the request was refused."""
+    ends = act(memory, now_s, bay, name)
+    return None if ends.same_as(why) else ends
+
+
+VERBS: Mapping[Request, Callable[[Memory, float, str], Heard]] = {
     Request.START: _start,
     Request.PAUSE: _pause,
     Request.STOP: _stop,

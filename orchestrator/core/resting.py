@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-from orchestrator.core import latches
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import full_due, goes_on, target
@@ -28,7 +27,7 @@ def _trips(f: Facts, faults: Faults) -> Found:
     worst = faults[0] if faults else None
     if worst is None or worst.effect is not Effect.TRIP or (_lost(f) and f.memory.state is not State.TRIPPED):
         return None
-    return Trigger.TRIP, _then(worst.cause, latches.goes_on(f))
+    return Trigger.TRIP, worst.told
 
 
 def _lost(f: Facts) -> bool:
@@ -39,9 +38,9 @@ def _loses(f: Facts, _faults: Faults) -> Found:
     return (Trigger.LOSE, offline(f)) if _lost(f) else None
 
 
-def _waits(f: Facts, faults: Faults) -> Found:
+def _waits(_f: Facts, faults: Faults) -> Found:
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
-    return (Trigger.HOLD, waits.cause.with_(how=_start(f))) if waits is not None else None  # its advice ends with that
+    return (Trigger.HOLD, waits.told) if waits is not None else None
 
 
 def _holds(f: Facts, _faults: Faults) -> Found:
@@ -79,11 +78,11 @@ def _charged(f: Facts, _faults: Faults) -> Found:
     return (Trigger.REST, why) if f.soc is not None else None
 
 
-def _barred(f: Facts, faults: Faults) -> Found:
+def _barred(_f: Facts, faults: Faults) -> Found:
     worst = faults[0] if faults else None
     if worst is None or worst.effect < Effect.NO_START:
         return None
-    return Trigger.SUSPEND, _then(worst.cause, latches.goes_on(f))
+    return Trigger.SUSPEND, worst.told
 
 
 def _remains(f: Facts, _faults: Faults) -> Found:
@@ -104,10 +103,6 @@ PLACES: tuple[Callable[[Facts, Faults], Found], ...] = (
     _barred,  # it goes on by itself, once nothing keeps it from charging
     _remains,  # what the battery wants
 )
-
-
-def _then(cause: Cause, then: Cause | None) -> Cause:
-    return cause.with_(then=then) if then is not None else cause
 
 
 def held(f: Facts, hold: Cause) -> Cause:

@@ -4,6 +4,7 @@ facts → what has lasted → the operator's request → faults → the trigger,
 """
 
 from orchestrator.core import latches, limits, rows
+from orchestrator.core.active import active_faults
 from orchestrator.core.alarm import alarm
 from orchestrator.core.contactor import closes
 from orchestrator.core.course import course
@@ -58,13 +59,13 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     f = update_history(f, now_s - memory.last_s if memory.last_s is not None else 0.0)
     refusal: Cause | None = None
     if snapshot.request is not None:
-        heard = hear(f.memory, snapshot.request, now_s, snapshot.unkept)
+        heard = hear(f.memory, snapshot.request, now_s, snapshot.unkept, rules.bay.name)
         refusal = heard.refusal
         f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
     known = latches.update(f)
     if known is not f.memory.faults:
         f = f.with_memory(changed(f.memory, faults=known))
-    faults = latches.shown(known, now_s, at_rest=stands_by(f)) if known else ()
+    faults = active_faults(f.memory, now_s, rules.bay.name, f, at_rest=stands_by(f)) if known else ()
     f, cause, ended = _move(f, faults)
     f, setpoint, chosen = _setpoint(f, faults)
     command, sequence = _order(f, setpoint, faults)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import Any
 
 from orchestrator.model.battery import BatteryLink, BatteryReading
 from orchestrator.model.cause import Cause
@@ -83,8 +84,18 @@ class ActiveFault:
 
     id: str
     effect: Effect
-    cause: Cause  #: what, with its evidence, and what to do
+    cause: Cause  #: what, with its evidence as it is now, or as it was if it is gone, and what to do
     since_s: float
+    gone_s: float | None = None  #: since when what raised it is gone; None: it is there
+    next: Cause | None = None  #: what ends it: a command, a time, or what must happen first
+    raised: Cause | None = None  #: the evidence alone, as it was when it was raised
+    when: tuple[tuple[str, Any], ...] = ()  #: its times and figures, as parameters of a cause
+
+    @property
+    def told(self) -> Cause:
+        """All that a person reads of it: `cause` with its times and figures, and what ends it."""
+        then = {"then": self.next} if self.next is not None else {}
+        return self.cause.with_("", **dict(self.when), **then)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +172,7 @@ class Decision:
     command: Command | None = None  #: standing order for the charger's port; None: only poll
     setpoint: Setpoint = STANDBY
     step: Step | None = None  #: while energised
-    faults: tuple[ActiveFault, ...] = ()  #: worst first
+    faults: tuple[ActiveFault, ...] = ()  #: the most dangerous first
     alarm: Alarm = Alarm.NONE
     closed: bool = False  #: the contactor between charger and battery is to be closed
     session: Session | None = None  #: running, or just ended (`result` set, in this one decision)

@@ -32,6 +32,7 @@ from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status, contactor_fields
 from orchestrator.service.store import Store
+from orchestrator.service.wallclock import WallClock
 
 #: A bay without news is looked at this often; what has gone stale is noticed within it.
 TICK_S = 0.2
@@ -129,6 +130,7 @@ class BayRunner:
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         for one in asked:
             answer, changed = self.decision.answer if self.decision else None, self._revision != before
+            answer = WallClock(now_s, time()).told(answer)
             self._answers.give(one, answer, self._revision, now_s, changed=changed)
         self._answers.look(now_s)
 
@@ -142,7 +144,7 @@ class BayRunner:
         try:
             snapshot, memory = replace(self._snapshot, request=request), self._memory
             memory = memory or self._store.past(self.place).memory(now_s)
-            self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)
+            self.decision, self._memory = carry_on(now_s, snapshot, memory, internal, self.name)
             self._keep(self._memory, now_s)
         except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
             self.decision = Decision(State.STOPPING, Cause.of("failed", error=internal), STOP, alarm=Alarm.DANGER)
@@ -158,21 +160,23 @@ class BayRunner:
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
         self.decision, self._internal, self.last_s = decision, "", now_s
-        lines = list(decision_lines(before, decision, self._language)) if before is None or decision != before else []
+        clock, lines = WallClock(now_s, time()), []
+        if before is None or decision != before:
+            lines = list(decision_lines(before, decision, self._language, clock))
         if self._recorder is not None:
             recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
             lines += [recorded] if recorded is not None else []
         for line in lines:
             self._journal.put(self.name, line)
         if before is None or before.state is not decision.state:
-            self._say(self._transition(before, decision))
+            self._say(self._transition(before, decision, clock))
         self._keep(self._memory, now_s)
 
-    def _transition(self, before: Decision | None, now: Decision) -> Cause:
-        state = now.state.value
+    def _transition(self, before: Decision | None, now: Decision, clock: WallClock) -> Cause:
+        state, reason = now.state.value, clock.told(now.cause)
         if before is None:
-            return Cause.of("bay_begins", bay=self.name, state=state, reason=now.cause)
-        return Cause.of("bay_goes", bay=self.name, before=before.state.value, state=state, reason=now.cause)
+            return Cause.of("bay_begins", bay=self.name, state=state, reason=reason)
+        return Cause.of("bay_goes", bay=self.name, before=before.state.value, state=state, reason=reason)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """All that is known of the bay now."""

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import asdict, fields, is_dataclass, replace
 
 from orchestrator.config.station import Bay
 from orchestrator.core.memory import Memory, side_by_side
@@ -23,6 +23,7 @@ from orchestrator.model import (
     Step,
 )
 from orchestrator.model.cause import plain
+from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import say
 
 Line = tuple[str, dict[str, object]]  #: kind, fields
@@ -40,17 +41,29 @@ DEEP = frozenset({Cause, tuple, dict})
 WHOLE_EVERY = 250
 
 
-def decision_lines(before: Decision | None, now: Decision, language: str = "en") -> Iterator[Line]:
-    """What has changed from one decision to the next, for programs and, in `language`, for people."""
-    cause = {"reason": say(now.cause, language), "cause": plain(now.cause)}
+def decision_lines(
+    before: Decision | None, now: Decision, language: str = "en", clock: WallClock | None = None
+) -> Iterator[Line]:
+    """What has changed from one decision to the next, for programs and, in `language`, for people.
+
+    A line has its own time, on both clocks: only sentences need the time of day (`clock`).
+    """
+
+    def why() -> dict[str, object]:
+        return {"reason": say(_at(clock, now.cause), language), "cause": plain(now.cause)}
+
     if before is None or now.state is not before.state:
-        yield "transition", {"from": before.state if before else None, "to": now.state, **cause}
+        yield "transition", {"from": before.state if before else None, "to": now.state, **why()}
     if before is None or now.command != before.command:
         yield "command", command_fields(now.command)
     yield from _fault_lines(before, now, language)
-    yield from _session_lines(before, now, language)
+    yield from _session_lines(before, now, language, clock)
     if before is None or _gist(now) != _gist(before):
-        yield "decision", {"state": now.state, **cause, "step": _step_fields(now.step, language)}
+        yield "decision", {"state": now.state, **why(), "step": _step_fields(now.step, language)}
+
+
+def _at(clock: WallClock | None, cause: Cause | None) -> Cause | None:
+    return cause if clock is None else clock.told(cause)
 
 
 def command_fields(command: Command | None) -> dict[str, object]:
@@ -88,21 +101,22 @@ def _fault_lines(before: Decision | None, now: Decision, language: str) -> Itera
         if name not in old or old[name].effect is not fault.effect:
             yield "fault", _fault_fields(fault, "raised", language)
     for name, fault in old.items():
-        if name not in new:
-            yield "fault", _fault_fields(fault, "cleared", language)
+        if name not in new:  # what it was; what was seen of it last, nobody may have written down
+            was = (fault.raised or fault.cause).with_(past=True)
+            yield "fault", _fault_fields(replace(fault, cause=was), "cleared", language)
 
 
-def _session_lines(before: Decision | None, now: Decision, language: str) -> Iterator[Line]:
+def _session_lines(before: Decision | None, now: Decision, language: str, clock: WallClock | None) -> Iterator[Line]:
     was = before.session if before and before.session and not before.session.result else None
     if now.session is None:
         return
     if was is None and not now.session.result:
-        yield "session", {"event": "begin", **session_fields(now.session, language)}
+        yield "session", {"event": "begin", **session_fields(now.session, language, clock)}
     elif now.session.result:
-        yield "session", {"event": "end", **session_fields(now.session, language)}
+        yield "session", {"event": "end", **session_fields(now.session, language, clock)}
 
 
-def session_fields(session: Session, language: str = "en") -> dict[str, object]:
+def session_fields(session: Session, language: str = "en", clock: WallClock | None = None) -> dict[str, object]:
     """A session in figures that a person can read."""
     return {
         "elapsed_s": round(session.elapsed_s, 1),
@@ -112,7 +126,7 @@ def session_fields(session: Session, language: str = "en") -> dict[str, object]:
         "soc_start_pct": session.soc_start_pct,
         "soc_pct": session.soc_pct,
         "step_changes": session.step_changes,
-        "result": say(session.result, language),
+        "result": say(_at(clock, session.result), language),
         "cause": plain(session.result) if session.result else None,
     }
 

@@ -21,6 +21,7 @@ from orchestrator.model import (
 )
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.records import command_fields, session_fields
+from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import fields, say
 
 #: What of a charger's reading the status shows; `t_s` is when it was asked for, in monotonic seconds of this machine.
@@ -36,12 +37,13 @@ def bay_status(
 
     Each cause stands there as data; `reason`, `text`, `step_rule` and `result` say it in `language`.
     """
-    step, session = decision.step, decision.session
+    step, session, clock = decision.step, decision.session, WallClock(now_s, wall_s)
+    cause = clock.told(decision.cause)
     return {
         "name": name,
         "state": decision.state,
-        "reason": say(decision.cause, language),
-        "cause": fields(decision.cause, language),
+        "reason": say(cause, language),
+        "cause": fields(cause, language),
         "step": step.index if step else None,
         "step_current_a": step.current_a if step else None,
         "step_rule": say(step.rule, language) if step else "",
@@ -59,19 +61,25 @@ def bay_status(
             **_problem(snapshot.battery_link.problem, language),
             **_battery(snapshot.battery, now_s),
         },
-        "faults": [_fault(fault, wall_s - (now_s - fault.since_s), language) for fault in decision.faults],
+        "faults": [_fault(fault, clock, language) for fault in decision.faults],
         "alarm": _level(decision.alarm),
-        "session": session_fields(session, language) if session else None,
+        "session": session_fields(session, language, clock) if session else None,
     }
 
 
-def _fault(fault: ActiveFault, since: float, language: str) -> dict[str, object]:
+def _fault(fault: ActiveFault, clock: WallClock, language: str) -> dict[str, object]:
+    """`since`, `gone_since` and `clears_at` are Unix time; `clears` is what ends it: a command, a time, a condition."""
+    told, ends = clock.told(fault.told), clock.told(fault.next)
+    until_s = fault.next.param("until_t_s") if fault.next is not None else None
     return {
         "id": fault.id,
         "effect": fault.effect.name,
-        "cause": fields(fault.cause, language),
-        "text": say(fault.cause, language),
-        "since": round(since, 3),
+        "cause": fields(told, language),
+        "text": say(told, language),
+        "since": round(clock.unix_s(fault.since_s), 3),
+        "gone_since": round(clock.unix_s(fault.gone_s), 3) if fault.gone_s is not None else None,
+        "clears": fields(ends, language),
+        "clears_at": round(clock.unix_s(until_s), 3) if until_s is not None else None,
     }
 
 

@@ -91,12 +91,12 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
-    from orchestrator.show import own_language, page
+    from orchestrator.show import own_language, own_width, page
 
     if as_json:
         print(json.dumps(document, ensure_ascii=False), flush=True)
         return
-    text = page(document, own_language())
+    text = page(document, own_language(), own_width())
     print(f"\x1b[H\x1b[2J{document['station']}\n{text}" if clear else text, flush=True)
 
 

@@ -5,12 +5,17 @@ figures. What an advice adds stands in a frame; `where` stands before it all, `t
 of numbers there are five of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
 `then` (how the parts of a list are joined), `after` (a cause, if there is one, after what stands before it).
 
+What is gone is said in the past tense: a template has both, `{reports|reported}`, and the cause says which is true
+(`past`). Moments are the time of day by the time they come here, in parameters called `…_at`. A cause from the core,
+which knows no clock, has them in seconds, called `…_t_s`.
+
 `say` never raises, whatever it is given: what it is asked for is often the reason of a stop. A cause that is not known,
 of an older or newer version say, or lacks something, is shown as its data.
 """
 
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain
@@ -35,6 +40,10 @@ from orchestrator.text.ko.words import WORDS as KO_WORDS
 
 #: Of a cause that a fault has made, what it does: such a sentence begins with what to do.
 TRIP = "TRIP"
+#: The present and the past of what stands in a template: {reports|reported}.
+TENSES = re.compile(r"\{([^{}|]*)\|([^{}|]*)\}")
+#: What a moment is called that is not the time of day yet, and what a template calls it.
+MOMENT, TIME_OF_DAY = "_t_s", "_at"
 #: Formats that are not those of a number.
 JOINS = {"": "list", "word": "list", "and": "and", "then": "then"}
 #: No sentence is longer, whatever stands in its parameters.
@@ -49,16 +58,24 @@ class Language:
     advice: Mapping[str, str]
     words: Mapping[str, str]
     frames: Mapping[str, str]
+    past: Mapping[str, str]  #: the texts, in the past tense
+
+
+def _language(
+    texts: Mapping[str, str], advice: Mapping[str, str], words: Mapping[str, str], frames: Mapping[str, str]
+) -> Language:
+    present, past = ({id_: TENSES.sub(tense, text) for id_, text in texts.items()} for tense in (r"\1", r"\2"))
+    return Language(present, advice, words, frames, past)
 
 
 LANGUAGES: Mapping[str, Language] = {
-    "en": Language(
+    "en": _language(
         {**EN_FAULTS, **EN_BAYS, **EN_LIMITS, **EN_LINKS, **EN_SERVICE},
         EN_ADVICE,
         {**EN_WORDS, **EN_CODES},
         EN_FRAMES,
     ),
-    "ko": Language(
+    "ko": _language(
         {**KO_FAULTS, **KO_BAYS, **KO_LIMITS, **KO_LINKS, **KO_SERVICE},
         KO_ADVICE,
         {**KO_WORDS, **KO_CODES},
@@ -92,19 +109,30 @@ def advise(id_: str, language: str = "en") -> str:
 
 
 def _sentence(cause: Cause, texts: Language) -> str:
-    params = _Params(cause, texts)
-    what, frames = texts.texts[cause.id].format_map(params), texts.frames
-    what = frames["where"].format(where=params["where"], what=what) if "where" in params else what
-    tripped = params.get("effect") == _Value(TRIP, texts)
-    if "ago_min" in params and not tripped:
-        what = frames["ago" if cause.param("ago_min") else "just_now"].format(what=what, ago_min=params["ago_min"])
+    params, frames = _Params(cause, texts), texts.frames
+    what = _evidence(cause, texts, params)
     if cause.advice:
-        do = texts.advice[cause.advice].format_map(params)
+        tripped, do = params.get("effect") == _Value(TRIP, texts), texts.advice[cause.advice].format_map(params)
         if "strikes" in params:
             do = frames["strikes"].format(do=do, strikes=params["strikes"])
         what = frames["trip" if tripped else "advice"].format(do=do, what=what)
     what = f"{what}{params['then']:after}" if "then" in params else what
     return f"{what}: {params['how']}" if "how" in params else what
+
+
+def _evidence(cause: Cause, texts: Language, params: "_Params") -> str:
+    """What is, or was, with its times and with its figures then, at the worst, and now."""
+    past = replace(texts, texts=texts.past) if cause.param("past") is True else texts
+    what, frames = past.texts[cause.id].format_map(_Params(cause, past) if past is not texts else params), texts.frames
+    what = frames["where"].format(where=params["where"], what=what) if "where" in params else what
+    if "raised_at" in params:
+        what = frames["at"].format(what=what, raised_at=params["raised_at"])
+    notes = []
+    if "since_at" in params:
+        notes.append(frames["was" if "was" in params else "since"].format_map(params))
+    notes += [str(params["worst"])] if "worst" in params else []
+    notes += [frames["now"].format_map(params)] if "now" in params else []
+    return f"{what}{frames['then']}{frames['list'].join(notes)}" if notes else what
 
 
 def _data(cause: Cause, texts: Language) -> str:
@@ -128,6 +156,9 @@ class _Params(dict[str, "_Value"]):
 
     def __init__(self, cause: Cause, texts: Language) -> None:
         super().__init__((name, _Value(value, texts)) for name, value in cause.params)
+        for name, value in cause.params:
+            if name.endswith(MOMENT) and isinstance(value, int | float):
+                self[f"{name.removesuffix(MOMENT)}{TIME_OF_DAY}"] = _Value(f"{value:.0f} s", texts)
         self["at"] = _Value(f" ({cause.place})" if cause.place else "", texts)
         self["place"] = _Value(cause.place, texts)
 
@@ -138,6 +169,9 @@ class _Value:
 
     value: object
     texts: Language
+
+    def __str__(self) -> str:
+        return format(self, "")
 
     def __format__(self, form: str) -> str:
         value, texts = self.value, self.texts

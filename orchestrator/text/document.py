@@ -57,5 +57,12 @@ def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
         **{name: _problem(bay[name], language) for name in parts if bay.get(name)},
         "reason": said(bay.get("cause"), bay["reason"], language),
         "step_rule": said(bay.get("step_cause"), bay.get("step_rule", ""), language),
-        "faults": [{**one, "text": said(one.get("cause"), one["text"], language)} for one in bay["faults"]],
+        "faults": [_fault(one, language) for one in bay["faults"]],
     }
+
+
+def _fault(fault: Mapping[str, Any], language: str) -> dict[str, Any]:
+    told = {**fault, "text": said(fault.get("cause"), fault["text"], language)}
+    if ends := fault.get("clears"):  # a service of an older version does not say it
+        told["clears"] = {**ends, "text": said(ends, ends["text"], language)}
+    return told

@@ -45,7 +45,8 @@ def test_a_charger_that_was_found_running_wants_a_person() -> None:
     world = running_at_the_start()
     decision = world.until(State.HELD)
     assert decision.alarm is Alarm.ATTENTION
-    assert reason_of(decision).endswith("find out why it ran, then start: orchestrator start bay-1")
+    assert "find out why it ran, then start; gone since " in reason_of(decision)
+    assert reason_of(decision).endswith(": orchestrator start bay-1")
     world.ask(Request.STOP)
     world.run(1)
     assert world.decision.alarm is Alarm.ATTENTION  # whatever else holds it

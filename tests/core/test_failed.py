@@ -183,7 +183,7 @@ def test_a_rule_that_raises_trips_its_bay_and_takes_no_other_with_it(monkeypatch
         assert other in world.raised
         world.until(State.TRIPPED, 15.0)
         if row.where >= set(State) - {State.STOPPING}:
-            assert "internal is still there" in world.ask(Request.RESET)
+            assert "internal: reset is refused while it lasts: " in world.ask(Request.RESET)
         monkeypatch.undo()
         world.shows.clear()
         world.run(15)

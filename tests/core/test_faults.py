@@ -62,7 +62,7 @@ def test_every_predicate_is_in_the_table_and_says_where_it_comes_from() -> None:
         for name, function in inspect.getmembers(module, inspect.isfunction)
         if function.__module__ == module.__name__ and not name.startswith("_")
     }
-    others = {obedience.did_not_stop}  # words, no predicate
+    others = {obedience.did_not_stop, state_of_charge.jump_ends_s, state_of_charge.exchange_ends_s}  # no predicates
     assert {row.check for row in FAULTS} - {standby.current_without_order} == predicates - others
     assert all(function.__doc__ for function in predicates)
 
@@ -142,7 +142,7 @@ def test_it_leads_where_its_effect_says(scene: Scene) -> None:
         lowest = scene.then is not State.CHARGING or effect_of(scene) >= Effect.LIMIT
         assert (world.decision.step is not None and world.decision.step.index == 0) is lowest
     elif effect_of(scene) >= Effect.NO_START and scene.then not in (State.UNCONTROLLABLE, State.OFFLINE):
-        assert world.raised[scene.fault] in reason_of(world.decision) or world.decision.faults[0].id != scene.fault
+        assert world.told[scene.fault] in reason_of(world.decision) or world.decision.faults[0].id != scene.fault
 
 
 DEBOUNCED = [scene for scene in SCENES if scene.lapse and scene.after_s > TICK_S]
@@ -199,7 +199,10 @@ def test_it_waits_for_a_start(scene: Scene) -> None:
     world = healed(scene)
     world.run(30)
     assert world.is_in(State.HELD)
-    assert reason_of(world.decision) == f"{world.raised[scene.fault]}: orchestrator start bay-1"
+    assert reason_of(world.decision) == world.told[scene.fault]
+    assert world.told[scene.fault].endswith(
+        f"; gone since {world.memory.faults[scene.fault].clean_s:.0f} s: orchestrator start bay-1"
+    )
     assert world.ask(Request.START) == ""
     assert not world.raised
     world.until(State.CHARGING)
@@ -211,11 +214,11 @@ def test_it_waits_for_a_reset_and_then_for_a_start(scene: Scene) -> None:
     row, text = ROW[scene.fault], scene.fault
     if row.clean_s:
         refused = world.ask(Request.RESET)
-        assert f"{text} must be gone for {row.clean_s:g} s first" in refused or world.is_in(State.UNCONTROLLABLE)
+        assert f"reset is refused for another {row.clean_s:g} s: " in refused or world.is_in(State.UNCONTROLLABLE)
         assert refused
     world.run(30)
     assert world.is_in(State.TRIPPED)
-    assert f"{text} is latched and needs a reset" in world.ask(Request.START)
+    assert f"{text}: start is refused before a reset: " in world.ask(Request.START)
     assert world.ask(Request.RESET) == ""
     assert not world.raised
     world.run(30)

@@ -7,9 +7,11 @@ import pytest
 from orchestrator.core.latches import release
 from orchestrator.core.memory import FaultMemory
 from orchestrator.core.operator import hear
+from orchestrator.core.persisted import Persisted
 from orchestrator.model import Action, Cause, Connection, ControlMode, Effect, Request, State
+from orchestrator.service.records import decision_lines
 from tests.core.bays import charging, idle, stopping
-from tests.core.said import cause, reason_of, said, say
+from tests.core.said import cause, reason_of, say
 from tests.core.world import TICK_S, World, remembering
 
 
@@ -108,10 +110,11 @@ def test_backoffs_grow_and_the_fourth_strike_within_an_hour_latches() -> None:
     strike(world)
     world.until(State.TRIPPED, 5)
     assert world.decision.faults[0].effect is Effect.TRIP
-    assert "; it came 4 times within an hour: reset by a person – SOC 140 %" in reason_of(world.decision)
+    assert "; it came 4 times within an hour: reset by a person – at " in reason_of(world.decision)
+    assert " s, SOC 140 %; gone since " in reason_of(world.decision)
     world.run(2000, dt_s=1.0)
     assert world.is_in(State.TRIPPED)
-    assert "latched and needs a reset" in world.ask(Request.START)
+    assert world.ask(Request.START).startswith("implausible: start is refused before a reset: ")
     assert world.ask(Request.RESET) == ""
     assert world.ask(Request.START) == ""
     world.charging()
@@ -153,8 +156,8 @@ def test_a_start_does_not_skip_a_backoff() -> None:
     gone_s = strike(world)
     world.run(5)
     refused = world.ask(Request.START)
-    assert refused.startswith("nothing to start: SUSPENDED: SOC 140 %")
-    assert refused.endswith("; its cause is gone, goes on by itself in 15 s (1st of 3 within an hour)")
+    assert refused.startswith("nothing to start: SUSPENDED: at ")
+    assert refused.endswith("; gone since 1005 s, goes on by itself in 15 s (1st of 3 within an hour)")
     world.until(State.CHARGING)
     assert world.now_s - gone_s == 20 + TICK_S + 2
 
@@ -164,20 +167,18 @@ def test_a_backoff_says_when_it_goes_on_and_a_latch_what_to_type() -> None:
     for which, wait_s in (("1st", 20), ("2nd", 70), ("3rd", 310)):
         implausible(world)
         world.run(2)
-        told = f"goes on by itself {wait_s} s after its cause is gone ({which} of 3 within an hour)"
+        told = f"goes on by itself {wait_s} s after it is gone ({which} of 3 within an hour)"
         assert reason_of(world.decision).endswith(f"; {told}")
         implausible(world, seen=False)
         world.run(TICK_S + 6)
-        left = f"its cause is gone, goes on by itself in {wait_s - 6} s ({which} of 3 within an hour)"
-        assert reason_of(world.decision).endswith(f"; {left}")
+        left = f", goes on by itself in {wait_s - 6} s ({which} of 3 within an hour)"
+        assert reason_of(world.decision).endswith(left)
         assert all(told not in say(fault.cause) and left not in say(fault.cause) for fault in world.decision.faults)
         world.until(State.CHARGING, 400)
         world.charging()
     strike(world)
     world.run(1)
-    assert reason_of(world.decision).endswith(
-        "; its cause is gone: orchestrator reset bay-1, then orchestrator start bay-1"
-    )
+    assert reason_of(world.decision).endswith(" s: orchestrator reset bay-1, then orchestrator start bay-1")
 
 
 def test_a_trip_whose_charger_stands_by_asks_nobody_to_cut_its_mains() -> None:
@@ -190,20 +191,28 @@ def test_a_trip_whose_charger_stands_by_asks_nobody_to_cut_its_mains() -> None:
     for request in (Request.START, Request.RESET):
         assert world.ask(request).startswith("the charger was not seen to stop: cut its mains")
     world.deaf.clear()
-    said = "the charger stands by now: have the cause repaired, then reset – before, it did not obey the stop for 8 s"
+    said = (
+        "the charger stands by now: have the cause repaired, then reset – at 1008 s, it did not obey the stop for 8 s"
+    )
     world.until(State.TRIPPED, 15)
-    assert reason_of(world.decision) == said
+    world.tick()
+    assert reason_of(world.decision).startswith(f"{said}; gone since 1013 s: ")
     world.run(600, dt_s=1.0)
-    assert reason_of(world.decision) == said
+    assert reason_of(world.decision).startswith(f"{said}; gone since 1013 s: ")
 
 
-def test_a_jump_of_the_soc_is_told_with_how_long_ago() -> None:
+def test_a_jump_of_the_soc_is_told_with_when_it_was_and_until_when_it_counts() -> None:
     world = charging()
     world.values["soc_pct"] = 56.0
     world.tick()
-    assert world.raised["soc_jump"].startswith("the SOC went from 50 to 56 % in 0 s, just now; ")
-    world.run(180, dt_s=1.0)
-    assert world.raised["soc_jump"].startswith("the SOC went from 50 to 56 % in 0 s, 3 min ago; ")
+    jumped_s = world.now_s
+    for _ in range(2):
+        told = world.told["soc_jump"]
+        assert told.startswith(f"at {jumped_s:.0f} s, the SOC went from 50 to 56 % in 0 s; ")
+        assert told.endswith(f"; counts until {jumped_s + 905:.0f} s")
+        world.run(180, dt_s=1.0)
+    world.run(560, dt_s=1.0)
+    assert "soc_jump" not in world.raised
 
 
 @pytest.mark.parametrize(
@@ -314,14 +323,18 @@ def test_a_refused_request_changes_nothing() -> None:
     world = charging()
     world.internal = "ValueError()"
     world.battery_link = replace(world.battery_link, abort=cause("0x6004: no such object"), abort_code=0x06020000)
+    since_s = world.now_s + TICK_S
     world.run(2)
     assert world.is_in(State.TRIPPED)
-    assert world.ask(Request.RESET) == "sdo_refused is still there: 0x6004: no such object"
-    assert set(world.raised) == {"internal", "sdo_refused"}
-    assert world.ask(Request.START) == (
-        "sdo_refused is latched and needs a reset: 0x6004: no such object; "
-        "internal is latched and needs a reset: ValueError()"
+    assert world.ask(Request.RESET) == (
+        "sdo_refused: reset is refused while it lasts: check the object map against this BMU, then reset – "
+        f"0x6004: no such object; since {since_s:.0f} s"
     )
+    assert set(world.raised) == {"internal", "sdo_refused"}
+    refused = world.ask(Request.START)
+    assert refused.startswith("sdo_refused: start is refused before a reset: ")
+    assert "; internal: start is refused before a reset: " in refused
+    assert world.told["internal"].endswith(", but reset is refused because of sdo_refused")
     world.battery_link = replace(world.battery_link, abort=None, abort_code=0)
     world.tick()
     assert world.ask(Request.RESET) == ""
@@ -336,14 +349,14 @@ def test_each_that_keeps_a_reset_from_its_effect_is_named() -> None:
     assert world.is_in(State.TRIPPED)
     world.shows.clear()
     world.tick()
-    assert world.ask(Request.RESET) == (
-        "reverse_polarity must be gone for 5 s first; sdo_refused is still there: 0x6004: no such object"
-    )
+    refused = world.ask(Request.RESET)
+    assert ", reset is refused for another 5 s: correct the battery's polarity" in refused
+    assert "; sdo_refused: reset is refused while it lasts: " in refused
 
 
 def test_a_fault_is_gone_long_enough_at_the_very_moment() -> None:
     gone = {"reverse_polarity": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
-    assert release(gone, 6.75, by_reset=True) == (gone, [Cause.of("gone_first", fault="reverse_polarity", clean_s=5)])
+    assert release(gone, 6.75, by_reset=True) == (gone, ["reverse_polarity"])
     assert release(gone, 7.0, by_reset=True) == ({}, [])
 
 
@@ -354,13 +367,11 @@ def test_a_start_clears_only_what_waits_for_one() -> None:
         "illegal_value": FaultMemory(present=True, seen_s=1.0, polls=1),
         "volts_disagree": FaultMemory(present=True, seen_s=1.0),
     }
-    left, reasons = release(before, 3.0, by_reset=False)
-    assert reasons == []
+    left, kept = release(before, 3.0, by_reset=False)
+    assert kept == []
     assert set(left) == {"implausible", "illegal_value", "volts_disagree"}
-    left, reasons = release(
-        {**before, "system_stop": replace(before["system_stop"], clean_s=None)}, 3.0, by_reset=False
-    )
-    assert said(reasons) == ["system_stop is still there: mode 7"]
+    left, kept = release({**before, "system_stop": replace(before["system_stop"], clean_s=None)}, 3.0, by_reset=False)
+    assert kept == ["system_stop"]
     assert set(left) == set(before)
 
 
@@ -408,7 +419,7 @@ def test_a_cause_that_returns_with_the_reset_latches_again() -> None:
 # --- which one is shown first -----------------------------------------------------------------------------------------
 
 
-def test_the_worst_comes_first_then_the_oldest() -> None:
+def test_the_worst_comes_first_then_the_most_dangerous() -> None:
     world = idle()
     world.values["soh_pct"] = 50.0
     world.tick()
@@ -419,21 +430,88 @@ def test_the_worst_comes_first_then_the_oldest() -> None:
     world.tick()
     world.internal = "ValueError()"
     world.tick()
-    assert [fault.id for fault in world.decision.faults] == ["reverse_polarity", "internal", "implausible", "emergency",
+    assert [fault.id for fault in world.decision.faults] == ["reverse_polarity", "internal", "emergency", "implausible",
                                                              "soh_low"]  # fmt: skip
     assert [fault.effect for fault in world.decision.faults] == sorted(
         (fault.effect for fault in world.decision.faults), reverse=True
     )
 
 
-def test_a_text_is_what_was_seen_when_it_was_raised() -> None:
+def test_evidence_is_told_in_the_tense_that_is_true() -> None:
+    world = World(temperature_c=44.0).charging()
+    world.values["temperature_c"] = 45.3
+    world.tick()
+    raised_s = world.now_s
+    limit = "the limit is 45 °C (policies/li-ion-48v.yaml:21); it charges again below 40 °C"
+    do, by_itself = "let it cool down", "goes on by itself 10 s after it is gone"
+    assert world.told["over_temperature"] == f"the pack has 45.3 °C, {limit}; since {raised_s:.0f} s; {do}; {by_itself}"
+    for celsius, more in ((46.1, ""), (44.0, ", up to 46.1 °C")):
+        world.values["temperature_c"] = celsius
+        world.run(3)
+        seen, then = f"the pack has {celsius} °C, {limit}", f"45.3 °C at {raised_s:.0f} s{more}"
+        assert world.told["over_temperature"] == reason_of(world.decision) == f"{seen}; {then}; {do}; {by_itself}"
+    world.values["temperature_c"] = 41.0
+    world.run(2)
+    world.values["temperature_c"] = 39.8
+    world.tick()
+    gone_s = world.now_s
+    world.tick()
+    assert reason_of(world.decision) == (
+        f"at {raised_s:.0f} s, the pack had 45.3 °C, {limit}; up to 46.1 °C, 39.8 °C now; "
+        f"gone since {gone_s:.0f} s, goes on by itself in 10 s"
+    )
+    (fault,) = world.decision.faults
+    assert (fault.since_s, fault.gone_s) == (raised_s, gone_s)
+    assert fault.next == Cause.of(
+        "goes_on_in", gone_t_s=gone_s, left_s=10, until_t_s=gone_s + 10, strike=None
+    )  # fmt: skip
+
+
+def test_evidence_about_another_quantity_is_told_without_the_first_ones_figure() -> None:
     world = charging()
-    world.amps = 17.0
+    world.volts = 55.5
     world.run(0.5)
-    text = world.raised["over_current"]
-    world.amps = 19.0
-    world.run(0.25)
-    assert world.raised["over_current"] == text
+    world.volts, world.values["voltage_v"] = None, 55.8
+    world.shows["voltage_v"] = 50.0
+    world.run(2)
+    told = world.told["over_voltage"]
+    assert "55.80 V at the pack, the limit is 55.2 V" in told
+    assert "; since 1004 s; reset is refused while it lasts" in told
+
+
+def test_a_restart_forgets_no_first_figure() -> None:
+    world = World(temperature_c=44.0).charging()
+    world.values["temperature_c"] = 46.0
+    world.run(3)
+    world.memory = Persisted.of(world.memory, world.now_s).memory(world.now_s)
+    for celsius in (45.0, 43.0):
+        world.values["temperature_c"] = celsius
+        world.run(5)
+    assert "the pack has 43.0 °C, the limit is 45 °C" in world.told["over_temperature"]
+    assert "; 46.0 °C at 1004 s; let it cool down; " in world.told["over_temperature"]
+
+
+def test_a_figure_that_falls_is_told_at_its_lowest() -> None:
+    world = charging()
+    for celsius in (-0.5, -2.0, 1.0):
+        world.values["temperature_c"] = celsius
+        world.run(2)
+    assert "the pack has 1.0 °C, " in world.told["under_temperature"]
+    assert ", down to -2.0 °C; " in world.told["under_temperature"]
+
+
+def test_new_figures_of_a_fault_are_no_event() -> None:
+    world = charging()
+    world.values["temperature_c"] = 45.3
+    world.run(3)
+    before, kept = world.decision, Persisted.of(world.memory, world.now_s).gist
+    for celsius in (46.1, 47.0, 44.0):
+        world.values["temperature_c"] = celsius
+        world.tick()
+        assert list(decision_lines(before, world.decision)) == []
+        assert Persisted.of(world.memory, world.now_s).gist == kept
+        assert world.decision.cause.same_as(before.cause)
+        assert world.decision != before
 
 
 @pytest.mark.parametrize("again", [State.STOPPING, State.UNCONTROLLABLE])
@@ -469,11 +547,12 @@ def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:
     for _ in range(3):
         assert trip_and_reset(world) == ""
         world.run(590, dt_s=1.0)
-    refused = trip_and_reset(world)
-    assert "temperature_invalid was reset 3 times within an hour" in refused
-    assert "reset again in 30 min" in refused
+    refused, locked_s = trip_and_reset(world), world.memory.operator.resets[0][0] + 3600
+    assert refused.startswith(
+        f"temperature_invalid: reset is locked until {locked_s:.0f} s, because it was reset 3 times within an hour"
+    )
     assert world.is_in(State.TRIPPED)
-    assert "temperature_invalid is latched" in world.ask(Request.START)
+    assert "temperature_invalid: start is refused before a reset: " in world.ask(Request.START)
     world.run(1795, dt_s=1.0)
     assert world.ask(Request.RESET) != ""
     world.run(30)
@@ -481,10 +560,11 @@ def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:
 
 
 def test_an_hour_after_the_first_of_three_there_may_be_a_fourth() -> None:
-    latched = {"internal": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True)}
+    latched = {"internal": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True, cause=cause("KeyError()"))}
     memory = remembering(faults=latched, resets=tuple((1000.0 + t_s, "internal") for t_s in (0.0, 10.0, 20.0)))
-    assert "reset again in 59 min" in say(hear(memory, Request.RESET, 1060.0).refusal)
-    assert "reset again in 0 min" in say(hear(memory, Request.RESET, 4599.75).refusal)
+    for now_s in (1060.0, 4599.75):
+        refusal = hear(memory, Request.RESET, now_s).refusal
+        assert say(refusal).startswith("internal: reset is locked until 4600 s, because ")
     heard = hear(memory, Request.RESET, 4600.0)
     assert heard.refusal is None
     assert [t_s for t_s, _ in heard.operator.resets] == [1010.0, 1020.0, 4600.0]

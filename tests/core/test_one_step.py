@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from orchestrator.core import latches
+from orchestrator.core.active import active_faults
 from orchestrator.core.course import Next, course
 from orchestrator.core.facts import Facts
 from orchestrator.core.history import entered, update_history
@@ -40,7 +41,7 @@ from tests.core.world import bay
 
 
 def course_of(f: Facts) -> Next:
-    return course(f, latches.shown(f.memory.faults, f.now_s))
+    return course(f, active_faults(f.memory, f.now_s, "bay-1", f))
 
 
 def goes(f: Facts) -> tuple[Trigger | None, Cause]:
@@ -257,7 +258,7 @@ def test_a_value_counts_while_it_is_fresh_and_not_from_the_future(t_s: float, va
 
 
 def test_a_fault_of_the_first_moment_is_shown_from_then_on() -> None:
-    (fault,) = latches.shown({"soh_low": FaultMemory(raised_s=0.0)}, 9.0)
+    (fault,) = active_faults(Memory(faults={"soh_low": FaultMemory(raised_s=0.0)}), 9.0, "bay-1")
     assert fault.since_s == 0.0
 
 
@@ -335,7 +336,7 @@ LATCHES = (
          faults(soh_low=replace(DEBOUNCED, raised_s=ago(9), clean_s=ago(4.9)))),
     Edge(soh_low, FaultMemory(raised_s=ago(9), clean_s=NOW_S, poll_t_s=ago(1)),
          faults(soh_low=replace(DEBOUNCED, raised_s=ago(9)))),
-    Edge(charger_silent, replace(DEBOUNCED, raised_s=NOW_S, cause=SILENT, strikes=(NOW_S,), polls=10,
+    Edge(charger_silent, replace(DEBOUNCED, raised_s=NOW_S, cause=SILENT, now=SILENT, strikes=(NOW_S,), polls=10,
                                  poll_t_s=NOW_S), faults(charger_silent=DEBOUNCED), **UNPLUGGED),
     Edge(charger_silent, None, faults(charger_silent=DEBOUNCED), STOPPING, **UNPLUGGED),
     Edge(charger_silent, None, {}, STOPPING, **UNPLUGGED),

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.config.policy import Policy
+from orchestrator.core.acts import MAX_RESETS
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory, value_of
-from orchestrator.core.operator import MAX_RESETS, STOPPED
+from orchestrator.core.operator import STOPPED
 from orchestrator.core.persisted import COUNTERS_S, UNFINISHED, Persisted, PersistedFault, from_first_format
 from orchestrator.core.states import ENERGISED, MAY_RUN
 from orchestrator.model import STOP, Action, Alarm, ChargerLink, Request, Session, State

@@ -190,6 +190,11 @@ class World:
         return {fault.id: say(fault.cause) for fault in self.decision.faults}
 
     @property
+    def told(self) -> dict[str, str]:
+        """The same with their times, their figures, and what ends them."""
+        return {fault.id: say(fault.told) for fault in self.decision.faults}
+
+    @property
     def orders(self) -> list[Command | None]:
         """The standing orders so far, each once."""
         commands = [decision.command for decision in self.decisions]

@@ -27,8 +27,12 @@ both. A program compares `id` and `key`, never the text: figures change all the 
 | `advice` | what a person shall do: of a fault its id in [faults.md](faults.md) |
 
 Some parameters are added by what the cause stands in: `effect` and `strikes` (a fault: what it does, how often it came
-within an hour), `ago_min` (a fault that tells of a moment), `then` and `how` (what comes next, what to type), `where`
-(which bus).
+within an hour), `past` (it is gone, and told in the past tense), `since_at` and `was`, or `raised_at`, `worst` and `now`
+(the times of a fault and its figures), `then` and `how` (what comes next, what to type), `where` (which bus).
+
+Moments are the time of day in the station's own time, with the date where it is another day, in parameters called `_at`;
+beside a fault `since`, `gone_since` and `clears_at` are the same as Unix time, and `clears` is what ends it. The journal
+has them as the core does, in seconds of the monotonic clock (`_t_s`), of which `t` stands on each line.
 
 `language: ko` in the station file makes the texts Korean. `orchestrator status` and the other verbs say them in the
 language of `LC_ALL`, `LC_MESSAGES` or `LANG`, whatever the service writes; where none of them is set, in the service's.

@@ -3,10 +3,10 @@
 import sys
 from collections.abc import Iterator
 
-from orchestrator.core.faults import FAULTS, Clear, Row
+from orchestrator.core.faults import FAULTS, RANK, Clear, Row
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
-from orchestrator.model import Effect
-from orchestrator.text.catalogue import advise
+from orchestrator.model import Cause, Effect
+from orchestrator.text.catalogue import advise, say
 from tests.docs.catalogue import CATALOGUE
 
 HEAD = """\
@@ -23,6 +23,16 @@ seen, the limit, and the line of the file that sets it. This page is made from t
 | PAUSE | charging stops, and goes on by itself |
 | STOP | charging stops; how it goes on, says the last column |
 | TRIP | charging stops, and the bay stays stopped until a person resets and then starts it |
+
+What `status` says of a fault is in the tense that is true. While it is there: the evidence as it is now, since when,
+and its figure then and at its worst. Once it is gone: what it was, when, and the same quantity now. It ends with what
+comes next, which is also what a refused `start` or `reset` is answered: a command to type, a time, or what must happen
+first.
+
+{samples}
+
+Of several faults the one with the worst effect is told first, and of those with the same effect the most dangerous one,
+however old it is. The table below is in this order.
 
 No fault waits for its condition to last without a break: the time that it was seen for drains at a quarter of its speed
 while it is away. And no word counts alone where a second witness can be heard: what the charger says and what the BMU
@@ -52,6 +62,36 @@ A rule that stops good charges is switched off by the people who have to live wi
 high-temperature bit, its own protection below all of this, and current steps that suit the pack. A BMU of which *every*
 word stands still while a charge goes in is found (`bmu_frozen`).
 """
+HOT, WAS_HOT = (
+    Cause.of("over_temperature", place="policy.yaml:12", pack_c=pack_c, limit_c=45, again_c=40)
+    for pack_c in (46.1, 45.3)
+)
+BITS = Cause.of("status_trip", advice="status_trip", bits=("high_temperature",), status=0x10, effect="TRIP")
+DOUBTS = Cause.of(
+    "soc_not_believed", advice="soc_not_believed",
+    whats=(
+        Cause.of("soc_step", before_pct=50, soc_pct=57, passed_s=1),
+        Cause.of("energy_disagrees", remaining_ah=10, available_wh=100, implied_v=10, pack_v=48),
+    ),
+)  # fmt: skip
+AT = {"raised_at": "21:02:14", "past": True}
+SAMPLES = {
+    "there": HOT.with_(
+        "over_temperature", since_at="21:02:14", was=(Cause.of("figure_c", value=45.3),),
+        then=Cause.of("goes_on_after", wait_s=10, strike=None),
+    ),
+    "gone": WAS_HOT.with_(
+        "", **AT,
+        worst=Cause.of("up_to", figure=Cause.of("figure_c", value=46.8)), now=(Cause.of("figure_c", value=39.8),),
+        then=Cause.of("goes_on_in", gone_at="21:09:40", left_s=8, strike=None),
+    ),
+    "there, latched": BITS.with_("", since_at="21:02:14", then=Cause.of("refused_while", request="reset")),
+    "gone, latched": BITS.with_("", **AT, then=Cause.of("reset_now", gone_at="21:09:40", bay="bay-1")),
+    "reset too often": BITS.with_("", **AT, then=Cause.of("reset_locked", until_at="22:05", times=3)),
+    "counts for a time": DOUBTS.with_(
+        "", since_at="21:02:14", then=Cause.of("refused_until", request="start", until_at="21:18")
+    ),
+}  # fmt: skip
 BACKOFFS = ", ".join(f"{CLEAN_S + wait_s:g}" for wait_s in BACKOFF_S)
 ENDS = {
     Clear.BACKOFF: f"by itself, {BACKOFFS} s after it has gone (first, second, third time in an hour), then by `reset`",
@@ -62,13 +102,27 @@ ENDS = {
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "\n".join(_table()) + "\n" + NUMBERS + "\n".join(_numbers()) + "\n" + STUCK
+    return (
+        HEAD.format(samples="\n".join(_samples()))
+        + "\n".join(_table())
+        + "\n"
+        + NUMBERS
+        + "\n".join(_numbers())
+        + "\n"
+        + STUCK
+    )
+
+
+def _samples() -> Iterator[str]:
+    yield "| | what `status` says |"
+    yield "| --- | --- |"
+    yield from (f"| {stage} | {say(cause)} |" for stage, cause in SAMPLES.items())
 
 
 def _table() -> Iterator[str]:
     yield "| fault | effect | what to do | how it ends |"
     yield "| --- | --- | --- | --- |"
-    for row in sorted(FAULTS, key=lambda row: (-row.effect, row.id)):
+    for row in sorted(FAULTS, key=lambda row: (-row.effect, RANK[row.id])):
         yield f"| `{row.id}` | {Effect(row.effect).name} | {_advice(row)} | {_end(row)} |"
 
 
@@ -95,7 +149,8 @@ def _end(row: Row) -> str:
         return f"by itself, {row.clean_s:g} s after it has gone"
     gone = f" for {row.clean_s:g} s" if row.clean_s else ""
     departs = "; also when the battery has left" if row.departs else ""
-    return ENDS[row.clear].replace("has gone,", f"has gone{gone},") + departs
+    counts = "; until when it counts, `status` says" if row.until else ""
+    return ENDS[row.clear].replace("has gone,", f"has gone{gone},") + departs + counts
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ def stop_is_not_heard(patch: Patch) -> None:
 
 def reset_starts(patch: Patch) -> None:
     def reset(memory: Memory, now_s: float) -> Heard:
-        return operator._start(with_values(memory, hold=None), now_s)
+        return operator._start(with_values(memory, hold=None), now_s, "bay-1")
 
     hear = operator.hear
     patch.setattr(

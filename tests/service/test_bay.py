@@ -112,7 +112,7 @@ def test_an_exception_of_our_own_stops_the_bay_latches_and_is_told(
     status = json.loads(json.dumps(bench.bay.status()))
     assert status["state"] == "TRIPPED"
     assert [fault["id"] for fault in status["faults"]] == ["internal"]
-    assert bench.ask(Request.START).startswith("internal is latched and needs a reset")
+    assert bench.ask(Request.START).startswith("internal: start is refused before a reset: ")
     assert bench.ask(Request.RESET) == ""
 
 

@@ -6,8 +6,9 @@ from typing import cast
 import pytest
 
 from orchestrator.model import Cause
-from orchestrator.show import figure, page, stands_by, strays, table, what_to_do, width_of
+from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
 from orchestrator.text.catalogue import fields
+from orchestrator.text.columns import width_of
 
 
 def bay(**changes: object) -> dict[str, object]:
@@ -241,3 +242,40 @@ def test_the_page_is_in_the_readers_language() -> None:
     )
     assert "the charger is being stopped" in page(document)
     assert "the charger is being stopped before anything else" in page(document, "en")
+
+
+WHY = (
+    "inspect the pack, then reset – at 21:02:14, the pack had 55.3 °C, at or above 55 °C (policy.yaml:12); 39.8 °C "
+    "now; gone since 21:03:10: orchestrator reset bay-1, then orchestrator start bay-1"
+)
+
+
+def test_a_long_reason_stays_in_its_column() -> None:
+    told = bay(state="TRIPPED", reason=WHY, faults=[fault("noisy_line", "a noisy line " * 9)])
+    head, *lines = table([told], width=120).splitlines()
+    column = head.index("WHY")
+    assert all(len(line) <= 120 for line in lines)
+    warned = next(number for number, line in enumerate(lines) if line.startswith("  WARN: a noisy line"))
+    assert {line[:column].strip() for line in lines[1:warned]} == {""}
+    assert " ".join(line[column:].strip() for line in lines[:warned]) == WHY
+    assert lines[warned + 1].startswith("    ")
+    assert table([told], width=0).splitlines()[1].endswith(WHY)
+
+
+def test_on_a_narrow_screen_the_reason_stands_below_and_commands_stay_whole() -> None:
+    head, cells, *lines = table([bay(state="TRIPPED", reason=WHY)], width=60).splitlines()
+    assert (head.split()[-1], cells.split()[0]) == ("STEP", "bay-1")
+    assert all(len(line) <= 60 for line in (head, *lines))
+    assert " ".join(line.strip() for line in lines) == WHY
+    assert any("orchestrator reset bay-1" in line for line in lines)
+    assert any("39.8 °C" in line for line in lines)
+
+
+def test_korean_is_as_wide_as_a_terminal_shows_it() -> None:
+    told = table([bay(reason="팩 온도가 높습니다 " * 9)], width=60)
+    assert max(len(line) for line in told.splitlines()[2:]) < 45
+
+
+def test_alarms_are_folded_too() -> None:
+    alarming = bay(state="UNCONTROLLABLE", alarm="danger", reason="why " * 30, command={"order": {"action": "stop"}})
+    assert all(len(line) <= 80 for line in page({"bays": [alarming]}, width=80).splitlines()[:3])

@@ -150,7 +150,7 @@ def test_since_is_the_wall_clock() -> None:
 
 def test_a_cause_is_data_and_a_sentence_in_the_stations_language() -> None:
     (fault,) = document(KNOWN, CHARGING)["faults"]
-    text = "9 % of the last minute's exchanges with the charger went wrong, more than 5 %; check the cable, its shield "
+    text = "9 % of the last minute's exchanges with the charger go wrong, more than 5 %; check the cable, its shield "
     text += "and its ground"
     cause = {
         "id": "noisy_line",
@@ -160,7 +160,8 @@ def test_a_cause_is_data_and_a_sentence_in_the_stations_language() -> None:
         "advice": "noisy_line",
         "text": text,
     }
-    assert fault == {"id": "noisy_line", "effect": "WARN", "cause": cause, "text": text, "since": 990.0}
+    assert fault == {"id": "noisy_line", "effect": "WARN", "cause": cause, "text": text, "since": 990.0,
+                     "gone_since": None, "clears": None, "clears_at": None}  # fmt: skip
     status = document(KNOWN, CHARGING)
     assert (status["reason"], status["cause"]["text"], status["cause"]["id"]) == ("step 4", "step 4", "said")
     korean: dict[str, Any] = bay_status("bay-1", KNOWN, CHARGING, 100.0, 1000.0, "ko")

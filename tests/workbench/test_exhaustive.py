@@ -21,18 +21,19 @@ ROOT = Path(__file__).parent
 BROKEN = {
     "odd/narrow": (
         "charges",
-        "→ SUSPENDED: the pack has 24.1 °C, the limit is 24 °C (narrow.yaml:2); it charges again below 19 °C; goes on "
-        "when it has cooled down; no order",
+        "→ SUSPENDED: the pack has 22.0 °C, the limit is 24 °C (narrow.yaml:2); it charges again below 19 °C; 24.1 °C "
+        "at 1001 s; let it cool down; goes on by itself 10 s after it is gone; no order",
     ),
     "broken/volts": (
         "charges, as measured",
-        "→ SUSPENDED: the charger reads 47.95 V, the BMU 47.45 V: not the same battery, or a bad connection; check "
-        "that this BMU belongs to this charger's battery; no order",
+        "→ SUSPENDED: the charger reads 47.95 V, the BMU 47.45 V: not the same battery, or a bad connection; "
+        "since 1032 s; check that this BMU belongs to this charger's battery; goes on by itself 1 s after it is gone; "
+        "no order",
     ),
     "broken/amps": (
         "charges, as measured",
-        "→ TRIPPED: check for loads on the battery and for a wrong node id, then reset – the charger reads 14.00 A, "
-        "the BMU 14.50 A; the BMU is likelier wrong, by the step that was set (14 A); no order",
+        "→ TRIPPED: check for loads on the battery and for a wrong node id, then reset – the charger reads 0.00 A, "
+        "the BMU 0.50 A; 14.00 A and 14.50 A at 1039 s; reset is refused while it lasts; no order",
     ),
 }  # fmt: skip
 

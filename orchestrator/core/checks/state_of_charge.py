@@ -4,6 +4,7 @@ Each of them alone may be a BMU that has corrected itself, so it only warns; two
 """
 
 from orchestrator.core.facts import TERMINAL_V, Facts
+from orchestrator.core.memory import Memory
 from orchestrator.model import Cause
 
 #: From one reading to the next the SOC may take a step of this much, and what a tiny pack takes in each second.
@@ -27,6 +28,12 @@ def soc_jump(f: Facts) -> Cause | None:
     """FAULTS B17."""
     step = f.memory.battery.charge_step
     return step[1] if step is not None and f.now_s - step[0] < STEP_NEWS_S else None
+
+
+def jump_ends_s(memory: Memory) -> float | None:
+    """When a jump is no news any more."""
+    step = memory.battery.charge_step
+    return step[0] + STEP_NEWS_S if step is not None else None
 
 
 def soc_falls(f: Facts) -> Cause | None:
@@ -65,7 +72,14 @@ def soc_not_believed(f: Facts) -> Cause | None:
     doubts = [name for name in DOUBTS if name in f.raised]
     if len(doubts) < 2:
         return None
-    return Cause.of("soc_not_believed", whats=tuple(f.memory.faults[name].cause for name in doubts))
+    seen = [f.memory.faults[name] for name in doubts]
+    return Cause.of("soc_not_believed", whats=tuple(doubt.now or doubt.cause for doubt in seen))
+
+
+def exchange_ends_s(memory: Memory) -> float | None:
+    """When another battery is no news any more."""
+    exchange = memory.battery.exchange
+    return exchange[0] + EXCHANGE_NEWS_S if exchange is not None else None
 
 
 def battery_exchanged(f: Facts) -> Cause | None:

@@ -8,7 +8,7 @@ ADVICE: Mapping[str, str] = {
     "error_stop": "look at the charger's own display and manual, then reset",
     "system_stop": "find out who stopped the charger, then start",
     "illegal_value": "a value outside its documented list: check the line and the charger's version",
-    "mode_taken_over": "set the rotary switch or the station file, then start",
+    "mode_taken_over": "set the charger's rotary switch or the station file, then start",
     "rejected_frame": "this charger does not know our commands: check its model and version, then reset",
     "line_taken_over": "find the program that uses this port (fuser -v, ModemManager, a getty, a terminal "
     "program) and keep it away",
@@ -56,8 +56,8 @@ ADVICE: Mapping[str, str] = {
     "emergency": "look the error up in the BMU's manual; once the BMU has taken it back (restart it if it "
     "does not), start",
     "hot_trip": "keep people away until it has cooled down; inspect the pack, then reset",
-    "over_temperature": "goes on when it has cooled down",
-    "under_temperature": "goes on when it has warmed up",
+    "over_temperature": "let it cool down",
+    "under_temperature": "let it warm up",
     "runaway": "keep people away; inspect the pack, then reset",
     "temperature_invalid": "no temperature, no charge: check the sensor and the object map, then reset",
     "implausible": "check the object map against this BMU",
@@ -71,7 +71,7 @@ ADVICE: Mapping[str, str] = {
     "battery_exchanged": "look which battery is in the bay, then start",
     "wrong_policy": "give the bay the policy of this battery, or have its BMU calibrated",
     "another_pack": "look which battery is in the bay, and have its BMU calibrated, then start",
-    "current_paused": "goes on by itself once the policy allows current again",
+    "current_paused": "wait until the policy allows current again",
     "no_step_allowed": "it charges once the policy allows at least this charger's lowest step",
     "precharge_too_strong": "charge this pack where the lowest step is lower, or have it inspected",
     "other_master": "find that tool, and keep it off this bus while batteries charge",

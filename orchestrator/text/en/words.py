@@ -34,6 +34,8 @@ WORDS: Mapping[str, str] = {
     "run": "run",
     "resume": "resume",
     "stop": "stop",
+    "start": "start",
+    "reset": "reset",
     "limit": "limit",
     "step": "step",
     "mode": "mode",
@@ -52,6 +54,9 @@ FRAMES: Mapping[str, str] = {
     "list": ", ",
     "and": " and ",
     "then": "; ",
-    "ago": "{what}, {ago_min} min ago",
-    "just_now": "{what}, just now",
+    # when it is, or was, and the figures then and now
+    "at": "at {raised_at}, {what}",
+    "since": "since {since_at}",
+    "was": "{was:and} at {since_at}",
+    "now": "{now:and} now",
 }

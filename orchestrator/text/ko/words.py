@@ -34,6 +34,8 @@ WORDS: Mapping[str, str] = {
     "run": "기동",
     "resume": "재개",
     "stop": "정지",
+    "start": "시작",
+    "reset": "리셋",
     "limit": "전류 제한",
     "step": "단계",
     "mode": "충전 모드",
@@ -52,6 +54,9 @@ FRAMES: Mapping[str, str] = {
     "list": ", ",
     "and": ", ",
     "then": ". ",
-    "ago": "{what}({ago_min}분 전)",
-    "just_now": "{what}(방금)",
+    # when it is, or was, and the figures then and now
+    "at": "{raised_at}: {what}",
+    "since": "{since_at}부터",
+    "was": "{since_at}에는 {was:and}",
+    "now": "지금은 {now:and}",
 }

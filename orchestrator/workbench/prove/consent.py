@@ -12,6 +12,10 @@ from orchestrator.core.states import ENERGISED, READY, UNSEEN, UNVERIFIED
 from orchestrator.model import Alarm, Cause, Request, State
 from orchestrator.workbench.prove.story import Taken
 
+#: Causes that name the command with which it goes on, and those that say why that is refused until when.
+COMMANDS = frozenset({"start_bay", "start_now", "reset_now"})
+NOT_YET = frozenset({"refused_while", "refused_until", "refused_for", "reset_locked", "waits_for_fault"})
+
 
 def operator_stops(taken: Taken) -> str | None:
     """A stop or a pause of the operator takes effect in the same step, unless it is answered with a reason."""
@@ -38,7 +42,7 @@ def _waiting(memory: Memory) -> set[str]:
 
 
 def waits_for_a_start(taken: Taken) -> str | None:
-    """HELD is left by a person's start only, or to verify the stop anew; it says what to type, once.
+    """HELD is left by a person's start only, or to verify the stop anew; it says what to type, once, or why not yet.
 
     A battery that leaves takes with it the faults that its leaving explains, and no others.
     """
@@ -58,8 +62,10 @@ def waits_for_a_start(taken: Taken) -> str | None:
 def _says_what_to_type(taken: Taken, *, waits: bool) -> str | None:
     if not waits:
         return "HELD, and nothing waits for a person"
-    told = [cause.param("bay") for cause in _parts(taken.decision.cause) if cause.id == "start_bay"]
-    return None if told == [taken.rules.bay.name] else f"HELD tells to start {told}"
+    parts = list(_parts(taken.decision.cause))
+    told = [cause.param("bay") for cause in parts if cause.id in COMMANDS]
+    well = told == [taken.rules.bay.name] or (not told and any(cause.id in NOT_YET for cause in parts))
+    return None if well else f"HELD tells to start {told}"
 
 
 def _parts(cause: Cause) -> Iterator[Cause]:

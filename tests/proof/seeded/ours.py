@@ -38,7 +38,7 @@ OURS: tuple[Seed, ...] = (
         NOT_CAUGHT,
         (
             f"{SERVICE}bay.py",
-            "            self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)\n",
+            "            self.decision, self._memory = carry_on(now_s, snapshot, memory, internal, self.name)\n",
             '            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP)\n',
         ),
     ),

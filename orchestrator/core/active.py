@@ -1,0 +1,100 @@
+"""The faults in force as people read them: in the tense that is true, with their times, their figures and their act.
+
+The evidence is what is seen now while it is there, and what was seen when it was raised once it is gone; then what the
+same quantities are now stands beside it. Nothing of this is an event: figures and countdowns change with every look, a
+fault is the same for as long as its id and its effect are.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from orchestrator.core.acts import act
+from orchestrator.core.facts import Facts
+from orchestrator.core.faults import ROW, Clear, Row
+from orchestrator.core.latches import effect, raised
+from orchestrator.core.memory import FaultMemory, Memory
+from orchestrator.model import ActiveFault, Cause, State
+
+#: What is known now of the quantities that stand in evidence, by the names of its parameters.
+LIVE: Mapping[str, Callable[[Facts], float | None]] = {
+    "charger_v": lambda f: f.volts,
+    "charger_a": lambda f: f.amps,
+    "pack_v": lambda f: f.pack_v,
+    "pack_a": lambda f: f.pack_a,
+    "pack_c": lambda f: f.temperature_c,
+    "soc_pct": lambda f: f.soc,
+    "soh_pct": lambda f: f.soh,
+    "bad_pct": lambda f: f.charger.bad_pct,
+}
+
+
+def active_faults(
+    memory: Memory, now_s: float, bay: str, f: Facts | None = None, *, at_rest: bool = False
+) -> tuple[ActiveFault, ...]:
+    """The faults in force, the most dangerous first. `f` is None where nothing is known of the bay now.
+
+    `at_rest`: the charger stands by, verified.
+    """
+    return tuple(_active(memory, now_s, bay, name, f, at_rest=at_rest) for name, _ in raised(memory.faults))
+
+
+def evidence(row: Row, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
+    """What is, or was, seen of it, and what to do."""
+    more: dict[str, Any] = {"effect": effect(row.id, fault).name}
+    if fault.latched and len(fault.strikes) > 1:
+        more["strikes"] = len(fault.strikes)
+    if fault.clean_s is not None or row.moment:
+        more["past"] = True
+    seen = fault.now if fault.now is not None and not row.moment else fault.cause
+    advice = row.at_rest if at_rest and row.at_rest else row.id
+    if row.clear is Clear.AUTO and fault.clean_s is not None:  # nothing is left to be done
+        advice = ""
+    return (seen or Cause(row.id)).with_(advice, **more)
+
+
+def times(row: Row, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:
+    """Since when it is, or when it was; and its figures then and now."""
+    names, raised_s = row.figures.split(), fault.raised_s
+    then = figures(fault.cause, names)
+    if fault.clean_s is not None or row.moment:
+        known = [(name, LIVE[name](f)) for name, _ in then if name in LIVE] if f is not None else []
+        now = _figures([(name, value) for name, value in known if value is not None])
+        more = {"raised_t_s": raised_s, "worst": _worse(row, fault, then), "now": now if len(now) == len(then) else ()}
+    else:
+        now_seen = figures(fault.now, names)
+        alike = dict(then).keys() == dict(now_seen).keys()  # evidence may be about another quantity by now
+        was = _figures(then) if alike and then != now_seen else ()
+        worst = None if not now_seen or fault.worst in dict(now_seen).values() else _worse(row, fault, then)
+        more = {"since_t_s": raised_s, "was": was, "worst": worst}
+    return tuple((name, value) for name, value in more.items() if value)
+
+
+def figures(cause: Cause | None, names: list[str]) -> list[tuple[str, float]]:
+    """The figures of a piece of evidence."""
+    return [(name, cause.param(name)) for name in names if cause is not None and cause.param(name) is not None]
+
+
+def _figures(known: list[tuple[str, float]]) -> tuple[Cause, ...]:
+    """Each with its unit, which is what stands behind the last underscore of its name."""
+    return tuple(Cause.of(f"figure_{name.partition('_')[2]}", value=value) for name, value in known)
+
+
+def _worse(row: Row, fault: FaultMemory, then: list[tuple[str, float]]) -> Cause | None:
+    """The worst value, where it was another one than at the beginning."""
+    if fault.worst is None or len(then) != 1 or fault.worst == then[0][1]:
+        return None
+    return Cause.of("down_to" if row.lowest else "up_to", figure=_figures([(then[0][0], fault.worst)])[0])
+
+
+def _active(memory: Memory, now_s: float, bay: str, name: str, f: Facts | None, *, at_rest: bool) -> ActiveFault:
+    row, fault = ROW[name], memory.faults[name]
+    return ActiveFault(
+        id=name,
+        effect=effect(name, fault),
+        cause=evidence(row, fault, at_rest=at_rest),
+        since_s=fault.raised_s or 0.0,
+        gone_s=fault.clean_s,
+        next=act(memory, now_s, bay, name, out=memory.state is State.UNCONTROLLABLE and not at_rest),
+        when=times(row, fault, f),
+        raised=fault.cause,
+    )

@@ -1,0 +1,26 @@
+"""Text for a terminal: how wide it is, and how a long line is folded."""
+
+import re
+from unicodedata import east_asian_width
+
+#: What is not torn in two at the end of a line: a command that somebody may copy, a figure and its unit, a word.
+WORD = re.compile(r"orchestrator \S+ \S+|\d\S* (?:°C|Ah|Wh|V|A|%|s|min|h|K)\S*|\S+")
+
+
+def width_of(text: str) -> int:
+    """How many columns of a terminal it takes: a Korean letter takes two."""
+    return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
+
+
+def folded(line: str, width: int, indent: int = 4) -> str:
+    """The line in as many as it takes at this width (0: as long as it is), all but the first one indented."""
+    if not width or width_of(line) <= width:
+        return line
+    head = max(len(line) - len(line.lstrip()), indent if indent > 4 else 0)  # what is aligned already stays
+    lines, now = [], line[:head]
+    for word in WORD.findall(line[head:]):
+        if now.strip() and width_of(now) + width_of(word) > width:
+            lines.append(now.rstrip())
+            now = " " * indent
+        now += f"{word} "
+    return "\n".join([*lines, now.rstrip()])
