@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
 
+from orchestrator.columns import folded, width_of
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
-from orchestrator.text.columns import folded, width_of
 from orchestrator.text.document import in_language, language_of_answer
 from orchestrator.text.language import language_of
 

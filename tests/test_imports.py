@@ -42,7 +42,8 @@ EDGES: dict[str, tuple[str, ...]] = {
         "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
         "sim.chemistry", "sim.pack", "text",
     ),
-    "show": ("model", "text"),
+    "columns": (),
+    "show": ("columns", "model", "text"),
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
         "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort", "link",

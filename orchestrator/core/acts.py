@@ -14,15 +14,13 @@ from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import BACKOFF_S, clear_after_s, in_the_way, raised
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.core.safestop import LASTS_S
-from orchestrator.core.states import ENERGISED
-from orchestrator.model import Cause, Effect, Request, State
+from orchestrator.core.states import DONE, ENERGISED
+from orchestrator.model import Cause, Effect, Request
 
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
 #: While what must survive a restart is not kept, nothing is cleared.
 UNKEPT = "unkept"
-#: In these nothing goes on that was interrupted.
-DONE = frozenset({State.IDLE, State.HELD, State.FULL})
 
 
 def act(memory: Memory, now_s: float, bay: str, name: str, *, out: bool = False) -> Cause:

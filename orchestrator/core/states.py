@@ -20,9 +20,7 @@ class Kind(Enum):
     UNSEEN = auto()  #: the charger is heard for the first time, or again: what it did meanwhile, nobody saw
     AT_REST = auto()  #: the charger was verified to stand by, and was not told to run since
     RESTING = auto()  #: from here a bay goes where the facts lead, without a stop first
-    SETTLED = (
-        auto()
-    )  #: entered after a verified standby, or after a charger that could not be heard: nothing is pending
+    SETTLED = auto()  #: entered after a verified standby, or after a charger that was not heard: nothing is pending
     QUIET = auto()  #: every decision is the same until something happens
     STARTABLE = auto()  #: a battery that wants to be charged is qualified from here
     READY = auto()  #: goes on by itself: no person is waited for
@@ -30,6 +28,7 @@ class Kind(Enum):
     MAY_RUN = auto()  #: a charger may be delivering current: after a restart a person must look
     SESSION_ENDS = auto()  #: after these a charge is over; a pause, a restart and a silent device do not end it
     ALIKE = auto()  #: at rest, waiting for a person or not: from one to the other a charge has come no farther
+    DONE = auto()  #: nothing goes on here that was interrupted
     PASSING = auto()  #: left again within seconds, whatever the surroundings
 
 
@@ -39,16 +38,18 @@ TABLE: Mapping[State, frozenset[Kind]] = {
     S.STARTING: frozenset({K.UNVERIFIED, K.UNSEEN, K.PASSING}),
     S.OFFLINE: frozenset({K.UNSEEN, K.RESTING, K.SETTLED, K.QUIET}),
     S.IDLE: frozenset({
-        K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS, K.SESSION_ENDS, K.ALIKE,
+        K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS, K.SESSION_ENDS, K.ALIKE, K.DONE,
     }),
     S.HELD: frozenset({
-        K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.OBEYS, K.SESSION_ENDS, K.ALIKE,
+        K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.OBEYS, K.SESSION_ENDS, K.ALIKE, K.DONE,
     }),
     S.QUALIFYING: frozenset({K.AT_WORK, K.AT_REST, K.RESTING, K.SETTLED, K.READY, K.OBEYS, K.PASSING}),
     S.PRECHARGE_PULSE: frozenset({K.ENERGISED, K.PRECHARGING, K.AT_WORK, K.READY, K.OBEYS, K.MAY_RUN}),
     S.PRECHARGE_CONTINUOUS: frozenset({K.ENERGISED, K.PRECHARGING, K.AT_WORK, K.READY, K.OBEYS, K.MAY_RUN}),
     S.CHARGING: frozenset({K.ENERGISED, K.AT_WORK, K.READY, K.OBEYS, K.MAY_RUN}),
-    S.FULL: frozenset({K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS, K.SESSION_ENDS}),
+    S.FULL: frozenset({
+        K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS, K.SESSION_ENDS, K.DONE,
+    }),
     S.SUSPENDED: frozenset({K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS}),
     S.STOPPING: frozenset({K.UNVERIFIED, K.MAY_RUN, K.PASSING}),
     S.TRIPPED: frozenset({K.AT_REST, K.SETTLED, K.QUIET, K.SESSION_ENDS}),
@@ -69,6 +70,6 @@ ENERGISED, PRECHARGING, AT_WORK = _of(K.ENERGISED), _of(K.PRECHARGING), _of(K.AT
 UNVERIFIED, UNSEEN = _of(K.UNVERIFIED), _of(K.UNSEEN)
 AT_REST, RESTING, SETTLED, QUIET = _of(K.AT_REST), _of(K.RESTING), _of(K.SETTLED), _of(K.QUIET)
 STARTABLE, READY, OBEYS, MAY_RUN = _of(K.STARTABLE), _of(K.READY), _of(K.OBEYS), _of(K.MAY_RUN)
-SESSION_ENDS, ALIKE, PASSING = _of(K.SESSION_ENDS), _of(K.ALIKE), _of(K.PASSING)
+SESSION_ENDS, ALIKE, DONE, PASSING = _of(K.SESSION_ENDS), _of(K.ALIKE), _of(K.DONE), _of(K.PASSING)
 #: In these standby comes first: what else there is decides only then.
 UNPROVED = UNVERIFIED | {State.OFFLINE}

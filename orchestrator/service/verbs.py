@@ -126,7 +126,7 @@ def _request(arguments: argparse.Namespace) -> int:
         # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
         looked_at = list(results) if arguments.verb == "stop" else accepted
         unverified = _wait_for_standby(path, looked_at, language, every=arguments.all)
-    refused = [Cause.of("refused", bay=bay, why=refusal) for bay, refusal in results.items() if refusal]
+    refused = [Cause.of("bay_refused", bay=bay, why=refusal) for bay, refusal in results.items() if refusal]
     for line in (*unverified.values(), *(say(one, language) for one in refused)):
         print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
     for bay in accepted:

@@ -5,10 +5,10 @@ from typing import cast
 
 import pytest
 
+from orchestrator.columns import width_of
 from orchestrator.model import Cause
 from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
 from orchestrator.text.catalogue import fields
-from orchestrator.text.columns import width_of
 
 
 def bay(**changes: object) -> dict[str, object]:

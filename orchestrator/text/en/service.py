@@ -64,7 +64,7 @@ TEXTS: Mapping[str, str] = {
     # answers to requests
     "accepted": "{bay}: {verb} accepted",
     "accepted_verified": "{bay}: {verb} accepted; stands by, verified",
-    "refused": "{bay}: {why}",
+    "bay_refused": "{bay}: {why}",
     "not_seen_to_stop": "{bay}: NOT verified, run `orchestrator estop`: {error}",
     "bay_unknown": "no bay '{bay}' here: {bays}",
     "verb_unknown": "unknown verb {verb}: {verbs}",

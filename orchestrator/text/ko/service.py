@@ -66,7 +66,7 @@ TEXTS: Mapping[str, str] = {
     # answers to requests
     "accepted": "{bay}: {verb} 요청을 수락했습니다",
     "accepted_verified": "{bay}: {verb} 요청을 수락했습니다. 대기 상태를 확인했습니다",
-    "refused": "{bay}: {why}",
+    "bay_refused": "{bay}: {why}",
     "not_seen_to_stop": "{bay}: 대기 상태가 확인되지 않았습니다. `orchestrator estop`을 실행하십시오: {error}",
     "bay_unknown": "'{bay}' 베이가 없습니다: {bays}",
     "verb_unknown": "알 수 없는 명령입니다: {verb}. 가능한 명령: {verbs}",
