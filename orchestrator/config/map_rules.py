@@ -1,4 +1,4 @@
-"""What must hold between the keys of one object map."""
+"""Rules between the keys of one object map."""
 
 import dataclasses
 from itertools import pairwise
@@ -9,11 +9,11 @@ from orchestrator.config.yaml.scalars import did_you_mean
 from orchestrator.model import BatteryReading
 from orchestrator.protocol.objects import ObjectEntry, Sweep, TpdoEntry
 
-SIZES = (1, 2, 4)  #: bytes that an expedited SDO answer of this BMU can have (CANopen manual §3.2)
-TPDO_BYTES = 8  #: of one CAN frame
-#: The values of a battery reading: all that a map may name.
+SIZES = (1, 2, 4)  #: possible bytes in an expedited SDO answer of this BMU (CANopen manual §3.2)
+TPDO_BYTES = 8  #: in one CAN frame
+#: The values of a battery reading: the only names that a map may use.
 READING_FIELDS = tuple(field.name for field in dataclasses.fields(BatteryReading))
-#: Without these no charge can be supervised. Those in FAST stop one, so they are read in every sweep.
+#: Without these no charge can be supervised. Those in FAST can stop one, so every sweep must read them.
 FAST = ("voltage_v", "current_a", "temperature_c", "status")
 REQUIRED = (*FAST, "soc_pct", "soh_pct")
 

@@ -1,4 +1,4 @@
-"""From the BMU's words to measurements, by an object map."""
+"""Decodes the BMU's words into measurements, by an object map."""
 
 from collections.abc import Iterable
 
@@ -6,18 +6,18 @@ from orchestrator.model import Measurement
 from orchestrator.protocol.hextext import byte_count
 from orchestrator.protocol.objects import FieldMap, ObjectEntry
 
-#: What a field's newest raw bits turned out to be: a value in range; None where the BMU says that it has none (so a
-#: reading's field becomes unknown, which is no fault by itself); or, in words, why they cannot be believed.
+#: The decoded raw bits of a field: a value in range; None if the BMU reports "not available" (the reading's field
+#: becomes unknown, which is no fault in itself); or a text explaining why they are implausible.
 Decoded = Measurement | str | None
 
 
 def raw_bits(field: FieldMap, word: int) -> int:
-    """The field's own bits of a word, sign and scale not yet applied."""
+    """The field's bits in a word, before sign and scale."""
     return word >> field.first_bit & (1 << field.width) - 1
 
 
 def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[str, Decoded]:
-    """Every field of an object, from the unsigned word that a reply of `size` bytes carried; asked for at `t_s`."""
+    """Every field of an object, from the unsigned word in a reply of `size` bytes to a request made at `t_s`."""
     if size != entry.size:
         why = f"0x{entry.index:04X}:{entry.sub:02X} declared {byte_count(size)}, the map says {entry.size}"
         return {field.name: why for field in entry.fields}
@@ -25,7 +25,7 @@ def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[st
 
 
 def decode_fields(fields: Iterable[FieldMap], word: int, t_s: float) -> dict[str, Decoded]:
-    """Every field of a word that is as long as it should be; asked for at `t_s`."""
+    """Every field of a word of the right length, requested at `t_s`."""
     return {field.name: _decode(field, word, t_s) for field in fields}
 
 

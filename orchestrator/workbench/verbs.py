@@ -1,6 +1,6 @@
-"""The verbs for those who tune policies, and for those who ask afterwards. None needs a service or a device.
+"""The verbs for tuning policies and for analysing recordings. None needs a service or a device.
 
-Each imports what it needs when it runs: plots and their like are extras, which a gateway need not have.
+Each imports its dependencies when it runs: plotting and the like are extras, which a gateway need not have.
 """
 
 import argparse
@@ -105,7 +105,7 @@ def _present() -> ModuleType:
 
 
 def _progress(form: str = "{:.0%}") -> Callable[[str, float], None]:
-    """Says on a terminal how far what takes longer than a second has come."""
+    """Show progress on a terminal once a computation takes longer than a second."""
     begin_s = time.monotonic()
 
     def say(what: str, share: float) -> None:
@@ -142,7 +142,7 @@ def _diagram(arguments: argparse.Namespace) -> int:
 
 
 def _give(data: bytes, out: Path | None) -> None:
-    """To a file, or to standard output."""
+    """Write to a file, or to standard output."""
     if out is None:
         sys.stdout.buffer.write(data)
         sys.stdout.flush()
@@ -154,7 +154,7 @@ def _give(data: bytes, out: Path | None) -> None:
 
 
 def missing(what: str, error: ImportError, extra: str = "workbench") -> OrchestratorError:
-    """What to install for something whose libraries a gateway need not have."""
+    """The error that says which extra to install for a verb."""
     return OrchestratorError(
         f"{what} needs the package {error.name}: pip install 'charging-station-orchestrator[{extra}]'"
     )
