@@ -10,6 +10,8 @@ import signal
 import pytest
 from hypothesis import settings
 
+from tests.ids import name_of
+
 #: What takes longest begins first, so that nobody waits for it alone at the end.
 LONG = (
     "proof/test_explore.py", "whole/test_faults.py", "proof/test_seeded_bugs.py", "workbench/test_exhaustive.py",
@@ -23,6 +25,11 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
 
 settings.register_profile("all", deadline=None)
 settings.load_profile("all")
+
+
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """Ids that can be read, where a table has none of its own."""
+    return name_of(val)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.lastresort import guardian, lastline
-from orchestrator.lastresort.estop import VERIFY_S, Options
+from orchestrator.lastresort.estop import VERIFY_S
+from orchestrator.lastresort.estop_options import Options
 from orchestrator.service import supervisor
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -7,14 +7,11 @@ import ast
 import re
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from graphlib import TopologicalSorter
-from pathlib import Path
 
 import pytest
 
-PACKAGE = "orchestrator"
-ROOT = Path(__file__).resolve().parent.parent / PACKAGE
+from tests.sources import PACKAGE, Module, product
 
 #: Part of the package → the parts, or single modules of them, that it may import besides itself.
 EDGES: dict[str, tuple[str, ...]] = {
@@ -33,7 +30,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol",
-        "text",
+        "show", "text",
     ),
     "commissioning": ("config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile"),
     # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
@@ -51,7 +48,6 @@ EDGES: dict[str, tuple[str, ...]] = {
     ),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
-
 #: Third-party library → its owners; nobody else imports it, and nothing else is imported at all.
 OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
@@ -68,7 +64,6 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "transitions": ("core.machine",),
     "yaml": ("config",),
 }
-
 #: These give the same answer to the same arguments, for ever: of the standard library they may use only LIBRARY.
 PURE = ("core", "errors", "interlock", "keys", "model", "protocol", "text")
 LIBRARY = frozenset({
@@ -77,55 +72,16 @@ LIBRARY = frozenset({
 })  # fmt: skip
 #: … and none of these built-in functions.
 IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "open", "print"})
-
 CLOCK_READERS = ("cli", "commissioning", "demo", "lastresort", "service", "sim", "workbench.verbs")
 CLOCKS = frozenset({
     "clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "monotonic", "monotonic_ns", "perf_counter",
     "perf_counter_ns", "process_time", "process_time_ns", "strftime", "thread_time", "thread_time_ns", "time",
     "time_ns",
 })  # fmt: skip
-
-MAX_FILE_LINES = 300
+MAX_FILE_LINES = 250
+#: Longer for the time being, until they are cut.
+LONGER: dict[str, int] = {"core.course": 280, "core.track": 270}
 MAX_FUNCTION_LINES = 40
-
-
-@dataclass(frozen=True)
-class Module:
-    """One source file; `name` is dotted and without the package: "core.step"."""
-
-    name: str
-    source: str
-    is_package: bool = False
-
-    @property
-    def part(self) -> str:
-        return self.name.partition(".")[0]
-
-    def nodes(self) -> Iterator[ast.AST]:
-        return ast.walk(ast.parse(self.source, self.name))
-
-    def imports(self) -> Iterator[tuple[int, str]]:
-        """Line and dotted name of all that is imported; `from a import b` is "a.b"."""
-        for node in self.nodes():
-            if isinstance(node, ast.Import):
-                yield from ((node.lineno, alias.name) for alias in node.names)
-            elif isinstance(node, ast.ImportFrom):
-                origin = ".".join(filter(None, (*self._above(node.level), node.module)))
-                yield from ((node.lineno, f"{origin}.{alias.name}") for alias in node.names)
-
-    def _above(self, level: int) -> tuple[str, ...]:
-        """The package that a relative import of this level starts from."""
-        if not level:
-            return ()
-        path = (PACKAGE, *filter(None, self.name.split(".")))
-        return path[: len(path) - level + self.is_package]
-
-
-def product() -> Iterator[Module]:
-    for path in sorted(ROOT.rglob("*.py")):
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        is_package = parts[-1] == "__init__"
-        yield Module(".".join(parts[:-1] if is_package else parts), path.read_text(encoding="utf-8"), is_package)
 
 
 def within(name: str, places: tuple[str, ...]) -> bool:
@@ -193,8 +149,9 @@ def light_packages(module: Module) -> Iterator[str]:
 def sizes(module: Module) -> Iterator[str]:
     """Files and functions that fit into a head."""
     lines = module.source.count("\n")
-    if lines > MAX_FILE_LINES:
-        yield f"{module.name}: {lines} lines, allowed are {MAX_FILE_LINES}"
+    allowed = LONGER.get(module.name, MAX_FILE_LINES)
+    if lines > allowed:
+        yield f"{module.name}: {lines} lines, allowed are {allowed}"
     for node in module.nodes():
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             length = (node.end_lineno or node.lineno) - node.lineno + 1
@@ -261,7 +218,7 @@ BROKEN: tuple[tuple[Rule, str, str], ...] = (
     (clocks, "config.load", "from datetime import datetime"),
     (light_packages, "config", "from orchestrator.config.load import load"),
     (light_packages, "", "import orchestrator.cli"),
-    (sizes, "core.step", "x = 1\n" * 301),
+    (sizes, "core.step", "x = 1\n" * 251),
     (sizes, "core.step", "def f():\n" + "    x = 1\n" * 40),
 )
 

@@ -11,18 +11,15 @@ from time import monotonic
 from orchestrator.commissioning.probe_bmu import BmuProbe
 from orchestrator.config.station import Bay, ChargerConfig, ContactorConfig, Rs485, Station
 from orchestrator.devices.dialogue import REQUESTS, SILENCE, Dialogue
+from orchestrator.devices.poll import poll
 from orchestrator.errors import LinkError, ServiceError
 from orchestrator.link.can import CanBus
 from orchestrator.link.gpio import describe
 from orchestrator.link.serial import SerialLine
-from orchestrator.model import ChargerReading
 from orchestrator.protocol.explain import explain
 from orchestrator.protocol.hextext import hex_of
 from orchestrator.protocol.sdo import NmtCommand
 from orchestrator.service.socketfile import is_alive
-
-#: The reply deadline, as in the service.
-REPLY_S = 0.12
 
 NMT = {
     "start": NmtCommand.START,
@@ -78,7 +75,7 @@ def _charger(config: ChargerConfig, show: Show) -> bool:
         if stranger := line.locked_by():
             show(f"charger on {config.port}: {stranger} has locked this port, and may take its answers")
         for _ in REQUESTS:
-            reading, exchange = _ask(line, dialogue)
+            reading, exchange = poll(line, dialogue, monotonic)
             if reading is not None:
                 break
     except LinkError as error:
@@ -95,19 +92,6 @@ def _charger(config: ChargerConfig, show: Show) -> bool:
         words = [mode.name.lower() if mode is not None else "" for mode in (reading.control_mode, config.control)]
         show(f"  ! it is in {words[0]} mode, the station file says {words[1]}: look at its rotary switch")
     return reading is not None
-
-
-def _ask(line: SerialLine, dialogue: Dialogue) -> tuple[ChargerReading | None, bytes]:
-    """One status request, and all bytes exchanged."""
-    asked_s = now_s = monotonic()
-    request = exchange = dialogue.ask(asked_s)
-    line.write(request)
-    reading, sending = None, len(request)
-    while reading is None and (left_s := asked_s + REPLY_S - now_s) > 0:
-        came = line.read(left_s, sending + dialogue.missing)
-        exchange, sending, now_s = exchange + came, 0, monotonic()
-        reading = dialogue.hear(came, now_s)
-    return reading or dialogue.give_up(now_s), exchange
 
 
 # --- the contactor ---------------------------------------------------------------------------------------------------

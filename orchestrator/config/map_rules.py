@@ -1,18 +1,14 @@
 """Rules between the keys of one object map."""
 
-import dataclasses
 from itertools import pairwise
 
 from orchestrator.config.names import name_problem
 from orchestrator.config.rules import Problems, Rule
 from orchestrator.config.yaml.scalars import did_you_mean
-from orchestrator.model import BatteryReading
-from orchestrator.protocol.objects import ObjectEntry, Sweep, TpdoEntry
+from orchestrator.protocol.objects import READING_FIELDS, ObjectEntry, Sweep, TpdoEntry
 
 SIZES = (1, 2, 4)  #: possible bytes in an expedited SDO answer of this BMU (CANopen manual §3.2)
 TPDO_BYTES = 8  #: in one CAN frame
-#: The values of a battery reading: the only names that a map may use.
-READING_FIELDS = tuple(field.name for field in dataclasses.fields(BatteryReading))
 #: Without these no charge can be supervised. Those in FAST can stop one, so every sweep must read them.
 FAST = ("voltage_v", "current_a", "temperature_c", "status")
 REQUIRED = (*FAST, "soc_pct", "soh_pct")

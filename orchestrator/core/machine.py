@@ -8,7 +8,8 @@ that is not in the table is refused with `RefusedError` and the state stays as i
 - TRIPPED is left by a person's `reset`, or by `stop` if the charger runs again. A reset leads to HELD: it permits a
   start, it does not make one.
 
-`transitions` is used as the engine, with a throw-away model for each call: the machine itself has no state.
+`transitions` is prescribed. It is the engine that walks the table, with a throw-away model for each call: the machine
+itself has no state.
 """
 
 from enum import StrEnum

@@ -10,40 +10,33 @@ from math import inf
 
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.battery_view import BatteryView
-from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup, TimerWrite
+from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.emergency import emergency_cob_id, emergency_text
 from orchestrator.devices.node_health import NOT_OURS, NodeHealth
 from orchestrator.devices.other_masters import OtherMasters
-from orchestrator.devices.polled import Polled
 from orchestrator.devices.read_plan import ReadPlan
-from orchestrator.devices.sdo_client import Key, SdoClient, Verdict
+from orchestrator.devices.requester import Requester, Send
+from orchestrator.devices.sdo_client import SdoClient, Verdict
 from orchestrator.devices.whose_answer import whose_answer
 from orchestrator.model import BatteryLink, BatteryReading
 from orchestrator.protocol.objects import TpdoEntry
 from orchestrator.protocol.sdo import (
-    NMT_COB_ID,
-    NmtCommand,
     NmtState,
     SdoAbort,
     SdoMalformed,
     SdoValue,
     SdoWritten,
     heartbeat_cob_id,
-    nmt_frame,
     parse_reply,
-    read_request,
     reply_cob_id,
     request_cob_id,
     tpdo_cob_id,
 )
 from orchestrator.protocol.sdo_others import Ask
 
-Send = Callable[[int, bytes], None]
-
 ANSWER_LIMIT_S = 1.5  #: without a valid answer for so long the node is not online (DESIGN §6)
 TOGGLE = 0x80  #: bit of a node-guarding answer that alternates; a heartbeat has none
-SILENT_S = 0.5  #: pause between requests to a node that is not online: it shall not cost the others' time
 
 
 class BatteryNode:
@@ -57,7 +50,6 @@ class BatteryNode:
         self.trouble = ""  #: what is wrong with the bus, in words, though it is open
         self.next_due_s = -inf  #: when `turn()` has something to do, frames apart
         self._config = config
-        self._budget = budget
         self._place = f"BMU 0x{config.node_id:02X} on {bus}"
         self._plan = ReadPlan(config, budget)
         self._client = SdoClient(config.sdo_timeout_s)
@@ -65,8 +57,9 @@ class BatteryNode:
         self._health = NodeHealth()
         self._others = OtherMasters()
         self._answer_s = -inf  # when the newest valid answer came
-        self._not_before_s = -inf  # when a silent node may be asked again
-        self._slot_s: float | None = None  # when the bus's budget lets the next request go out, if that is reserved
+        self._requester = Requester(
+            self.node_id, budget, plan=self._plan, client=self._client, setup=self._setup, others=self._others
+        )
         self._view = BatteryView(f"{self._place}: not asked yet", on_change)
         self._handlers = self._frame_handlers()
 
@@ -111,7 +104,7 @@ class BatteryNode:
         """Do what is due: give up what took too long, notice silence, send the next request by `send(cob_id, data)`."""
         self._watch(now_s)
         if self._client.pending is None:
-            self.next_due_s = self._ask(now_s, send)
+            self.next_due_s = self._requester.ask(now_s, send, online=self._view.link.online)
         if self._client.pending is not None:
             self.next_due_s = self._client.deadline_s
         if self._view.link.online:
@@ -120,13 +113,11 @@ class BatteryNode:
 
     def fail(self, problem: str, now_s: float) -> None:
         """The bus, or our own code, failed: what was asked is lost, and the reason is shown until an answer comes."""
-        self._client.drop()
-        self._slot_s = None
-        self._not_before_s = self.next_due_s = now_s + SILENT_S
+        self.next_due_s = self._requester.fail(now_s)
         self._view.set(online=False, problem=problem)
         self._publish()
 
-    # --- the schedule -------------------------------------------------------------------------------------------------
+    # --- silence ------------------------------------------------------------------------------------------------------
 
     def _watch(self, now_s: float) -> None:
         asked = self._client.pending
@@ -149,44 +140,6 @@ class BatteryNode:
         else:
             why = self.trouble or self._health.silence(self._config.sdo_timeout_s)
         return f"{self._place} does not answer: {why}"
-
-    def _ask(self, now_s: float, send: Send) -> float:
-        """Send the next request if one is due, and return when to come here again."""
-        if now_s < self._not_before_s:
-            return self._not_before_s
-        if self._setup.start_due:
-            self._setup.start_due = False
-            send(NMT_COB_ID, nmt_frame(NmtCommand.START, self.node_id))
-            return now_s
-        write = self._setup.next_write(now_s) if self._view.link.online else None
-        if write is not None and self._client.may_ask(write.key):
-            return self._request(write, now_s, send)
-        if self._setup.check_due and self._view.link.online and self._client.may_ask(HEARTBEAT):
-            return self._request(HEARTBEAT, now_s, send)
-        chosen = self._plan.choose(now_s, self._client)
-        return self._request(chosen, now_s, send) if isinstance(chosen, Polled) else chosen
-
-    def _request(self, what: TimerWrite | Polled | Key, now_s: float, send: Send) -> float:
-        if self._slot_s is None:
-            self._slot_s = self._budget.reserve(now_s)
-        begin_s = max(self._slot_s, self._others.wait_until_s(now_s))
-        if now_s < begin_s:
-            return begin_s
-        self._slot_s = None
-        if isinstance(what, Polled):
-            key, frame = what.key, read_request(*what.key)
-            self._plan.asked(what, now_s)
-        elif isinstance(what, TimerWrite):
-            key, frame = what.key, what.frame()
-            self._setup.sent(now_s)
-        else:
-            key, frame = what, read_request(*what)
-            self._setup.checking(now_s)
-        self._client.ask(key, now_s, write=isinstance(what, TimerWrite))
-        if not self._view.link.online:
-            self._not_before_s = now_s + SILENT_S
-        send(request_cob_id(self.node_id), frame)
-        return now_s
 
     # --- what frames say ----------------------------------------------------------------------------------------------
 
@@ -221,7 +174,7 @@ class BatteryNode:
 
     def _accept(self, reply: SdoValue | SdoWritten | SdoAbort, now_s: float) -> None:
         self._answer_s = now_s
-        self._not_before_s = -inf
+        self._requester.hurry()
         self._view.set(online=True, problem="")
         if self._others.active:
             self._others.ours_answered(self._client.asked_s)
@@ -273,7 +226,7 @@ class BatteryNode:
         self._others.clear()
         self._setup.booted()
         self._plan.restart(now_s)
-        self._not_before_s = -inf
+        self._requester.hurry()
         self.next_due_s = now_s
 
     def _on_emergency(self, data: bytes, _now_s: float) -> None:
@@ -284,15 +237,12 @@ class BatteryNode:
             self._view.set(emergency=text)
 
     def _on_tpdo(self, tpdo: TpdoEntry, data: bytes, now_s: float) -> None:
-        objects = [self._plan[index, 0] for index in tpdo.objects]
-        if self._setup.tpdos_changed or len(data) != sum(polled.entry.size for polled in objects):
+        values = None if self._setup.tpdos_changed else self._plan.from_tpdo(tpdo, data, now_s)
+        if values is None:
             self._view.dropped()
             return
-        begin = 0
-        for polled in objects:
-            end = begin + polled.entry.size
-            self._view.measured(polled.from_tpdo(int.from_bytes(data[begin:end], "little"), now_s))
-            begin = end
+        for fields in values:
+            self._view.measured(fields)
 
     def _publish(self) -> None:
         if problem := self._health.problem:

@@ -8,10 +8,10 @@ from typing import Protocol
 
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.errors import LinkError
-from orchestrator.protocol.sdo import NMT_COB_ID, NmtCommand
+from orchestrator.protocol.sdo import NMT_COB_ID
 
 REOPEN_S = 1.0  #: pause before a bus that failed is opened again
-TICK_S = 0.1  #: longest wait for a frame: so soon an NMT command goes out and `close()` is noticed
+TICK_S = 0.1  #: longest wait for a frame: so soon `close()` is noticed
 CLOSE_S = 3.0  #: slcan sleeps 2 s when it opens
 STALL_S = 0.5  #: without a turn for so long the loop hangs; five ticks
 
@@ -37,9 +37,6 @@ class CanPort(Protocol):
     def send(self, cob_id: int, data: bytes) -> None:
         """LinkError if the bus is broken, RefusedError for a frame that may not be sent."""
 
-    def nmt(self, node_id: int, command: NmtCommand) -> None:
-        """From any thread; RefusedError for a node that is not of this station."""
-
 
 class BatteryBus:
     """One bus with its BMUs. `clock` gives monotonic seconds."""
@@ -63,16 +60,12 @@ class BatteryBus:
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread and close the bus. An NMT command that was just given may be lost.
+        """End the thread and close the bus.
 
         A driver that hangs (slcan opens a stalled adapter for ever) is left behind after CLOSE_S.
         """
         self._closing.set()
         self._thread.join(CLOSE_S)
-
-    def nmt(self, node_id: int, command: NmtCommand) -> None:
-        """Ask a node to start, stop or reset; RefusedError for a node that is not of this station. From any thread."""
-        self._port.nmt(node_id, command)
 
     def stalled(self, now_s: float) -> bool:
         """True when the loop hangs or has ended. While the bus is closed, all nodes offline, it may take its time."""

@@ -2,9 +2,9 @@
 
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.bus_budget import BusBudget
-from orchestrator.devices.polled import Polled
+from orchestrator.devices.polled import Fields, Polled
 from orchestrator.devices.sdo_client import Key, SdoClient
-from orchestrator.protocol.objects import Sweep
+from orchestrator.protocol.objects import Sweep, TpdoEntry
 
 AGAIN_S = 0.2  #: a lost frame costs a value that is read once a second no more than this and its time-out
 TPDO_PERIODS = 3  #: an object that no TPDO brought for so many periods is read every sweep again
@@ -62,6 +62,18 @@ class ReadPlan:
         by_tpdo = self._tpdo_s is not None and now_s - polled.tpdo_t_s < TPDO_PERIODS * self._tpdo_s
         slow = by_tpdo or polled.entry.sweep is Sweep.SLOW
         polled.due_s = now_s + (self._budget.slow_s if slow else self._budget.fast_s(self._sweep_s))
+
+    def from_tpdo(self, tpdo: TpdoEntry, data: bytes, now_s: float) -> list[Fields] | None:
+        """The values of each object in a TPDO; None if it has not their length."""
+        objects = [self._by_key[index, 0] for index in tpdo.objects]
+        if len(data) != sum(polled.entry.size for polled in objects):
+            return None
+        values, begin = [], 0
+        for polled in objects:
+            end = begin + polled.entry.size
+            values.append(polled.from_tpdo(int.from_bytes(data[begin:end], "little"), now_s))
+            begin = end
+        return values
 
 
 def _due_s(polled: Polled) -> float:

@@ -9,33 +9,17 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from orchestrator.lastresort.bareport import HELD
+from orchestrator.lastresort.contactors import Contactors
 from orchestrator.lastresort.descriptors import Turns, room
-from orchestrator.lastresort.laststop import LOOK_S, LastStop
+from orchestrator.lastresort.estop_options import USAGE, Options
+from orchestrator.lastresort.laststop import LastStop
 
-USAGE = """\
-usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held]
-
-Stop the charger on every port of the station file, and on the given ports, and verify it. Without arguments the file is
-station.yaml in this folder, else that of the installed service, else that of a service that runs. Ports whose chargers
-may be running by what the service has written down are stopped, too, whether the file still names them or not.
-Needs no running service. Each one that holds one of these ports is told to hold its bays until an operator starts them.
-Then the station file's contactors are opened. Those that a service holds are left to it: it opens them by itself
-where a charger does not obey.
-
-  --port PATH ...  these ports: without a station file, or besides those of the one that is named
-  --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or what the station file says)
-  --leave-held     leave ports alone that a running service holds, and tell it nothing
-
-Exit status 0: every charger was verified to stand by; 1: not every one, or there may be more; 2: used wrongly.
-"""
 Contactor = tuple[str, int, bool]  #: chip, line, active low
 #: A contactor's driver that has not answered by the end, and a moment more, hangs.
-OPENING, OPEN_S = "its driver hangs", 0.5
-#: What systemd says to ExecStopPost= (systemd.exec, $SERVICE_RESULT) when its watchdog has killed the guardian: who
-#: still holds the ports is its controller, frozen as well, and is killed only afterwards.
-FROZEN = "watchdog"
+OPEN_S = 0.5
 UNTOLD = "a service that holds a port could not be told: it may start its chargers again"
 HURRIED = "interrupted: every charger was sent its stop, but not each was given the time to prove it: run this again"
 LOST = "every charger that was found is told of here, but it may have named more, and those may run"
@@ -47,37 +31,6 @@ WATCH_S = 1.0
 READER_S = 2.0
 #: What the service has written down is waited for no longer than this: its disk may hang.
 READ_S = 1.0
-
-
-class Options:
-    """The command line, taken apart by hand: argparse alone would cost half of the time there is."""
-
-    def __init__(self, words: list[str]) -> None:
-        self.ports: list[str] = []
-        self.stations: list[str] = []
-        self.socket = os.environ.get("ORCHESTRATOR_SOCKET", "")
-        self.leave_held = False
-        self.wrong = ""
-        taking = ""
-        for word in words:
-            if word == "--leave-held":
-                self.leave_held, taking = True, ""
-            elif word in ("--port", "--socket"):
-                taking = word
-            elif word.startswith("-"):
-                self.wrong = f"unknown option {word}"
-            elif taking == "--port":
-                self.ports.append(word)
-            elif taking == "--socket":
-                self.socket, taking = word, ""
-            else:
-                self.stations.append(word)
-        if os.environ.get("SERVICE_RESULT") == FROZEN:
-            self.leave_held = False
-        if len(self.stations) > 1:
-            self.wrong = "name one station file"
-        elif taking == "--socket" or (taking == "--port" and not self.ports):
-            self.wrong = f"{taking} needs a path"
 
 
 def main(words: list[str], catch: Callable[[Callable[[], None]], None] = lambda _: None) -> int:
@@ -107,8 +60,7 @@ class EmergencyStop:
         self._bays: dict[str, str] = {}  # of each port's bay the name, where it has one
         self._real: dict[str, str] = {}  # a port's real name → the one that it is called by
         self._contactors: tuple[Contactor, ...] = ()
-        self._opening: set[Contactor] = set()
-        self._cut: dict[Contactor, str] = {}  # what became of them
+        self._opened = Contactors()
         self._notes: list[str] = []
         self._doubts: list[str] = []  # why it is not all, although every charger that is known stands by
 
@@ -187,9 +139,7 @@ class EmergencyStop:
             whys = self._stopping.finish(VERIFY_S, on_round=self._isolate)
         else:
             whys = self._with_services()
-        end_s = time.monotonic() + OPEN_S
-        while OPENING in self._cut.values() and time.monotonic() < end_s:
-            time.sleep(LOOK_S)
+        self._opened.wait(OPEN_S)
         if self._stopping.hurried:
             self._doubts.append(HURRIED)
         return self._tell(whys)
@@ -223,17 +173,8 @@ class EmergencyStop:
 
     def _isolate(self) -> None:
         """Open the contactors, each in its own time."""
-        for line in set(self._contactors) - self._opening:
-            self._opening.add(line)
-            self._cut.setdefault(line, OPENING)
-            threading.Thread(target=self._open, args=(line,), daemon=True).start()
-
-    def _open(self, line: Contactor) -> None:
-        from orchestrator.lastresort.lastopen import request  # noqa: PLC0415 - the first stops are out now
-
-        chip, number, active_low = line
-        self._cut[line] = request(chip, number, active_low=active_low)
-        self._opening.discard(line)
+        for contactor in self._contactors:
+            self._opened.open(contactor, partial(_open, contactor))
 
     def _tell(self, whys: Mapping[str, str]) -> int:
         """First what to do."""
@@ -241,7 +182,8 @@ class EmergencyStop:
         running = [names[port] for port, why in whys.items() if why not in ("", HELD)]
         lines = [f"CUT THE MAINS of {', '.join(running)}: nothing proves that they stand by"] if running else []
         lines += [f"{names[port]}: {why or 'standby verified'}" for port, why in whys.items()]
-        lines += [f"contactor on {chip} line {line}: {became}" for (chip, line, _), became in self._cut.items()]
+        became = self._opened.became
+        lines += [f"contactor on {one[0]} line {one[1]}: {became[one]}" for one in self._contactors if one in became]
         lines += self._doubts
         if not any(whys.values()) and not self._doubts:
             lines.append("every charger stands by, verified")
@@ -249,6 +191,13 @@ class EmergencyStop:
         for note in self._notes:
             _say(2, note)
         return 1 if any(whys.values()) or self._doubts else 0
+
+
+def _open(contactor: Contactor) -> str:
+    from orchestrator.lastresort.lastopen import request  # noqa: PLC0415 - the first stops are out now
+
+    chip, number, active_low = contactor
+    return request(chip, number, active_low=active_low)
 
 
 def _say(fd: int, text: str) -> None:

@@ -18,15 +18,15 @@ import select
 import signal
 import socket
 import sys
-import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from types import FrameType
 
 from orchestrator.lastresort.bareport import HELD, drop_port
+from orchestrator.lastresort.contactors import HANGS, Contactors, aside
 from orchestrator.lastresort.lastopen import open_contactor
-from orchestrator.lastresort.laststop import LOOK_S, stop_all
+from orchestrator.lastresort.laststop import stop_all
 from orchestrator.lastresort.notify import Systemd, say
 
 #: Messages from the controller: one letter, then a name. PORT carries a port's descriptor, CONTACTOR that of a GPIO
@@ -46,8 +46,6 @@ END_S = 10.0
 VERIFY_S = 5.0
 #: Without a charger to stop, contactors are given this long to open.
 OPEN_S = 0.5
-#: What is said of one whose driver has not answered.
-OPENING = "its driver hangs"
 #: A process that was killed is gone within this, if anything can make it go.
 KILLED_S = 1.0
 #: systemd is told that we live this often; the unit allows a multiple of it.
@@ -71,8 +69,7 @@ class Guardian:
         self._child, self._link = os.pidfd_open(child), link
         self._ports: dict[str, int | None] = {}  # None: the controller has closed it, for now
         self._contactors: dict[str, int] = {}
-        self._opening: set[str] = set()
-        self._opened: dict[str, str] = {}  # contactor → what became of it
+        self._opened = Contactors()
         self._done = self._ending = self._ready = False
         self._excused = False  # since the last heartbeat
         self._deadline_s = time.monotonic() + STARTUP_S
@@ -103,7 +100,7 @@ class Guardian:
         for name, why in whys.items():
             say(f"guardian: {name}: {why or 'standby verified'}")
         for name in self._contactors:
-            say(f"guardian: contactor {name}: {self._opened.get(name, OPENING)}")
+            say(f"guardian: contactor {name}: {self._opened.became.get(name, HANGS)}")
         return self._status(KILLED_S) or ACTED
 
     def _pass_on(self, _number: int, _frame: FrameType | None) -> None:
@@ -192,17 +189,12 @@ class Guardian:
 
     def _open(self, within_s: float = 0.0) -> None:
         """Open every contactor, each in its own time: whoever obeys has stopped by now."""
-        end_s = time.monotonic() + within_s
-        for name in self._contactors.keys() - self._opening:
-            self._opening.add(name)
-            self._opened.setdefault(name, OPENING)
-            aside(partial(self._open_one, name))
-        while OPENING in self._opened.values() and time.monotonic() < end_s:
-            time.sleep(LOOK_S)
+        for name in self._contactors:
+            self._opened.open(name, partial(self._open_one, name))
+        self._opened.wait(within_s)
 
-    def _open_one(self, name: str) -> None:
-        self._opened[name] = open_contactor(self._contactors[name])
-        self._opening.discard(name)
+    def _open_one(self, name: str) -> str:
+        return open_contactor(self._contactors[name])
 
     def _stopping(self, reason: str) -> None:
         """The stops of a round are out; after the first one there is time to tell."""
@@ -231,14 +223,6 @@ class Guardian:
             return end.si_status, f"has ended with status {end.si_status}"
         early = self._ending and not self._ports  # before it could take SIGTERM for anything but its end
         return 0 if early else ACTED, f"was ended by {signal.Signals(end.si_status).name}"
-
-
-def aside(work: Callable[[], object]) -> None:
-    """Do it in a thread: what a driver takes its time over must keep nobody from watching. Without one, do it here."""
-    try:
-        threading.Thread(target=work, daemon=True).start()
-    except RuntimeError:
-        work()
 
 
 def has_terminal() -> bool:

@@ -10,39 +10,26 @@ Whatever the port's driver is asked for may take for ever. Then it is this threa
 Standard library only, few imports.
 """
 
-import errno
-import os
-import select
-import termios
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
 
-from orchestrator.lastresort import line_settings
-from orchestrator.lastresort.bareport import HELD, drop_port, flush, open_port, takes
+from orchestrator.lastresort.bareport import HELD
 from orchestrator.lastresort.descriptors import Turns
-from orchestrator.lastresort.port_owner import holder
-from orchestrator.protocol.standby import ANSWER_BYTES, OPERATION_STOP_FRAME, QUESTION, STOP_FRAME, stands_by
+from orchestrator.lastresort.lastport import GATHER_S, LastPort
+from orchestrator.protocol.standby import OPERATION_STOP_FRAME, STOP_FRAME
 
 #: What is written when, in seconds from a round's beginning; each frame has left the wire when the next one comes.
 STOPS: tuple[tuple[float, bytes], ...] = ((0.0, STOP_FRAME), (0.02, STOP_FRAME), (0.04, OPERATION_STOP_FRAME))
-#: Then the charger gets time to obey, and is asked; an answer takes as long as anywhere else (120 ms), and a bit.
+#: Then the charger gets time to obey, and is asked.
 ASK_S = 0.25
-ANSWER_S = 0.2
 ROUND_S = 0.5
 #: A charger that has shown standby is asked again this often: "200 ms or more is recommended" (protocol 2/2, §2.2.2).
 AGAIN_S = 0.21
 #: So many answers in a row that show standby are a proof: one answer in two may be wrong.
 PROOFS = 2
-#: From an answer's first byte to its last, with an adapter's latency: who reads earlier gets pieces, or leaves some to
-#: another process that reads this port.
-GATHER_S = 0.01 + ANSWER_BYTES * 10 / 19200
 #: Where ports take turns, one that has had its own waits for this long before it asks for another.
 LET_IN_S = 0.02
-#: Of what came in, kept up to this; far more than one answer.
-KEEP = 256
-
 #: (name of a port, since when) → (which sample, "" if it shows standby, else why not) of another process that looks
 #: after it; None: nobody does, and the charger has to be asked. Answers at once.
 Witness = Callable[[str, float], tuple[float, str] | None]
@@ -50,8 +37,6 @@ Witness = Callable[[str, float], tuple[float, str] | None]
 SILENT = "no proof of standby: the charger does not answer"
 ONCE = "no proof of standby: the charger has shown it only once"
 RUNS = "NOT stopped: the charger says that it goes on"
-STALLED = "the line takes nothing"
-GONE = "the line is gone"
 HANGS = "the port's driver hangs"
 
 
@@ -64,7 +49,7 @@ class LastLine:
         self.name, self.why = name, SILENT
         self.tried = threading.Event()  #: the first stop is out, or could not be written
         self.shown_s: float | None = None  #: since when every answer has shown standby
-        self._fd, self._witness, self._leave_held, self._turns = fd, witness, leave_held, turns
+        self._port, self._witness, self._turns = LastPort(name, fd, leave_held=leave_held), witness, turns
         self._stopped_s = 0.0  # when the first stop had been written
         self._begun = False  # the thread has had its first round
         self._proofs, self._sample = 0, 0.0
@@ -83,8 +68,7 @@ class LastLine:
 
     def first(self) -> None:
         """Write the first stop, before anything else is asked of the port."""
-        if self._fd is not None:
-            os.set_blocking(self._fd, False)
+        self._port.never_wait()
         self.write(STOP_FRAME)
         self._stopped_s = time.monotonic()
         self.tried.set()
@@ -104,14 +88,14 @@ class LastLine:
         turns = self._turns
         if turns is None:
             self._watch()
-            self._close()
+            self._port.close()
             return
         while not self._finished:
             turns.take()
             try:
                 self._take_turn() if self._crowded else self._watch()
             finally:
-                self._close()
+                self._port.close()
                 turns.give()
             self._over.wait(LET_IN_S)
 
@@ -170,7 +154,7 @@ class LastLine:
         elif self._begun:
             self.write(STOP_FRAME)
         self._begun = True
-        if self._restored():
+        if self._port.restored():
             self.write(STOP_FRAME)
 
     def _pause_until(self, at_s: float) -> None:
@@ -182,7 +166,10 @@ class LastLine:
         """Take another sample of what the charger does."""
         seen = self._witness(self.name, self._stopped_s)
         if seen is None:
-            self._judge(self._answer())
+            standby = self._port.ask()
+            if self._port.trouble:
+                self._fail(self._port.trouble)
+            self._judge(None if standby is None else "" if standby else RUNS)
         elif seen[1]:
             self._judge(seen[1])
         elif seen[0] != self._sample:
@@ -200,72 +187,12 @@ class LastLine:
             self.why = why or self.why
 
     def write(self, frame: bytes) -> None:
-        """Write what the line takes now. What a full line still holds is dropped: an old order must not come out."""
-        try:
-            if self._fd is None:
-                self._fd = open_port(self.name, leave_held=self._leave_held)
-                self.why = SILENT
-            if not takes(self._fd, frame):
-                flush(self._fd, termios.TCOFLUSH)
-                if not takes(self._fd, frame):
-                    self._fail(STALLED)
-        except OSError as error:
-            self._failed(error)
-
-    def _restored(self) -> bool:
-        """Whether the port's settings had to be set right."""
-        with suppress(OSError, termios.error):  # gone, or no tty: the next use of it will tell
-            return self._fd is not None and bool(line_settings.restore(self._fd))
-        return False
-
-    def _answer(self) -> str | None:
-        """What the charger says to a question: "" for standby. What came in before it proves nothing."""
-        heard, end_s = b"", time.monotonic() + ANSWER_S
-        if self._fd is not None:
-            flush(self._fd, termios.TCIFLUSH)
-            self.write(QUESTION)
-        while self._fd is not None and (left_s := end_s - time.monotonic()) > 0:
-            listener = select.poll()
-            listener.register(self._fd, select.POLLIN)
-            if not listener.poll(left_s * 1000):
-                break
-            time.sleep(GATHER_S)
-            heard = (heard + self._read())[-KEEP:]
-            standby = stands_by(heard)
-            if standby is not None:
-                return "" if standby else RUNS
-        return None
-
-    def _read(self) -> bytes:
-        assert self._fd is not None
-        try:
-            data = os.read(self._fd, 4096)
-            if not data:
-                raise OSError(GONE)
-        except BlockingIOError:
-            return b""  # somebody else has read it
-        except OSError as error:
-            self._failed(error)
-            return b""
-        return data
-
-    def _failed(self, error: OSError) -> None:
-        if error.errno == errno.EBUSY:
-            self._fail(f"one program has this port for itself alone (TIOCEXCL): {holder(self.name, (os.getpid(),))}")
-        else:
-            self._fail(error.strerror or str(error))
-        self._close()
+        """Write what the line takes now, on a port that is opened for it if need be."""
+        if not self._port.is_open and self._port.open():
+            self.why = SILENT
+        if not self._port.write(frame):
+            self._fail(self._port.trouble)
 
     def _fail(self, why: str) -> None:
         if self._proofs < PROOFS:
             self.why, self._proofs, self.shown_s = why, 0, None
-
-    def _close(self) -> None:
-        """Close the port. What a stalled line has not taken is dropped, since close() would wait for it."""
-        if self._fd is not None:
-            fd, self._fd = self._fd, None
-            if self.why == STALLED:
-                drop_port(fd)
-                return
-            with suppress(OSError):  # it is closed, whatever its driver says to that
-                os.close(fd)

@@ -14,7 +14,8 @@ from contextlib import suppress
 
 from orchestrator.lastresort.bareport import HELD
 from orchestrator.lastresort.descriptors import Turns
-from orchestrator.lastresort.lastline import ANSWER_S, ASK_S, ROUND_S, STOPS, LastLine, Witness
+from orchestrator.lastresort.lastline import ASK_S, ROUND_S, STOPS, LastLine, Witness
+from orchestrator.lastresort.lastport import ANSWER_S
 
 #: The first stops are waited for no longer than this before anything else is done: what else there is would compete
 #: with them for the processor.

@@ -1,5 +1,9 @@
 """A CAN bus by python-can and canopen: the only module that uses them.
 
+Both are prescribed. python-can opens every kind of adapter and takes and hands over single frames. canopen's `Network`
+hands frames on by their COB-ID and gives NMT commands; SDO is ours (`devices/sdo_client.py`), since canopen would take
+a late answer for one to the next request.
+
 There is no Notifier: it dies of the first exception. One thread of ours calls `receive()` and `send()`. Whatever the
 libraries raise becomes a LinkError; then the bus is closed and, after a pause, a new one is opened: a Network that has
 seen its interface go down stays deaf.
@@ -7,7 +11,6 @@ seen its interface go down stays deaf.
 
 import errno
 import logging
-from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from io import IOBase
@@ -16,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import LinkError, RefusedError
 from orchestrator.link import can_filter, can_text
+from orchestrator.link.can_echo import CanEcho
 from orchestrator.link.can_gate import refusal
-from orchestrator.protocol.sdo import FRAME_BYTES, NMT_COB_ID, NmtCommand, nmt_frame
+from orchestrator.protocol.sdo import FRAME_BYTES, NmtCommand
 
 if TYPE_CHECKING:
     import can
@@ -31,11 +35,6 @@ DEFAULT_BITRATE = 1_000_000
 SEND_TIMEOUT_S = 0.02
 #: So many unreadable frames in a row are no noise any more: build the bus anew.
 MAX_GARBAGE = 16
-#: Our own frames that an interface may still have to bring back.
-MAX_ECHO = 256
-#: Interfaces that always bring back what we send ourselves, and do not mark it; others do where they are told to.
-ECHOING = frozenset({"udp_multicast"})
-
 #: What we add where the station file is silent, by interface.
 PROTECTIVE: Mapping[str, Mapping[str, object]] = {
     # python-can's own 1 ms is a busy loop (5 % of a core when idle); a read may come this much late.
@@ -46,12 +45,11 @@ PROTECTIVE: Mapping[str, Mapping[str, object]] = {
 
 
 class CanBus:
-    """One bus of the station file. All but `nmt()` belongs to the thread that called `open()`.
+    """One bus of the station file. It belongs to the thread that called `open()`.
 
     `settings` go to python-can as they are, nothing is taken from the environment or from python-can's own
     configuration files. `nodes` are the node ids that may be written to at all (`link/can_gate.py`); `pages`: their
-    older protocol may be asked, too. `filtered`: nothing is wanted but what is subscribed to; without, `nodes_seen`
-    tells of all.
+    older protocol may be asked, too. `filtered`: the kernel keeps back what is not subscribed to.
     """
 
     def __init__(
@@ -65,17 +63,12 @@ class CanBus:
     ) -> None:
         self.name = name
         self.trouble = ""  #: error-passive, bus-off, nobody acknowledges: in words; "" once a frame comes again
-        self.foreign = 0  #: frames that are none of ours, or not CANopen's: remote, extended, CAN FD
-        self.garbage = 0  #: what the driver could not read
         self._settings = {**PROTECTIVE.get(str(settings.get("interface")), {}), **settings}
         self._nodes = frozenset(nodes)
         self._pages = pages
-        self._scans = not filtered
         self._filtered = filtered and "can_filters" not in settings
-        self._echoes = settings.get("interface") in ECHOING or bool(settings.get("receive_own_messages"))
-        self._echo: deque[tuple[int, bytes]] = deque(maxlen=MAX_ECHO)  # what we sent and did not hear yet
+        self._echo = CanEcho(settings)
         self._callbacks: dict[int, FrameCallback] = {}
-        self._orders: deque[tuple[int, NmtCommand]] = deque()
         self._garbage_run = 0
         self._bus: can.BusABC | None = None
         self._network: canopen.Network | None = None
@@ -85,11 +78,6 @@ class CanBus:
         """The wire's bit/s, for the budget of its use; DEFAULT_BITRATE where the settings do not say it."""
         bitrate = self._settings.get("bitrate")
         return bitrate if isinstance(bitrate, int) else DEFAULT_BITRATE
-
-    @property
-    def nodes_seen(self) -> tuple[int, ...]:
-        """The node ids of all that was heard since the bus was opened, ours or not; of a filtered bus only ours."""
-        return () if self._network is None else tuple(self._network.scanner.nodes)
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
         """Call `callback(cob_id, data)` for each data frame with this id; it holds for every later bus, too."""
@@ -108,7 +96,7 @@ class CanBus:
         for cob_id, callback in self._callbacks.items():
             self._network.subscribe(cob_id, _without_time(callback))
         self._garbage_run = 0
-        self._echo.clear()
+        self._echo.forget()
 
     def close(self) -> None:
         """Shut the bus down. Never raises: a bus that broke cannot be closed in any better way."""
@@ -119,36 +107,34 @@ class CanBus:
             _close_files(bus)
 
     def nmt(self, node_id: int, command: NmtCommand) -> None:
-        """Ask a node to start, stop or reset. From any thread; it is sent in the bus thread's next turn.
-
-        RefusedError, at once, for a node that is not of this station.
-        """
-        self._check(NMT_COB_ID, nmt_frame(command, node_id))
-        self._orders.append((node_id, command))
+        """Ask a node to start, stop or reset; RefusedError for a node that is not of this station."""
+        if self._network is None:
+            raise self._closed()
+        master = type(self._network.nmt)(node_id)  # the network's own one speaks to all nodes at once
+        master.network = self._network
+        master.send_command(command)
 
     def send(self, cob_id: int, data: bytes) -> None:
         """Write one frame; RefusedError if it is none of those that may be written, LinkError if the bus is broken.
 
         A full transmit queue is no broken bus but a BMU that is not there: the frame is lost and `trouble` says so.
         """
-        self._check(cob_id, data)
+        if reason := refusal(cob_id, data, self._nodes, pages=self._pages):
+            raise RefusedError(f"{can_text.place(self.name, self._settings)}: not sent: {reason}")
         if self._bus is None:
-            raise LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
+            raise self._closed()
         try:
             self._bus.send(_new_message(cob_id, data), SEND_TIMEOUT_S)
-            if self._echoes:
-                self._echo.append((cob_id, data))
+            self._echo.sent(cob_id, data)
         except Exception as error:
             if not _is_queue_full(error):
                 raise self._failed(error) from error
             self.trouble = can_text.QUEUE_FULL
 
     def receive(self, timeout_s: float) -> None:
-        """Send what `nmt()` left, then wait for one frame and hand it on. What a callback raises comes out here."""
+        """Wait for one frame and hand it on. What a callback raises comes out here."""
         if self._bus is None or self._network is None:
-            raise LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
-        while self._orders:
-            _send_nmt(self._network, *self._orders.popleft())
+            raise self._closed()
         try:
             message = self._bus.recv(max(timeout_s, 0.0))
         except Exception as error:  # noqa: BLE001 - drivers raise anything; it ends here
@@ -158,38 +144,15 @@ class CanBus:
         if message is not None:
             self._dispatch(message, self._network)
 
-    def _check(self, cob_id: int, data: bytes) -> None:
-        if reason := refusal(cob_id, data, self._nodes, pages=self._pages):
-            raise RefusedError(f"{can_text.place(self.name, self._settings)}: not sent: {reason}")
-
     def _dispatch(self, message: "can.Message", network: "canopen.Network") -> None:
         if message.is_error_frame:
             self._error_frame(message)
             return
         self.trouble = ""
-        wanted = message.arbitration_id in self._callbacks
-        odd = message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES
-        if odd or not wanted:
-            self.foreign += 1
-            if odd or not self._scans:
-                return
-        if not self._is_own(message):
+        if message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES:
+            return  # none of CANopen's
+        if message.arbitration_id in self._callbacks and not self._echo.is_own(message):
             network.notify(message.arbitration_id, message.data, message.timestamp)
-
-    def _is_own(self, message: "can.Message") -> bool:
-        """Our own frame has come back. Echoes come in the order of sending: those before it are lost.
-
-        A frame just like it by somebody else is told from it by their number only, unless the driver marks echoes.
-        """
-        if not message.is_rx:
-            self._echoes = False
-            self._echo.clear()
-            return True
-        if not self._echo or (frame := (message.arbitration_id, bytes(message.data))) not in self._echo:
-            return False
-        while self._echo.popleft() != frame:
-            pass
-        return True
 
     def _error_frame(self, message: "can.Message") -> None:
         said = can_text.error_frame(message.arbitration_id, bytes(message.data))
@@ -201,7 +164,6 @@ class CanBus:
 
     def _unreadable(self, error: Exception) -> None:
         """A frame that the driver chokes on is noise, whatever it raises; an errno, or many in a row, is a failure."""
-        self.garbage += 1
         self._garbage_run += 1
         if can_text.errno_of(error) is not None or self._garbage_run >= MAX_GARBAGE:
             raise self._failed(error) from error
@@ -211,6 +173,9 @@ class CanBus:
                 flush()
             except Exception as broken:
                 raise self._failed(broken) from broken
+
+    def _closed(self) -> LinkError:
+        return LinkError(f"{can_text.place(self.name, self._settings)}: is not open")
 
     def _failed(self, error: Exception) -> LinkError:
         return LinkError(can_text.failure(self.name, self._settings, error))
@@ -260,12 +225,6 @@ def _new_message(cob_id: int, data: bytes) -> "can.Message":
     import can  # noqa: PLC0415 - see above
 
     return can.Message(arbitration_id=cob_id, is_extended_id=False, data=data)
-
-
-def _send_nmt(network: "canopen.Network", node_id: int, command: NmtCommand) -> None:
-    master = type(network.nmt)(node_id)  # the network's own one speaks to all nodes at once
-    master.network = network
-    master.send_command(command)
 
 
 def _without_time(callback: FrameCallback) -> Callable[[int, bytearray, float], None]:

@@ -14,6 +14,7 @@ from orchestrator.model import (
     Command,
     Connection,
     ControlMode,
+    ErrorBit,
     Operation,
     Precharge,
 )
@@ -57,15 +58,6 @@ class Push(IntFlag):
     CURRENT_LIMIT = 0x02
     CHARGE_MODE = 0x04
     PRECHARGE = 0x08
-
-
-class ErrorBit(IntFlag):
-    """What was wrong with the frame that the charger received (§3.3.5)."""
-
-    LENGTH = 0x01
-    COMMAND = 0x02
-    ORDER = 0x04
-    CHECKSUM = 0x08
 
 
 # --- to the charger --------------------------------------------------------------------------------------------------

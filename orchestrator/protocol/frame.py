@@ -103,26 +103,12 @@ class FrameDecoder:
     bytes received. When the line falls quiet (a gap, or the reply deadline), the caller calls `flush()`.
     """
 
-    __slots__ = ("_pending", "_rejected", "bad_frames", "skipped_bytes")
+    __slots__ = ("_pending", "bad_frames", "skipped_bytes")
 
     def __init__(self) -> None:
         self._pending = b""
-        self._rejected = b""
         self.bad_frames = 0  #: starts not followed by a good frame
         self.skipped_bytes = 0  #: bytes outside good frames
-
-    @property
-    def pending(self) -> int:
-        """How many bytes await the rest of their frame: at most one less than the largest frame."""
-        return len(self._pending)
-
-    @property
-    def last_reject(self) -> str:
-        """Why the latest false start was rejected, with its bytes; "" if there was none."""
-        if not self._rejected:
-            return ""
-        shown = self._rejected[: declared_size(self._rejected) or _HEADER]
-        return f"{why_bad(self._rejected)} in {hex_of(shown)}"
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames completed by these bytes, in order."""
@@ -131,10 +117,6 @@ class FrameDecoder:
     def flush(self) -> list[Frame]:
         """Stop waiting for the rest; return the good frames inside the pending bytes. Nothing is pending afterwards."""
         return self._hunt(self._pending, final=True)
-
-    def reset(self) -> None:
-        """Discard pending bytes, as after reopening a port. The counters keep their values."""
-        self._pending = b""
 
     def _hunt(self, data: bytes, *, final: bool) -> list[Frame]:
         frames: list[Frame] = []
@@ -151,7 +133,6 @@ class FrameDecoder:
                 break
             else:
                 self.bad_frames += 1
-                self._rejected = data[at : at + MAX_FRAME]
                 at = data.find(START, at + 1)
         keep = at
         if at < 0:  # the last byte may be the first half of a start

@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from enum import IntEnum
 
+from orchestrator.model import ErrorBit
 from orchestrator.protocol.charger import (
     STATUS_KINDS,
     Code,
-    ErrorBit,
     Kinds,
     Push,
     parse_error,

@@ -10,7 +10,6 @@ from orchestrator.config.station import Bay
 from orchestrator.core.failed import carry_on
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
-from orchestrator.core.rules import Rules
 from orchestrator.core.step import step
 from orchestrator.interlock import grant
 from orchestrator.model import (
@@ -28,6 +27,7 @@ from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import Battery, Charger
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
+from orchestrator.service.policy_in_force import PolicyInForce, name_of
 from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status
@@ -62,13 +62,12 @@ class BayRunner:
         self.name, self.place = bay.name, Place.of(bay)
         self.last_s = 0.0  #: when the last step was taken
         self.decision: Decision | None = None
-        self._rules, self._language = Rules.of(bay), language
+        self.policy, self._language = PolicyInForce(bay), language
         self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
         self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
         self._revision = 0  # the one that keeps this bay's memory
         self._ending = ""
         self._waits: Cause | None = None  # why the next run has to wait for an operator
-        self._offered: Bay | None = None  # with a policy that is not in force yet
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
@@ -106,20 +105,6 @@ class BayRunner:
         self._ending = why
         if not orderly and self.decision is not None and self.decision.state in ENERGISED:
             self._waits = Cause.of("ended_in_charge", why=why)
-
-    def offer(self, bay: Bay | None) -> str:
-        """Take another policy over at the next standby; what will come of it. From any thread.
-
-        `bay` is this bay in the station file as it is now, None if it is not in there any more.
-        """
-        mine = self._rules.bay
-        if bay is None or replace(bay, policy=mine.policy) != mine:
-            return "the station file has changed here: only a restart of the service brings that into force"
-        if bay.policy.source == mine.policy.source:
-            self._offered = None
-            return f"{_shown(bay)} is unchanged"
-        self._offered = bay
-        return f"{_shown(bay)} comes into force when the bay stands by"
 
     def isolate(self) -> None:
         """Open the contactor for good, at the end of the service, and write it down."""
@@ -168,11 +153,12 @@ class BayRunner:
             self.decision = Decision(State.STOPPING, Cause.of("failed", error=internal), STOP, alarm=Alarm.DANGER)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
-        self._take_over()
+        if self.verified and self.decision is not None and self.decision.state is not State.QUALIFYING:
+            self._take_over()
         snapshot = self._snapshot = self._look(now_s, asleep_s, request)
         before = self.decision
         memory = self._memory or self._store.past(self.place).memory(now_s)
-        decision, self._memory = step(now_s, snapshot, memory, self._rules)
+        decision, self._memory = step(now_s, snapshot, memory, self.policy.rules)
         self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
@@ -228,13 +214,11 @@ class BayRunner:
             self._journal.put(self.name, ("contactor", {"closed": now[1], "problem": now[0]}))
 
     def _take_over(self) -> None:
-        bay, decision = self._offered, self.decision
-        if bay is None or decision is None or not self.verified or decision.state is State.QUALIFYING:
-            return
-        self._offered, self._rules = None, Rules.of(bay)
-        if self._recorder is not None:
-            self._recorder.begin(bay)
-        self._say(f"{self.name}: {_shown(bay)} is in force")
+        bay = self.policy.take_over()
+        if bay is not None:
+            if self._recorder is not None:
+                self._recorder.begin(bay)
+            self._say(f"{self.name}: {name_of(bay)} is in force")
 
     def _keep(self, memory: Memory, now_s: float) -> None:
         persisted = Persisted.of(memory, now_s)
@@ -246,20 +230,10 @@ class BayRunner:
         """The bay's part of the status document."""
         decision = self.decision or Decision(State.STARTING, Memory().cause)
         status = bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language)
-        bay, offered, contactor = self._rules.bay, self._offered, self._contactor
+        contactor = self._contactor
         return {
             **status,
             "contactor": contactor and {"closed": contactor.closed_s is not None, "problem": contactor.problem},
             "port": self.place.port,
-            "policy": {
-                "name": bay.policy.policy,
-                "file": bay.policy.source.file,
-                "sha256": bay.policy.source.digest,
-                "waiting_sha256": offered.policy.source.digest if offered else "",
-            },
+            "policy": self.policy.status(),
         }
-
-
-def _shown(bay: Bay) -> str:
-    source = bay.policy.source
-    return f"policy {bay.policy.policy} ({source.file}, sha256 {source.digest})"

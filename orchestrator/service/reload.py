@@ -49,4 +49,4 @@ class Reload:
             self._say(f"{error}\n{self._file}: reload refused, every policy stays as it is")
             return
         for runner in self._bays:
-            self._say(f"{runner.name}: reload: {runner.offer(fresh.get(runner.name))}")
+            self._say(f"{runner.name}: reload: {runner.policy.offer(fresh.get(runner.name))}")

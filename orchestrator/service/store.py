@@ -9,37 +9,24 @@ A restart is neither a reset nor a start. Where the file cannot be read, every b
 overwritten. Where the disk does not answer in time, nothing is written at all, and the next start finds what is there.
 """
 
-import os
 import threading
 from collections.abc import Callable, Collection, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.core.persisted import COUNTERS_S, Persisted
 from orchestrator.errors import ServiceError
 from orchestrator.model import Cause
-from orchestrator.service.disk import lock_file, make_directory, replace_file
+from orchestrator.service.disk import replace_file
 from orchestrator.service.loading import FILE, FIRST_FILE, held, load, move_aside
+from orchestrator.service.ownership import Ownership
 from orchestrator.service.past import Entry, Place
+from orchestrator.service.remembered import Remembered
 from orchestrator.service.stateformat import Stamp, encode
 
-LOCK = "lock"
 #: A change that is not on disk within this counts as not kept (FAULTS P9).
 KEPT_WITHIN_S = 2.0
 #: A disk that refused is asked again this often.
 RETRY_S = 1.0
-#: A service that has just been killed may hold the lock for so long.
-LOCKED_S = 1.5
-
-
-@dataclass(frozen=True, slots=True)
-class _Put:
-    persisted: Persisted
-    at_s: float
-    run: int
-    gist: object
-    counters: object
 
 
 class Store:
@@ -63,7 +50,7 @@ class Store:
         self._directory, self._places = directory, tuple(places)
         self._clock, self._wall, self._boot, self._on_kept = clock, wall, boot, on_kept
         self._lock = threading.Lock()  # guards what follows; nobody waits for a disk with it
-        self._table: dict[Place, _Put] = {}
+        self._table: dict[Place, Remembered] = {}
         self._gists: dict[Place, object] = {}  # as they were last written
         self._disk: dict[Place, Persisted] = {}  # without what a write under way may turn round
         self._revision, self.kept_revision = 1, 0  # the file is written once at the start
@@ -73,7 +60,7 @@ class Store:
         self._problem = self._foreign = self._blind = ""
         self._run_number = 1
         self._aside: tuple[str, ...] = ()
-        self._descriptor: int | None = None
+        self._ownership = Ownership(directory, clock)
         self._written_s = self._failed_s = 0.0
         self._ended = False
         self._wake, self._loaded = threading.Event(), threading.Event()
@@ -111,7 +98,7 @@ class Store:
         now_s = self._clock()
         with self._lock:
             old = self._table[place]
-            new = self._table[place] = _put(persisted, now_s, old.run)
+            new = self._table[place] = Remembered.of(persisted, now_s, old.run)
             if new.gist == old.gist:
                 self._counted = self._counted or new.counters != old.counters
                 return self._revision
@@ -181,7 +168,7 @@ class Store:
                 break
             self._wake.wait(RETRY_S)
             self._wake.clear()
-        self._give_up_ownership()
+        self._ownership.give_up()
 
     def turn(self, *, ended: bool = False) -> None:
         """Write what is due; before the end, everything."""
@@ -193,13 +180,13 @@ class Store:
 
     def _begin(self, entries: Sequence[Entry]) -> None:
         now_s = self._clock()
-        self._table = {entry.place: _put(entry.persisted, now_s, entry.run) for entry in entries}
+        self._table = {entry.place: Remembered.of(entry.persisted, now_s, entry.run) for entry in entries}
         self._pending_s = now_s
 
     def _load(self) -> Sequence[Entry]:
         """Every place's entry at the start; BlockingIOError where another service owns the directory."""
         try:
-            self._own()
+            self._ownership.take(lambda: self._ended)
         except BlockingIOError:
             raise
         except OSError as error:
@@ -207,20 +194,6 @@ class Store:
         loaded = load(self._directory, self._places, self._stamp())
         self._run_number, self._aside = loaded.run, loaded.aside
         return loaded.entries
-
-    def _own(self) -> None:
-        """Be the only service that writes here."""
-        if self._descriptor is not None:
-            return
-        make_directory(self._directory)
-        end_s, pause = self._clock() + LOCKED_S, threading.Event()
-        while self._descriptor is None:
-            try:
-                self._descriptor = lock_file(self._directory / LOCK)
-            except BlockingIOError:
-                if self._clock() > end_s or self._ended:
-                    raise
-                pause.wait(0.05)
 
     def _due(self, *, ended: bool) -> bool:
         now_s = self._clock()
@@ -244,7 +217,7 @@ class Store:
             for place, put in table.items()
         ]
         try:
-            self._own()
+            self._ownership.take(lambda: self._ended)
             move_aside(self._directory, self._aside, "unread")
             self._aside = ()
             replace_file(self.path, encode(stamp, self._run_number, entries))
@@ -253,7 +226,7 @@ class Store:
         except OSError as error:
             self._fail(_said(error, self.path), stamp.clock_s)
             if isinstance(error, FileNotFoundError):
-                self._give_up_ownership()
+                self._ownership.give_up()  # somebody has removed the directory and the lock in it: it is locked anew
             return
         with self._lock:
             self._disk = {place: put.persisted for place, put in table.items()}
@@ -265,22 +238,9 @@ class Store:
     def _fail(self, problem: str, now_s: float) -> None:
         self._problem, self._failed_s, self._counted = problem, now_s, True
 
-    def _give_up_ownership(self) -> None:
-        """At the end; or somebody has removed the directory and the lock in it, and it has to be locked anew."""
-        descriptor, self._descriptor = self._descriptor, None
-        if descriptor is not None:
-            with suppress(OSError):  # it is closed, whatever the file system says to that
-                os.close(descriptor)
-
     def _stamp(self) -> Stamp:
         return Stamp(self._wall(), self._clock(), self._boot)
 
 
 def _said(error: OSError, path: Path) -> str:
     return f"{error.filename or path}: {error.strerror or error}"
-
-
-def _put(persisted: Persisted, now_s: float, run: int) -> _Put:
-    session, soc = persisted.session, persisted.soc
-    counters = (session and (session.elapsed_s, session.charged_ah), soc and soc[1])  # they change while current flows
-    return _Put(persisted, now_s, run, persisted.gist, counters)

@@ -6,7 +6,7 @@ only thing that the loop waits for. Signals only put into it. At the end every b
 """
 
 import signal
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from functools import partial
 from queue import Empty, SimpleQueue
 from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
@@ -17,11 +17,7 @@ from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
-from orchestrator.errors import ServiceError
 from orchestrator.link.can import CanBus, load
-from orchestrator.model import Cause, Request
-from orchestrator.model.cause import plain
-from orchestrator.service.asked import Asked
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
 from orchestrator.service.closing import close_all
@@ -30,21 +26,17 @@ from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
-from orchestrator.service.reception import Answer, Later
 from orchestrator.service.reload import Reload
+from orchestrator.service.request_handler import RequestHandler
 from orchestrator.service.starts import Starts
-from orchestrator.service.status import station_status
-from orchestrator.service.store import KEPT_WITHIN_S, Store
+from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
 from orchestrator.service.wiring import charger_port, open_contactor, stray_port
-from orchestrator.text.catalogue import say
 
 #: How often the guardian hears that every loop turns: five times before it acts.
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
 STOP_S = 3.0
-#: A request is decided by the next step, and answered when it is on disk or after 2 s; longer is a loop that hangs.
-ANSWER_S = 3.0
 #: A disk that answers has told what the last run has left within this; else the chargers are stopped meanwhile …
 LOCK_S = 0.3
 #: … and it has this long.
@@ -80,7 +72,10 @@ class Supervisor:
         )
         self._reload = Reload(station, self._bays, self._say)
         self._reload_asked = False
-        self._control = ControlSocket(station.control.socket, self._answer, monotonic, self._say)
+        self._handler = RequestHandler(
+            station, self._bays, self._journal, self._store, self._strays, monotonic, self._wake.put
+        )
+        self._control = ControlSocket(station.control.socket, self._handler.answer, monotonic, self._say)
 
     def _build(self) -> None:
         """Devices for every bay; nothing is opened yet."""
@@ -227,72 +222,7 @@ class Supervisor:
     def _unverified(self) -> list[str]:
         return [*(bay.name for bay in self._bays if not bay.verified), *self._strays.unverified]
 
-    # --- what the control socket asks, in its own thread ---
-
-    def _answer(self, request: Mapping[str, object]) -> Answer | Later:
-        verb = request.get("verb")
-        if verb == "status":
-            name = request.get("bay")
-            bays = self._bays if name is None else [self._named(name)]
-            now_s, shown = monotonic(), [bay.status() for bay in bays]
-            problem, unkept = self._journal.problem(now_s), self._store.unkept(now_s)
-            alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
-            return station_status(self._station, alarm, shown, problem, unkept, self._strays.status())
-        if isinstance(verb, str) and verb in set(Request):
-            names, port = request.get("bays"), request.get("port")
-            if verb == Request.RESET and isinstance(port, str):
-                return self._drop(port)
-            bays = self._bays if names is None else [self._named(name) for name in _names(names)]
-            return self._ask(list(dict.fromkeys(bays)), Request(verb))
-        raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
-
-    def _drop(self, port: str) -> Later:
-        """Forget a charger that no bay has any more; told when the disk has it."""
-        self._store.refuse_unkept(monotonic())
-        what, revision = self._strays.drop(port)
-        end_s = monotonic() + KEPT_WITHIN_S
-
-        def results() -> Answer | None:
-            if self._store.kept_revision >= revision:
-                return {"results": {what: ""}}
-            why = self._store.unkept(monotonic()) or "the disk has not taken it"
-            return {"results": {what: f"dropped, but not kept: {why}"}} if monotonic() >= end_s else None
-
-        return results
-
-    def _named(self, name: object) -> BayRunner:
-        for bay in self._bays:
-            if bay.name == name:
-                return bay
-        raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
-
-    def _ask(self, bays: list[BayRunner], request: Request) -> Later:
-        """Hand the request to each bay; what they say is there later, "" is yes."""
-        asked = {bay.name: Asked(request) for bay in bays}
-        for bay in bays:
-            bay.ask(asked[bay.name])
-            self._wake.put(self._bays.index(bay))
-        end_s = monotonic() + ANSWER_S
-        late = Cause("no_answer")
-
-        def results() -> Answer | None:
-            if not all(one.done.is_set() for one in asked.values()) and monotonic() < end_s:
-                return None
-            answers = {name: one.answer if one.done.is_set() else late for name, one in asked.items()}
-            return {
-                "results": {name: say(answer, self._language) for name, answer in answers.items()},
-                "causes": {name: plain(answer) for name, answer in answers.items() if answer is not None},
-            }
-
-        return results
-
 
 def boottime() -> float:
     """As `monotonic`, but it goes on while the machine is suspended."""
     return clock_gettime(CLOCK_BOOTTIME)
-
-
-def _names(value: object) -> list[object]:
-    if not isinstance(value, list):
-        raise ServiceError("'bays' is a list of names, or null for all")
-    return value

@@ -10,6 +10,7 @@ from enum import IntEnum
 from math import inf
 
 from orchestrator.model import ChargeMode, Connection, ControlMode, Operation, Precharge
+from orchestrator.sim import automatic
 from orchestrator.sim.pack import Pack
 
 #: Amperes per second while the output rises; it falls at once.
@@ -18,8 +19,6 @@ SOFT_START_A_PER_S = 20.0
 PULSE_S = 1.0
 #: In the constant-voltage phase below the cut-off current for this long: full.
 FULL_AFTER_S = 3.0
-#: In automatic: how long the charger looks for a battery, and below which volts of a cell it does what.
-SEARCH_S, RECOVERY_CELL_V, PRECHARGE_CELL_V, RECHARGE_CELL_V = 2.0, 2.7, 3.0, 4.0
 #: A rogue charger starts by itself after standing still for this long.
 ROGUE_AFTER_S = 2.0
 
@@ -223,16 +222,12 @@ class Charger:
         """Automatic (rotary switch 2 … 5): search, recover, precharge, charge, and again when the pack has sunk."""
         cell_v = pack.ocv_v / pack.cells
         if self.full:
-            if cell_v < RECHARGE_CELL_V:
+            if cell_v < automatic.RECHARGE_CELL_V:
                 self.full, self.mode, self.stage_s = False, ChargeMode.BATTERY_SEARCH, 0.0
             return
-        if self.mode is ChargeMode.BATTERY_SEARCH and (self.stage_s < SEARCH_S or self.resting):
+        if self.mode is ChargeMode.BATTERY_SEARCH and (self.stage_s < automatic.SEARCH_S or self.resting):
             return
-        stage, function = ChargeMode.CHARGE, Precharge.OFF
-        if cell_v < RECOVERY_CELL_V:
-            stage, function = ChargeMode.BATTERY_RECOVERY, Precharge.PULSE
-        elif cell_v < PRECHARGE_CELL_V:
-            stage, function = ChargeMode.PRECHARGE, Precharge.CONTINUOUS
+        stage, function = automatic.stage_for(cell_v)
         if stage is not self.mode:
             self.mode, self.precharge = stage, function
             self._begin()

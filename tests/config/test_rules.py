@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from orchestrator.config.load import check
-from orchestrator.config.map_rules import READING_FIELDS, REQUIRED
+from orchestrator.config.map_rules import REQUIRED
 from orchestrator.config.names import name_problem
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems, Rule, problems
 from orchestrator.config.station import Bay, Station
 from orchestrator.config.yaml.schema import slots
-from orchestrator.protocol.objects import ObjectMap
+from orchestrator.protocol.objects import READING_FIELDS, ObjectMap
 
 GOOD = Path(__file__).parent / "good"
 

@@ -1,7 +1,7 @@
 """A charge in which all is well but for what a test names, and any rule of the core that is asked about it alone."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from orchestrator.config.policy import Policy
@@ -28,6 +28,7 @@ from orchestrator.model import (
 from tests.core.bays import POLICY
 from tests.core.said import cause
 from tests.core.world import bay
+from tests.ids import short, shown
 
 NOW_S = 100_000.0
 AT = POLICY.source.at
@@ -44,6 +45,10 @@ NO_PRECHARGE = replace(POLICY, precharge=None)
 
 def ago(seconds: float) -> float:
     return NOW_S - seconds
+
+
+#: What a rule says, in a test's name, where it is no sentence.
+ANSWERS: dict[object, str] = {None: "silent", True: "yes", False: "no"}
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,17 @@ class Edge:
     policy: Policy = POLICY
     control: ControlMode = ControlMode.MANUAL
     tpdo_s: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The rule, what is special about the charge, and what it says of that."""
+        usual = Edge(self.rule, self.says)
+        special: dict[str, object] = {}
+        for name in (each.name for each in fields(self)[2:]):
+            if (one := getattr(self, name)) != getattr(usual, name):
+                special |= one if isinstance(one, dict) else {name: one}
+        says = ANSWERS.get(self.says) or short(shown(self.says), 40)
+        return f"{self.rule.__name__}-{short(shown(special), 90)}-{says}"
 
     @property
     def facts(self) -> Facts:

@@ -297,7 +297,7 @@ class Scene:
 
     @property
     def name(self) -> str:
-        return f"{self.fault}-{self.evidence[0]}".replace(" ", "_")
+        return f"{self.fault}-{self.evidence[0]}".replace("°", "").replace("…", "..").replace(" ", "_")
 
 
 ILLEGAL = "charge mode 9 (documented: 1 … 8)"

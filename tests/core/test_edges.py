@@ -419,7 +419,7 @@ REPORTS = (
 EDGES = (*CHARGE, *FINISH, *BATTERY, *OBEDIENCE, *SOC, *PAIR, *REPORTS)
 
 
-@pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge.rule.__name__}-{edge.says}")
+@pytest.mark.parametrize("edge", EDGES, ids=lambda edge: edge.name)
 def test_a_rule_at_its_edge(edge: Edge) -> None:
     assert said(edge.rule(edge.facts)) == edge.says
 

@@ -64,7 +64,7 @@ EDGES = (
 )
 
 
-@pytest.mark.parametrize(("values", "index", "key", "words"), EDGES, ids=str)
+@pytest.mark.parametrize(("values", "index", "key", "words"), EDGES)
 def test_the_lowest_wins_and_has_a_name(values: dict[str, float], index: int, key: str, words: str) -> None:
     the_policy = policy()
     world = World(bay(the_policy), **values).charging()

@@ -430,6 +430,6 @@ EDGES = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("edge", EDGES, ids=lambda edge: f"{edge.rule.__name__}-{edge.says}")
+@pytest.mark.parametrize("edge", EDGES, ids=lambda edge: edge.name)
 def test_one_step(edge: Edge) -> None:
     assert said(edge.rule(edge.facts)) == said(edge.says)

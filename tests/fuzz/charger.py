@@ -64,8 +64,7 @@ class Session:
         self._is_honest(self.dialogue.hear(data, self.now_s))
         self.stream += data
         self._parse(self.decoder.feed(data))
-        assert self.decoder.pending < MAX_FRAME
-        assert len(self.decoder.last_reject) <= MAX_REASON
+        assert len(self.decoder._pending) < MAX_FRAME
 
     def _parse(self, frames: list[Frame]) -> None:
         self.found += [frame.encode() for frame in frames]
@@ -93,7 +92,7 @@ class Session:
         """The line has fallen quiet."""
         self._parse(self.decoder.flush())
         assert self.found == frames_in(self.stream)
-        assert self.decoder.pending == 0
+        assert not self.decoder._pending
         assert self.decoder.skipped_bytes == len(self.stream) - sum(map(len, self.found))
         assert stands_by(self.stream) is _standby(self.stream)
         assert len(why_bad(b"\xaf\xfa" + self.stream)) <= MAX_REASON

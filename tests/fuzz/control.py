@@ -57,7 +57,7 @@ def _service() -> tuple[Supervisor, Loop]:
     supervisor = Supervisor(load_station(directory / "station.yaml"), GuardianLink(ours.detach()))
     supervisor._store.kept_revision = sys.maxsize  # the disk takes everything at once
     loop = Loop(supervisor)
-    supervisor._wake = loop  # type: ignore[assignment]  # no more is needed of a queue
+    supervisor._handler._wake = loop.put
     return supervisor, loop
 
 
@@ -133,7 +133,7 @@ TARGET = Target(
         b"\n", b", ", b": ", b"{", b"}", b"[", b"]", b"[" * 1200, b"]" * 1200, b'{"a":' * 300, b"\xff", b"\xef\xbb\xbf",
         b"\0", b" " * 4096, b'"bay-1", ', b'"' + b"\\u0001" * 600 + b'"', b"\\", b'"',
     ],
-    [f"orchestrator/service/{name}.py" for name in ("reception", "client", "control", "supervisor", "status")],
+    [f"orchestrator/service/{name}.py" for name in ("reception", "client", "control", "request_handler", "status")],
     max_bytes=client.MAX_REQUEST + 64,
     limit_s=1.0,
 )  # fmt: skip

@@ -68,7 +68,7 @@ TARGET = Target(
         record(RAW_FD), record(RAW_FD, b"B"), record(RAW_FD, b"D"), record(RAW_FD, b"E"), record(RAW_FD, b"\0"),
         record(NAME, b"x" * 31),
     ],
-    ["orchestrator/lastresort/guardian.py", "orchestrator/lastresort/bareport.py"],
+    [f"orchestrator/lastresort/{name}.py" for name in ("guardian", "contactors", "bareport")],
     max_bytes=128,
     limit_s=1.0,
 )  # fmt: skip

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from orchestrator.config import ports
 from orchestrator.config.yaml import tree
 from orchestrator.core import persisted
-from orchestrator.devices import battery, dialogue
+from orchestrator.devices import battery, dialogue, requester
 from orchestrator.devices.sdo_client import SdoClient
 from orchestrator.lastresort import bareport
 from orchestrator.lastresort.guardian import Guardian
@@ -27,7 +27,7 @@ from orchestrator.protocol import frame, standby, words
 from orchestrator.service import control, reception, typed
 from orchestrator.service.client import Client
 from orchestrator.service.reception import Later
-from orchestrator.service.supervisor import Supervisor
+from orchestrator.service.request_handler import RequestHandler
 from tests.fuzz import __main__ as runner
 from tests.fuzz.__main__ import NAMES, main, the_target, unguided
 from tests.fuzz.config import STATION
@@ -132,7 +132,7 @@ def short_emergency(patch: Patch) -> None:
 
 
 def asks_for_ever(patch: Patch) -> None:
-    patch.setattr(battery.BatteryNode, "_ask", lambda self, now_s, send: now_s)
+    patch.setattr(requester.Requester, "ask", lambda self, now_s, send, *, online: now_s)
 
 
 def texts_only(patch: Patch) -> None:
@@ -153,12 +153,12 @@ def any_json(patch: Patch) -> None:
 
 
 def asks_one_only(patch: Patch) -> None:
-    ask = Supervisor._ask
+    ask = RequestHandler._ask
 
-    def once(self: Supervisor, bays: list[Any], request: Any) -> Later:
+    def once(self: RequestHandler, bays: list[Any], request: Any) -> Later:
         return ask(self, bays[:1], request)
 
-    patch.setattr(Supervisor, "_ask", once)
+    patch.setattr(RequestHandler, "_ask", once)
 
 
 def raw_answers(patch: Patch) -> None:

@@ -16,7 +16,7 @@ from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import encode
 from orchestrator.sim.client import PlantProcess
 from tests.guardian.saboteur import MODES
-from tests.guardian.test_guardian import state_of
+from tests.guardian.watched import state_of
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until
 from tests.whole.station import Service, orchestrator, station_document

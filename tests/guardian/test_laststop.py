@@ -20,15 +20,14 @@ from orchestrator.lastresort.bareport import HELD, drop_port, open_port
 from orchestrator.lastresort.guardian import VERIFY_S
 from orchestrator.lastresort.lastline import (
     ASK_S,
-    GONE,
     HANGS,
     ONCE,
     ROUND_S,
     RUNS,
     SILENT,
-    STALLED,
     STOPS,
 )
+from orchestrator.lastresort.lastport import GONE, STALLED
 from orchestrator.lastresort.laststop import LastStop, stop_all
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Action, Command

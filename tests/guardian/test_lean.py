@@ -9,22 +9,24 @@ from pathlib import Path
 import pytest
 
 from tests.guardian.chargers import running_chargers
-from tests.test_imports import PACKAGE, ROOT, Module, product
+from tests.sources import PACKAGE, ROOT, Module, product
 
 ROOM = {"", "lastresort"}
 PORT = ROOM | {f"lastresort.{name}" for name in ("port_owner", "line_settings", "bareport")}
-LINE = PORT | {"protocol", "protocol.standby", "lastresort.descriptors", "lastresort.lastline"}
+LAST_PORT = PORT | {"protocol", "protocol.standby", "lastresort.lastport"}
+LINE = LAST_PORT | {"lastresort.descriptors", "lastresort.lastline"}
 STOP = LINE | {"lastresort.laststop"}
-ALONE = ("port_owner", "line_settings", "notify", "lastopen", "descriptors")
+ALONE = ("port_owner", "line_settings", "notify", "lastopen", "descriptors", "contactors", "estop_options")
 #: Module → all of the product that is imported with it.
 LEAN: dict[str, set[str]] = {
     "protocol.standby": {"", "protocol", "protocol.standby"},
     **{f"lastresort.{name}": ROOM | {f"lastresort.{name}"} for name in ALONE},
     "lastresort.bareport": PORT,
+    "lastresort.lastport": LAST_PORT,
     "lastresort.lastline": LINE,
     "lastresort.laststop": STOP,
-    "lastresort.estop": STOP | {"lastresort.estop"},
-    "lastresort.guardian": STOP | {"lastresort.lastopen", "lastresort.notify", "lastresort.guardian"},
+    "lastresort.estop": STOP | {f"lastresort.{name}" for name in ("contactors", "estop_options", "estop")},
+    "lastresort.guardian": STOP | {f"lastresort.{name}" for name in ("contactors", "lastopen", "notify", "guardian")},
 }
 MODULES = {module.name: module for module in product()}
 

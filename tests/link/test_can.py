@@ -6,7 +6,6 @@ import select
 import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -62,6 +61,19 @@ def pair(channel: str) -> Iterator[tuple[CanBus, Frames, can.BusABC]]:
     bus.close()
 
 
+def unreadable(bus: CanBus) -> list[Exception]:
+    """What the driver cannot read from now on."""
+    came: list[Exception] = []
+    good = bus._unreadable
+
+    def noted(error: Exception) -> None:
+        came.append(error)
+        good(error)
+
+    bus._unreadable = noted  # type: ignore[method-assign]  # nothing else shows that noise has come
+    return came
+
+
 Pair = tuple[CanBus, Frames, can.BusABC]
 
 
@@ -89,7 +101,6 @@ def test_foreign_frames_do_not_disturb(pair: Pair) -> None:
     for _ in range(5):
         bus.receive(1.0)
     assert heard == []
-    assert bus.foreign == 5
     assert bus._network is not None
     assert bus._network.lss.responses.empty()
     other.send(message(0x590, ANSWER))
@@ -108,7 +119,7 @@ def test_a_can_fd_frame_is_never_taken_for_canopen(channel: str, length: int) ->
         for cob_id in (0x590, 0x710):
             other.send(message(cob_id, bytes(length), is_fd=True))
             bus.receive(1.0)
-        assert (heard, bus.foreign) == ([], 2)
+        assert heard == []
         other.send(message(0x590, ANSWER))
         bus.receive(1.0)
         assert heard == [(0x590, ANSWER)]
@@ -121,22 +132,6 @@ def test_frames_of_any_length_are_handed_on_whole(pair: Pair) -> None:
         other.send(message(0x590, bytes(length)))
         bus.receive(1.0)
     assert [len(data) for _, data in heard] == list(range(9))
-
-
-def test_who_is_on_the_bus_is_known_to_who_asks_for_it(channel: str) -> None:
-    settings: dict[str, object] = {"interface": "virtual", "channel": channel}
-    for filtered, seen in ((False, [0x0A, 0x10]), (True, [0x10])):
-        bus = CanBus("can0", settings, [0x10], filtered=filtered)
-        bus.subscribe(0x590, lambda _cob_id, _data: None)
-        bus.open()
-        with can.Bus(**settings) as other:  # type: ignore[arg-type]  # as in a station file
-            other.send(message(0x70A, b"\x05"))
-            other.send(message(0x590, ANSWER))
-            bus.receive(1.0)
-            bus.receive(1.0)
-        assert list(bus.nodes_seen) == seen
-        bus.close()
-        assert list(bus.nodes_seen) == []
 
 
 def test_what_a_callback_raises_is_not_swallowed(pair: Pair) -> None:
@@ -181,18 +176,14 @@ def test_what_canopen_sends_by_itself_goes_through_the_gate_too(pair: Pair) -> N
     assert other.recv(0) is None
 
 
-def test_nmt_commands_come_from_any_thread(pair: Pair) -> None:
+def test_each_nmt_command_goes_to_one_node(pair: Pair) -> None:
     bus, _, other = pair
-    commands = list(NmtCommand)
-    threads = [threading.Thread(target=bus.nmt, args=(0x10, command)) for command in commands]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert other.recv(0) is None  # only the bus's own thread sends
-    bus.receive(0.0)
-    sent = [other.recv(1.0) for _ in commands]
-    assert {bytes(m.data) for m in sent if m and m.arbitration_id == 0} == {bytes((c, 0x10)) for c in commands}
+    for command in NmtCommand:
+        bus.nmt(0x10, command)
+        sent = other.recv(1.0)
+        assert sent is not None
+        assert (sent.arbitration_id, bytes(sent.data)) == (0, bytes((command, 0x10)))
+    assert other.recv(0) is None
 
 
 def test_nmt_to_a_foreign_node_is_refused_at_once(pair: Pair) -> None:
@@ -389,9 +380,9 @@ def test_an_echo_that_was_lost_does_not_hide_another_masters_frame(udp: dict[str
     bus.subscribe(0x610, lambda cob_id, data: heard.append((cob_id, data)))
     bus.close()
     bus.open()
-    bus._echo.append((0x610, OTHER_READ))  # the bus lost it
+    bus._echo.sent(0x610, OTHER_READ)  # the bus lost it
     bus.send(0x610, READ)
-    listen(bus, lambda: not bus._echo, "our own echo")
+    listen(bus, lambda: not bus._echo._sent, "our own echo")
     with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
         other.send(message(0x610, OTHER_READ))
         listen(bus, lambda: heard, "the other's request")
@@ -401,11 +392,12 @@ def test_an_echo_that_was_lost_does_not_hide_another_masters_frame(udp: dict[str
 
 def test_a_datagram_that_is_no_frame_is_noise(udp: dict[str, object]) -> None:
     bus, heard = opened(udp)
+    noise = unreadable(bus)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         stranger.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
         for garbage in (b"", b"hello", b"\x93\x01\x02\x03", b"\x81\xa3foo\x01", bytes(range(256)) * 4):
             stranger.sendto(garbage, (str(udp["channel"]), int(str(udp["port"]))))
-        listen(bus, lambda: bus.garbage == 5, "five datagrams")
+        listen(bus, lambda: len(noise) == 5, "five datagrams")
     with can.Bus(**udp, hop_limit=0) as other:  # type: ignore[arg-type]  # as in a station file
         other.send(message(0x590, ANSWER))
         listen(bus, lambda: heard, "the answer")
@@ -469,8 +461,9 @@ def test_slcan_both_ways(adapter: Pty) -> None:
 @pytest.mark.parametrize("noise", [b"\xff\xfe\r", b"tzzz8\r", b"t5\r", b"T\r", b"\x00\x80\xff" * 30 + b"\r"])
 def test_noise_on_slcan_costs_one_frame_not_the_bus(adapter: Pty, noise: bytes) -> None:
     bus, heard = slcan(adapter)
+    came = unreadable(bus)
     os.write(adapter.master, noise)
-    listen(bus, lambda: bus.garbage, "the noise")
+    listen(bus, lambda: came, "the noise")
     os.write(adapter.master, b"t59084300600" + b"0F8FF4009\r")
     listen(bus, lambda: heard, "the answer")
     assert heard == [(0x590, ANSWER)]

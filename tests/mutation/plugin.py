@@ -47,7 +47,10 @@ def _plain(val: str | bytes, config: pytest.Config | None) -> str:
 collecting._ascii_escaped_by_config = _plain
 
 #: File of tests → the module that they start as a process.
-ELSEWHERE: Mapping[str, str] = {"tests/guardian/test_guardian.py": "orchestrator/lastresort/guardian.py"}
+ELSEWHERE: Mapping[str, str] = {
+    f"tests/guardian/test_guardian{part}.py": "orchestrator/lastresort/guardian.py"
+    for part in ("", "_contactors", "_messages", "_signals")
+}
 #: What takes longer is a slow test, measured with mutmut's detours in the code.
 QUICK_S = 0.3
 #: What takes longer waits for something that a mutant keeps from coming.

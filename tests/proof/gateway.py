@@ -28,9 +28,10 @@ from orchestrator.link import can as can_module
 from orchestrator.link import gpio
 from orchestrator.service import boot, control, controller
 from tests.proof.virtual_can import BusWire, Driver
+from tests.proof.virtual_descriptors import ROOT
 from tests.proof.virtual_disk import Disk
 from tests.proof.virtual_gpio import Chip, Output, VirtualLine
-from tests.proof.virtual_kernel import ROOT, Kernel
+from tests.proof.virtual_kernel import Kernel
 from tests.proof.virtual_modules import exchange, path_class, replacements
 from tests.proof.virtual_process import Process, Processes
 from tests.proof.virtual_rig import Nature, VirtualRig

@@ -21,7 +21,8 @@ from tests.proof import program
 from tests.proof.gateway import CHIP, FIRST_NODE, JOURNAL, Entry, Gateway, port_name
 from tests.proof.hazards import FOR_EVER, Hazard, Script
 from tests.proof.judge import ESTOP_S, FROZEN_S, KILLED_S, TERM_S, Judge
-from tests.proof.virtual_kernel import STDERR, Trouble
+from tests.proof.virtual_calls import Trouble
+from tests.proof.virtual_descriptors import STDERR
 from tests.proof.virtual_process import Process
 from tests.proof.virtual_rig import ANSWER_S, Nature
 

@@ -207,7 +207,7 @@ class Player:
         before = watch.before or Memory()
         if after.state is not before.state:
             self._changed(number, before.state, after.state)
-        taken = Taken(Move(0.0, "", ""), bay.last_s, snapshot, before, decision, after, bay._rules)
+        taken = Taken(Move(0.0, "", ""), bay.last_s, snapshot, before, decision, after, bay.policy.rules)
         for rule in PROPERTIES:
             if (wrong := rule.check(taken)) is not None:
                 self._wrong(number, rule.name, wrong)
@@ -242,7 +242,7 @@ class Player:
             runner = self.world.bays[number]
             if runner.decision is not None:
                 self._judge(
-                    number, Bay(rig, runner._rules, runner.decision, self.time.now_s, self.watches[number].heard)
+                    number, Bay(rig, runner.policy.rules, runner.decision, self.time.now_s, self.watches[number].heard)
                 )
         if self.world.guardian.unwell > UNWELL:
             self._wrong(0, "hangs", "a thread of the service has ended or hangs: the guardian would have acted")

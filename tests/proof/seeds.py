@@ -3,7 +3,7 @@
     python -m tests.proof seeds                       all of them; writes docs/proofs.md
     python -m tests.proof.seeds --only NAME ...       some of them, nothing is written
 
-A seed is a text that stands in the package exactly once and what takes its place (`seed_table.py`). The likeliest proof
+A seed is a text that stands in the package exactly once and what takes its place (`seeded/`). The likeliest proof
 runs first, and of that the likeliest part; then all proofs, one after the other, until one finds something. What the
 package itself makes them find does not count.
 """
@@ -24,7 +24,8 @@ from pathlib import Path
 from threading import Lock
 
 from tests.proof.report import say
-from tests.proof.seed_table import SEEDS, Seed
+from tests.proof.seed_table import SEEDS
+from tests.proof.seeded.seed import Seed
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs" / "proofs.md"
@@ -81,7 +82,11 @@ PROOFS: Mapping[str, Proof] = {
             "tests/whole/test_survives.py",
             "tests/whole/test_operator.py",
             "tests/whole/test_others.py",
+            "tests/service/test_asking.py",
             "tests/service/test_control.py",
+            "tests/service/test_control_clients.py",
+            "tests/service/test_control_order.py",
+            "tests/service/test_control_requests.py",
             "tests/test_surroundings.py",
         ),
     ),

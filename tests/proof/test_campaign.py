@@ -12,6 +12,7 @@ from orchestrator.core.faults import FAULTS
 from orchestrator.core.machine import Trigger, fire
 from orchestrator.core.rules import Rules
 from orchestrator.devices import charger as charger_module
+from orchestrator.devices import charger_view
 from orchestrator.devices import dialogue as dialogue_module
 from orchestrator.model import State
 from tests.proof.campaign import kinds, play_seed, smallest, table, unseen
@@ -55,7 +56,7 @@ def no_limits(patch: Patch) -> None:
 
 def deaf_to_silence(patch: Patch) -> None:
     without("charger_silent")(patch)
-    patch.setattr(charger_module, "MISSES_UNTIL_SILENT", 10_000)
+    patch.setattr(charger_view, "MISSES_UNTIL_SILENT", 10_000)
 
 
 def breaks_on_noise(patch: Patch) -> None:

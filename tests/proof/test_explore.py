@@ -8,10 +8,10 @@ import pytest
 
 from orchestrator.model import ControlMode, State
 from orchestrator.workbench.processes import cores
-from orchestrator.workbench.prove.endings import reaches, settles
 from orchestrator.workbench.prove.exhaustive import here
 from orchestrator.workbench.prove.explore import Explorer
 from orchestrator.workbench.prove.gist import outline
+from orchestrator.workbench.prove.lasting import reaches, settles
 from tests.proof.exploring import NEVER, changes_of_table, rules, small, walk_on
 
 

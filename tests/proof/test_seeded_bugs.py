@@ -18,9 +18,10 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause, ChargeMode, Effect, Precharge, Request, State
-from orchestrator.workbench.prove.endings import ENDINGS, reaches, settles
+from orchestrator.workbench.prove.endings import ENDINGS
 from orchestrator.workbench.prove.exhaustive import here
 from orchestrator.workbench.prove.explore import Explorer
+from orchestrator.workbench.prove.lasting import reaches, settles
 from orchestrator.workbench.prove.properties import PROPERTIES
 from tests.proof.exploring import rules, small, walk_on
 

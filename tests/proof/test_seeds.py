@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from tests.proof.scenes import SCENES
-from tests.proof.seed_table import SEEDS, Seed
+from tests.proof.seed_table import SEEDS
+from tests.proof.seeded.seed import Seed
 from tests.proof.seeds import PAGE, PROOFS, ROOT, Result, apply, page, search
 
 
@@ -35,7 +36,9 @@ def test_names_are_unique_and_proofs_exist() -> None:
 @pytest.mark.parametrize("seed", SEEDS, ids=lambda seed: seed.name)
 def test_what_comes_first_is_there(seed: Seed) -> None:
     for where in seed.where:
-        assert where in SCENES if seed.likely == "environment" else (ROOT / where.partition("::")[0]).exists()
+        file, _, test = where.partition("::")
+        assert where in SCENES if seed.likely == "environment" else (ROOT / file).exists()
+        assert not test or f"def {test}(" in (ROOT / file).read_text(encoding="utf-8")
 
 
 def test_the_page_names_what_nobody_found() -> None:

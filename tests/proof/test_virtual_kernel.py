@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
+from tests.proof.virtual_calls import Trouble
 from tests.proof.virtual_disk import Disk
-from tests.proof.virtual_kernel import Kernel, Trouble
+from tests.proof.virtual_kernel import Kernel
 from tests.proof.virtual_process import Processes
 from tests.proof.virtual_time import Time
 

@@ -12,7 +12,7 @@ import can
 from orchestrator.sim.can_noise import Bus, BusNoise
 from orchestrator.sim.can_wire import PERFECT
 from orchestrator.sim.timers import Handler
-from tests.proof.virtual_kernel import Calls
+from tests.proof.virtual_calls import Calls
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
 

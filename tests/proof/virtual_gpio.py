@@ -16,6 +16,7 @@ from orchestrator.link import gpio
 from tests.proof.virtual_time import Time
 
 if TYPE_CHECKING:
+    from tests.proof.virtual_descriptors import Descriptors
     from tests.proof.virtual_kernel import Kernel
 
 VALUES = struct.Struct("=QQ")
@@ -60,7 +61,7 @@ class Breaker:
             self.closed = self._driven
 
 
-def request_line(kernel: "Kernel", chip: Chip, name: str, argument: bytearray) -> int:
+def request_line(kernel: "Descriptors", chip: Chip, name: str, argument: bytearray) -> int:
     """GPIO_V2_GET_LINE_IOCTL."""
     offset, consumer, flags, *rest = REQUEST.unpack(argument)
     output = chip.outputs.get(offset)

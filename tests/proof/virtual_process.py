@@ -16,10 +16,14 @@ from math import inf
 from types import SimpleNamespace
 from typing import Any, Self
 
-from tests.proof.virtual_kernel import BACKLOG, Death, File, Kernel, Poll, Proc, Socket
+from tests.proof.virtual_files import Death, File, Proc, Socket
+from tests.proof.virtual_kernel import Kernel
 from tests.proof.virtual_time import Runner, StuckError
+from tests.proof.virtual_waits import Poll
 
 PIDS = count(5000)
+#: A socket takes this many messages.
+BACKLOG = 200
 KILLS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 

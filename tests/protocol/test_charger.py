@@ -13,6 +13,7 @@ from orchestrator.model import (
     Command,
     Connection,
     ControlMode,
+    ErrorBit,
     Operation,
     Precharge,
 )
@@ -24,7 +25,6 @@ from orchestrator.protocol.charger import (
     STATUS_VALUES,
     STOP_FRAME,
     Code,
-    ErrorBit,
     ErrorReply,
     Kind1,
     Kind2,

@@ -29,6 +29,11 @@ def fed(decoder: FrameDecoder, parts: Iterable[bytes]) -> list[bytes]:
     return [frame.encode() for part in parts for frame in decoder.feed(part)]
 
 
+def waiting(decoder: FrameDecoder) -> int:
+    """How many bytes wait for the rest of their frame."""
+    return len(decoder._pending)
+
+
 def all_of(stream: bytes) -> list[bytes]:
     """Everything found in a stream after which the line falls quiet."""
     decoder = FrameDecoder()
@@ -59,7 +64,7 @@ ARRIVALS: dict[str, Callable[[bytes], list[bytes]]] = {
 def test_golden_frames_are_found_however_they_arrive(vector: ChargerVector, arrival: str) -> None:
     decoder = FrameDecoder()
     assert fed(decoder, ARRIVALS[arrival](vector.wire)) == ([vector.wire] if vector.valid else [])
-    assert decoder.pending <= 8
+    assert waiting(decoder) <= 8
 
 
 @pytest.mark.parametrize("vector", GOOD, ids=str)
@@ -73,7 +78,6 @@ def test_the_documents_misprinted_frame_is_a_bad_frame_like_any_other() -> None:
     decoder = FrameDecoder()
     assert decoder.feed(bytes.fromhex("AFFA90071F031110058939AFA0")) == []
     assert decoder.bad_frames == 1
-    assert decoder.last_reject == "checksum 0x39, expected 0x68 in AF FA 90 07 1F 03 11 10 05 89 39 AF A0"
 
 
 @pytest.mark.parametrize("data", [START, END, START + END, STOP, b"\xaf" * 32, (START + b"\x90\x23") * 8])
@@ -107,19 +111,19 @@ def test_the_smallest_and_the_largest_frame_are_good(data: bytes) -> None:
 # --- damage ----------------------------------------------------------------------------------------------------------
 
 DAMAGE = [
-    (RUN[:2] + b"\x91" + RUN[3:], "address 0x91, expected 0x90 in AF FA 91 05 02 90 01 01 29 AF A0"),
+    (RUN[:2] + b"\x91" + RUN[3:], "address 0x91, expected 0x90"),
     (
         bytes.fromhex("AFFA9105029001012AAFA0"),  # its sum is right
-        "address 0x91, expected 0x90 in AF FA 91 05 02 90 01 01 2A AF A0",
+        "address 0x91, expected 0x90",
     ),
-    (RUN[:3] + b"\x02" + RUN[4:], "length 0x02, expected 0x03 … 0x23 in AF FA 90 02"),
-    (RUN[:3] + b"\x24" + RUN[4:], "length 0x24, expected 0x03 … 0x23 in AF FA 90 24"),
-    (RUN[:8] + b"\x2a" + RUN[9:], "checksum 0x2A, expected 0x29 in AF FA 90 05 02 90 01 01 2A AF A0"),
-    (RUN[:9] + b"\xaa" + RUN[10:], "end AA A0, expected AF A0 in AF FA 90 05 02 90 01 01 29 AA A0"),
-    (RUN[:10] + b"\xaa", "end AF AA, expected AF A0 in AF FA 90 05 02 90 01 01 29 AF AA"),
+    (RUN[:3] + b"\x02" + RUN[4:], "length 0x02, expected 0x03 … 0x23"),
+    (RUN[:3] + b"\x24" + RUN[4:], "length 0x24, expected 0x03 … 0x23"),
+    (RUN[:8] + b"\x2a" + RUN[9:], "checksum 0x2A, expected 0x29"),
+    (RUN[:9] + b"\xaa" + RUN[10:], "end AA A0, expected AF A0"),
+    (RUN[:10] + b"\xaa", "end AF AA, expected AF A0"),
     (
         RUN[:3] + b"\x04" + RUN[4:],
-        "checksum 0x01, expected 0x27; end 29 AF, expected AF A0 in AF FA 90 04 02 90 01 01 29 AF",
+        "checksum 0x01, expected 0x27; end 29 AF, expected AF A0",
     ),
 ]
 
@@ -129,42 +133,33 @@ def test_a_damaged_frame_is_dropped_and_says_what_was_expected(bad: bytes, why: 
     for parts in ([bad, STOP], bytewise(bad + STOP)):
         decoder = FrameDecoder()
         assert fed(decoder, parts) == [STOP]
-        assert (decoder.bad_frames, decoder.skipped_bytes, decoder.pending) == (1, len(bad), 0)
-        assert decoder.last_reject.split(" in ")[0] == why.split(" in ")[0]
-    whole = FrameDecoder()
-    whole.feed(bad + STOP)
-    assert whole.last_reject == why
-
-
-def test_nothing_is_said_before_anything_was_wrong() -> None:
-    decoder = FrameDecoder()
-    decoder.feed(RUN)
-    assert (decoder.last_reject, decoder.bad_frames, decoder.skipped_bytes) == ("", 0, 0)
+        assert (decoder.bad_frames, decoder.skipped_bytes, waiting(decoder)) == (1, len(bad), 0)
+    assert why_bad(bad) == why
 
 
 @pytest.mark.parametrize("head", ["AF FA 91", "AF FA 90 02", "AF FA 90 24"])
 def test_a_start_with_a_wrong_address_or_length_is_not_waited_for(head: str) -> None:
     decoder = FrameDecoder()
     assert decoder.feed(bytes.fromhex(head)) == []
-    assert (decoder.pending, decoder.bad_frames) == (0, 1)
+    assert (waiting(decoder), decoder.bad_frames) == (0, 1)
 
 
 @pytest.mark.parametrize(
     ("cut", "why"),
     [
-        (START, "incomplete: 2 bytes, the smallest frame has 9 in AF FA"),
-        (START + b"\x90", "incomplete: 3 bytes, the smallest frame has 9 in AF FA 90"),
-        (RUN[:4], "incomplete: 4 bytes, its length 0x05 makes it 11 in AF FA 90 05"),
-        (RUN[:-1], "incomplete: 10 bytes, its length 0x05 makes it 11 in AF FA 90 05 02 90 01 01 29 AF"),
+        (START, "incomplete: 2 bytes, the smallest frame has 9"),
+        (START + b"\x90", "incomplete: 3 bytes, the smallest frame has 9"),
+        (RUN[:4], "incomplete: 4 bytes, its length 0x05 makes it 11"),
+        (RUN[:-1], "incomplete: 10 bytes, its length 0x05 makes it 11"),
     ],
 )
 def test_an_incomplete_frame_waits_until_the_line_is_quiet(cut: bytes, why: str) -> None:
     decoder = FrameDecoder()
     assert decoder.feed(cut) == []
-    assert (decoder.pending, decoder.bad_frames, decoder.last_reject) == (len(cut), 0, "")
+    assert (waiting(decoder), decoder.bad_frames) == (len(cut), 0)
     assert decoder.flush() == []
-    assert (decoder.pending, decoder.bad_frames, decoder.skipped_bytes) == (0, 1, len(cut))
-    assert decoder.last_reject == why
+    assert (waiting(decoder), decoder.bad_frames, decoder.skipped_bytes) == (0, 1, len(cut))
+    assert why_bad(cut) == why
     assert fed(decoder, [RUN]) == [RUN]
 
 
@@ -173,7 +168,7 @@ def test_a_good_frame_inside_a_waiting_false_start_comes_out_with_the_flush() ->
     decoder = FrameDecoder()
     assert decoder.feed(false_start + STOP + RUN + false_start) == []
     assert [frame.encode() for frame in decoder.flush()] == [STOP, RUN]
-    assert (decoder.pending, decoder.bad_frames, decoder.skipped_bytes) == (0, 2, 8)
+    assert (waiting(decoder), decoder.bad_frames, decoder.skipped_bytes) == (0, 2, 8)
 
 
 def test_a_good_frame_inside_a_false_start_comes_out_as_soon_as_that_is_whole() -> None:
@@ -185,26 +180,18 @@ def test_a_good_frame_inside_a_false_start_comes_out_as_soon_as_that_is_whole() 
 def test_half_a_start_is_kept_for_the_next_bytes_but_not_past_a_flush() -> None:
     decoder = FrameDecoder()
     assert decoder.feed(RUN + b"\xaf") != []
-    assert decoder.pending == 1
+    assert waiting(decoder) == 1
     assert fed(decoder, [RUN[1:]]) == [RUN]
     assert decoder.feed(b"\xaf") == []
     assert decoder.flush() == []
     assert fed(decoder, [RUN[1:]]) == []
 
 
-def test_reset_forgets_what_waits_and_keeps_the_counters() -> None:
-    decoder = FrameDecoder()
-    decoder.feed(DAMAGE[0][0] + RUN[:5])
-    decoder.reset()
-    assert (decoder.pending, decoder.bad_frames) == (0, 1)
-    assert fed(decoder, [RUN[5:], STOP]) == [STOP]
-
-
 def test_a_hundred_kilobytes_of_the_worst_garbage_stay_bounded() -> None:
     decoder = FrameDecoder()
     for _ in range(1000):
         decoder.feed(bytes.fromhex("AFFA9023") * 25)
-        assert decoder.pending < MAX_FRAME
+        assert waiting(decoder) < MAX_FRAME
     assert [frame.encode() for frame in decoder.feed(STOP + bytes(MAX_FRAME))] == [STOP]
 
 
@@ -226,13 +213,12 @@ def test_any_stream_gives_the_frames_that_the_reference_finds(stream: bytes, cut
     parts = split(stream, cut)
     for part in parts:
         found += [frame.encode() for frame in decoder.feed(part)]
-        assert decoder.pending < MAX_FRAME
-        assert (decoder.last_reject == "") == (decoder.bad_frames == 0)
+        assert waiting(decoder) < MAX_FRAME
     came = sum(map(len, parts))
-    assert sum(map(len, found)) + decoder.skipped_bytes + decoder.pending == came
+    assert sum(map(len, found)) + decoder.skipped_bytes + waiting(decoder) == came
     found += [frame.encode() for frame in decoder.flush()]
     assert found == frames_in(b"".join(parts))
-    assert (decoder.pending, sum(map(len, found)) + decoder.skipped_bytes) == (0, came)
+    assert (waiting(decoder), sum(map(len, found)) + decoder.skipped_bytes) == (0, came)
 
 
 @given(st.lists(st.tuples(st.binary(max_size=30).filter(lambda noise: 0xAF not in noise), frames), max_size=8))

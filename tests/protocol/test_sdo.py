@@ -35,7 +35,9 @@ GOLDEN: list[tuple[bytes, SdoReply]] = [
 ]
 
 
-@pytest.mark.parametrize(("exchange", "ours"), list(zip(BMU, GOLDEN, strict=True)))
+@pytest.mark.parametrize(
+    ("exchange", "ours"), list(zip(BMU, GOLDEN, strict=True)), ids=[one.request.hex(" ").upper() for one in BMU]
+)
 def test_the_documents_exchanges(exchange: Exchange, ours: tuple[bytes, SdoReply]) -> None:
     request, reply = ours
     assert (request_cob_id(NODE), request) == (exchange.request_cob_id, exchange.request)

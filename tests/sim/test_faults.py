@@ -258,20 +258,20 @@ def test_a_battery_can_live_faster_than_the_clock(tmp_path: Path) -> None:
     loop.close()
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "seen"),
-    [
-        ("over_temperature", 22.0, lambda rig: rig.bay.pack.temperature_c == 22),
-        ("over_voltage", 56.0, lambda rig: 56 <= rig.bay.readout().voltage_v < 56.1),
-        ("over_current", 1.25, lambda rig: rig.bay.charger.current_a == 10),
-        ("implausible_soc", 101.0, lambda rig: rig.bay.readout().soc_pct == 101),
-        ("stale_reading", 0.35, lambda rig: rig.bmu.port.faults.delay_s == 0.35),
-        ("sdo_abort", 0x0800_0020, lambda rig: rig.bmu.port.faults.aborts == {0x6004: 0x0800_0020}),
-        ("status_bits", 0x05, lambda rig: rig.bay.readout().status == 5),
-        ("volts_disagree", 0.9, lambda rig: -0.9 < gap_v(rig) < -0.8),
-        ("illegal_value", 77.0, lambda rig: rig.wire.lies == {Kind.CHARGE_MODE: 77}),
-    ],
+STRENGTHS: tuple[tuple[str, float, Callable[[Rig], bool]], ...] = (
+    ("over_temperature", 22.0, lambda rig: rig.bay.pack.temperature_c == 22),
+    ("over_voltage", 56.0, lambda rig: 56 <= rig.bay.readout().voltage_v < 56.1),
+    ("over_current", 1.25, lambda rig: rig.bay.charger.current_a == 10),
+    ("implausible_soc", 101.0, lambda rig: rig.bay.readout().soc_pct == 101),
+    ("stale_reading", 0.35, lambda rig: rig.bmu.port.faults.delay_s == 0.35),
+    ("sdo_abort", 0x0800_0020, lambda rig: rig.bmu.port.faults.aborts == {0x6004: 0x0800_0020}),
+    ("status_bits", 0x05, lambda rig: rig.bay.readout().status == 5),
+    ("volts_disagree", 0.9, lambda rig: -0.9 < gap_v(rig) < -0.8),
+    ("illegal_value", 77.0, lambda rig: rig.wire.lies == {Kind.CHARGE_MODE: 77}),
 )
+
+
+@pytest.mark.parametrize(("name", "value", "seen"), STRENGTHS, ids=[name for name, _, _ in STRENGTHS])
 def test_strengths_can_be_chosen(name: str, value: float, seen: Callable[[Rig], bool], scene: Scene) -> None:
     scene.inject(name, value)
     assert seen(scene.rig)

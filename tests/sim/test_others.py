@@ -15,10 +15,10 @@ from orchestrator.sim.can_wire import CanWire
 from orchestrator.sim.forger import Forger, Lie, When
 from orchestrator.sim.main_loop import LATEST_S, MainLoop
 from orchestrator.sim.second_master import EVERYTHING, SecondMaster
+from tests.proof.virtual_calls import Calls
 from tests.proof.virtual_can import BusWire
-from tests.proof.virtual_kernel import Calls
 from tests.proof.virtual_time import Time
-from tests.sim.test_bmu import TOLD
+from tests.sim.wires import TOLD
 from tests.waiting import wait_until
 
 NODE_ID = 0x10

@@ -11,6 +11,22 @@ from collections.abc import Iterator
 
 import can
 
+from orchestrator.sim.pack import Readout
+
+#: Chosen so that 0x6000 reads as in the manual's sample (§4.1.2), and every field of the others can be told apart.
+TOLD = Readout(
+    voltage_v=23.68,
+    current_a=-0.08,
+    status=0x0041,
+    time_to_full_min=None,
+    time_to_empty_min=0x0102,
+    soc_pct=55.4,
+    soh_pct=98.0,
+    remaining_ah=11.08,
+    available_wh=532.9,
+    temperature_c=-2.5,
+)
+
 DEADLINE_S = 5.0
 
 

@@ -11,9 +11,9 @@ from orchestrator.config.load import load_policy
 from orchestrator.core.rules import Rules
 from orchestrator.workbench import processes
 from orchestrator.workbench.prove import exhaustive
-from orchestrator.workbench.prove.endings import reaches
 from orchestrator.workbench.prove.exhaustive import bay_of, bays_in, here
 from orchestrator.workbench.prove.explore import Explorer
+from orchestrator.workbench.prove.lasting import reaches
 from tests.proof.exploring import small, walk_on
 
 ROOT = Path(__file__).parent

@@ -188,7 +188,7 @@ def one_run(directory: Path, began_s: float, wall_s: float, *, trip: bool = Fals
         bench.bay.end("SIGTERM")
     bench.step(20)
     bench.journal._write()
-    bench.store._give_up_ownership()
+    bench.store._ownership.give_up()
 
 
 def replayed(directory: Path, capsys: pytest.CaptureFixture[str]) -> str:

@@ -14,8 +14,9 @@ from typing import Any, Union, get_args, get_origin
 
 from orchestrator.config.yaml import scalars
 from orchestrator.config.yaml.scalars import UnfitError
-from orchestrator.config.yaml.schema import INVALID, Slot, join, places, slots
+from orchestrator.config.yaml.schema import INVALID, Slot, join, slots
 from orchestrator.config.yaml.tree import Entries, Items, Mark, Node, Refused, Scalar
+from orchestrator.config.yaml.unknown import unknown_key
 from orchestrator.config.yesterday import ROWS, Yesterday
 from orchestrator.errors import Finding
 from orchestrator.keys import Key, Range, Source
@@ -204,18 +205,11 @@ class Reader:
 
     def _unknown(self, name: Scalar, record: type, taken: set[str], path: str) -> Slot | None:
         """Says what an unknown key may have meant; if that is still free, its value is read as such."""
-        known = slots(record)
-        near = scalars.nearest(name.text, known) if len(self.findings) < MAX_FINDINGS else ""
-        hint = f"did you mean {near}? Allowed here: " if near else "allowed here: "
-        inner = places(record, frozenset(self._references))
-        where = [place for place in inner if place.rpartition(".")[2] == name.text]
-        if where:
-            hint = (
-                f"it belongs below {' or '.join(place.rpartition('.')[0] for place in where)}, indented; allowed here: "
-            )
+        guess = len(self.findings) < MAX_FINDINGS  # a guess takes its time, and nobody would read it any more
+        meant = unknown_key(name.text, record, frozenset(self._references), guess=guess)
         at = f" in {path}" if path else ""
-        self._report(name.mark, f"unknown key {name.text!r}{at}; {hint}{', '.join(known)}")
-        return known[near] if near and near not in taken and not where else None
+        self._report(name.mark, f"unknown key {name.text!r}{at}; {meant.hint}")
+        return meant.slot if meant.slot is not None and meant.slot.name not in taken else None
 
     def _absent(self, slot: Slot, record: type, path: str) -> object:
         if slot.default is INVALID:

@@ -15,9 +15,10 @@ from orchestrator.errors import ConfigError
 from orchestrator.model import ControlMode
 from orchestrator.protocol.objects import ObjectMap
 from orchestrator.workbench.processes import cores
-from orchestrator.workbench.prove.endings import ENDINGS, reaches, settles
+from orchestrator.workbench.prove.endings import ENDINGS
 from orchestrator.workbench.prove.explore import Each, Explorer, Walk
 from orchestrator.workbench.prove.inputs import StationInputs
+from orchestrator.workbench.prove.lasting import reaches, settles
 from orchestrator.workbench.prove.properties import PROPERTIES
 from orchestrator.workbench.prove.story import Counterexample
 

@@ -1,0 +1,94 @@
+"""What must hold for the CAN buses of one station, and for the filters that it may put on them."""
+
+from collections.abc import Callable, Mapping
+
+from orchestrator.config.rules import Problems
+from orchestrator.config.yaml.scalars import nearest
+
+BITRATES = (10_000, 1_000_000)  #: bit/s, CiA 301
+SIMULATED = ("virtual", "udp_multicast")  #: buses without a wire, hence without a bit rate
+#: python-can's own; others may come from its plug-ins, so that an unlike name is let through.
+INTERFACES = (
+    "canalystii",
+    "cantact",
+    "etas",
+    "gs_usb",
+    "iscan",
+    "ixxat",
+    "kvaser",
+    "neousys",
+    "neovi",
+    "nican",
+    "nixnet",
+    "pcan",
+    "robotell",
+    "seeedstudio",
+    "serial",
+    "slcan",
+    "socketcan",
+    "socketcand",
+    "systec",
+    "udp_multicast",
+    "usb2can",
+    "vector",
+    "virtual",
+)
+
+_SDO_ANSWERS = 0x580  #: + the node id
+
+
+def bus_problems(buses: Mapping[str, Mapping[str, object]]) -> Problems:
+    """Each bus has an interface and a bit rate, and stands in the file once."""
+    seen: dict[object, str] = {}
+    for name, bus in buses.items():
+        yield from ((f"can.{name}{at}", text) for at, text in _bus(bus))
+        first = seen.setdefault(repr((bus.get("interface"), bus.get("channel"))), name)
+        if first != name:
+            yield f"can.{name}", f"is the same interface and channel as {first}: name each bus once"
+
+
+def _bus(bus: Mapping[str, object]) -> Problems:
+    interface, bitrate = bus.get("interface"), bus.get("bitrate")
+    if not isinstance(interface, str):
+        yield "", "the key 'interface' is missing: which of python-can's interfaces, e.g. socketcan"
+    elif interface not in INTERFACES and (near := nearest(interface, INTERFACES)):
+        yield ".interface", f"{interface!r} is not an interface of python-can; did you mean {near}?"
+    if bitrate is None:
+        if interface not in SIMULATED:
+            yield "", "the key 'bitrate' is missing: the bus's bit/s (the BMU's document does not say it), e.g. 250000"
+    elif not isinstance(bitrate, int) or not BITRATES[0] <= bitrate <= BITRATES[1]:
+        yield ".bitrate", f"{bitrate!r} is no bit rate; in bit/s, {BITRATES[0]} … {BITRATES[1]}, e.g. 250000"
+
+
+def filter_problems(buses: Mapping[str, Mapping[str, object]], bays: Mapping[str, Mapping[str, object]]) -> Problems:
+    """A filter of the station's own must let through what its BMUs say."""
+    for name, bus in buses.items():
+        if "can_filters" not in bus:
+            continue
+        at, passed = f"can.{name}.can_filters", _passed(bus["can_filters"])
+        if passed is None:
+            yield at, "needs a list of {can_id: 0x590, can_mask: 0x7FF}: the ids that are let through"
+            continue
+        for bay in bays.values():
+            node_id = bay.get("battery.node_id")
+            if bay.get("battery.can") == name and isinstance(node_id, int) and not passed(_SDO_ANSWERS + node_id):
+                yield (
+                    at,
+                    f"keeps back 0x{_SDO_ANSWERS + node_id:X}, the answers of the BMU with node id 0x{node_id:02X}",
+                )
+
+
+def _passed(filters: object) -> Callable[[int], bool] | None:
+    """Which standard ids python-can's filters let through; None if they are not as it wants them."""
+    if not isinstance(filters, list) or not filters:
+        return None
+    pairs: list[tuple[int, int]] = []
+    for one in filters:
+        if not isinstance(one, Mapping) or set(one) - {"extended"} != {"can_id", "can_mask"}:
+            return None
+        can_id, mask = one["can_id"], one["can_mask"]
+        if not (isinstance(can_id, int) and isinstance(mask, int)):
+            return None
+        if one.get("extended") is not True:
+            pairs.append((can_id, mask))
+    return lambda cob_id: any((cob_id ^ can_id) & mask == 0 for can_id, mask in pairs)

@@ -1,0 +1,62 @@
+"""What is known of one charger: its newest reading, and how its line is doing."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from orchestrator.devices.dialogue import SILENCE, Dialogue, Heard
+from orchestrator.devices.line_quality import LineQuality
+from orchestrator.model import ChargerLink, ChargerReading
+
+#: So many polls in a row without an answer are silence: with one frame in a hundred lost, three come every seven hours,
+#: five once in two years. Five take 1.12 s of the 2.0 s that a silent device may go on for (DESIGN §6).
+MISSES_UNTIL_SILENT = 5
+#: Answers that come late are no accident: what is asked for repeats after three, and a late one would pass for fresh.
+LATE_UNTIL_SILENT = 3
+
+
+class ChargerView:
+    """The newest consistent pair; `on_change()` is called after each reading and each change of the link."""
+
+    __slots__ = ("_on_change", "_port", "_quality", "current")
+
+    def __init__(self, port: str, on_change: Callable[[], None]) -> None:
+        self._port, self._on_change = port, on_change
+        self._quality = LineQuality()
+        #: What other threads may look at.
+        self.current: tuple[ChargerReading | None, ChargerLink] = (None, ChargerLink(problem=f"{port}: not opened yet"))
+
+    @property
+    def link(self) -> ChargerLink:
+        """How the line is doing."""
+        return self.current[1]
+
+    def polled(self, reading: ChargerReading | None, dialogue: Dialogue, now_s: float, refused: str) -> None:
+        """A poll is over; `reading` is None where no answer came, `refused` why an order did not go out instead."""
+        link = self.link
+        misses = 0 if reading else link.misses + 1
+        problem = "" if reading else link.problem
+        silent = misses >= (LATE_UNTIL_SILENT if dialogue.heard is Heard.LATE_REPLY else MISSES_UNTIL_SILENT)
+        complained = dialogue.error_t_s != link.error_t_s
+        self._quality.count(now_s, bad=reading is None or complained)
+        if silent:
+            problem = f"{self._port}: {SILENCE[dialogue.heard]}"
+        self.publish(
+            reading,
+            online=reading is not None or (link.online and not silent),
+            misses=misses,
+            problem=problem,
+            refused=refused,
+            error_bits=dialogue.error_bits,
+            error_t_s=dialogue.error_t_s,
+            bad_frames=dialogue.bad_frames,
+            bad_pct=self._quality.bad_pct,
+        )
+
+    def publish(self, reading: ChargerReading | None = None, **changes: object) -> None:
+        """Let the others see what has changed."""
+        last_reading, last_link = self.current
+        link = replace(last_link, **changes)  # type: ignore[arg-type]  # the callers name the fields of ChargerLink
+        if reading is None and link == last_link:
+            return
+        self.current = (reading or last_reading, link)
+        self._on_change()

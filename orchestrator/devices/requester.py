@@ -1,0 +1,86 @@
+"""Which request goes to a BMU next, and when: one at a time, as the bus's budget and other masters allow."""
+
+from collections.abc import Callable
+from math import inf
+
+from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup, TimerWrite
+from orchestrator.devices.bus_budget import BusBudget
+from orchestrator.devices.other_masters import OtherMasters
+from orchestrator.devices.polled import Polled
+from orchestrator.devices.read_plan import ReadPlan
+from orchestrator.devices.sdo_client import Key, SdoClient
+from orchestrator.protocol.sdo import NMT_COB_ID, NmtCommand, nmt_frame, read_request, request_cob_id
+
+Send = Callable[[int, bytes], None]
+
+SILENT_S = 0.5  #: pause between requests to a node that is not online: it shall not cost the others' time
+
+
+class Requester:
+    """Asks one BMU for its objects, sets its timers and starts it. Belongs to the thread of its bus."""
+
+    __slots__ = ("_budget", "_client", "_node_id", "_not_before_s", "_others", "_plan", "_setup", "_slot_s")
+
+    def __init__(
+        self,
+        node_id: int,
+        budget: BusBudget,
+        *,
+        plan: ReadPlan,
+        client: SdoClient,
+        setup: BmuSetup,
+        others: OtherMasters,
+    ) -> None:
+        self._node_id, self._budget = node_id, budget
+        self._plan, self._client, self._setup, self._others = plan, client, setup, others
+        self._not_before_s = -inf  # when a silent node may be asked again
+        self._slot_s: float | None = None  # when the bus's budget lets the next request go out, if that is reserved
+
+    def hurry(self) -> None:
+        """The node answers, or has just booted: it is not kept waiting."""
+        self._not_before_s = -inf
+
+    def fail(self, now_s: float) -> float:
+        """What was asked is lost; when the node may be asked again."""
+        self._client.drop()
+        self._slot_s = None
+        self._not_before_s = now_s + SILENT_S
+        return self._not_before_s
+
+    def ask(self, now_s: float, send: Send, *, online: bool) -> float:
+        """Send the next request if one is due, and return when to come here again."""
+        if now_s < self._not_before_s:
+            return self._not_before_s
+        if self._setup.start_due:
+            self._setup.start_due = False
+            send(NMT_COB_ID, nmt_frame(NmtCommand.START, self._node_id))
+            return now_s
+        write = self._setup.next_write(now_s) if online else None
+        if write is not None and self._client.may_ask(write.key):
+            return self._request(write, now_s, send, online=online)
+        if self._setup.check_due and online and self._client.may_ask(HEARTBEAT):
+            return self._request(HEARTBEAT, now_s, send, online=online)
+        chosen = self._plan.choose(now_s, self._client)
+        return self._request(chosen, now_s, send, online=online) if isinstance(chosen, Polled) else chosen
+
+    def _request(self, what: TimerWrite | Polled | Key, now_s: float, send: Send, *, online: bool) -> float:
+        if self._slot_s is None:
+            self._slot_s = self._budget.reserve(now_s)
+        begin_s = max(self._slot_s, self._others.wait_until_s(now_s))
+        if now_s < begin_s:
+            return begin_s
+        self._slot_s = None
+        if isinstance(what, Polled):
+            key, frame = what.key, read_request(*what.key)
+            self._plan.asked(what, now_s)
+        elif isinstance(what, TimerWrite):
+            key, frame = what.key, what.frame()
+            self._setup.sent(now_s)
+        else:
+            key, frame = what, read_request(*what)
+            self._setup.checking(now_s)
+        self._client.ask(key, now_s, write=isinstance(what, TimerWrite))
+        if not online:
+            self._not_before_s = now_s + SILENT_S
+        send(request_cob_id(self._node_id), frame)
+        return now_s

@@ -1,0 +1,101 @@
+"""What is asked at the control socket, in its own thread: the status, or a request that is handed to the bays."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from orchestrator.config.station import Station
+from orchestrator.errors import ServiceError
+from orchestrator.model import Cause, Request
+from orchestrator.model.cause import plain
+from orchestrator.service.asked import Asked
+from orchestrator.service.bay import BayRunner
+from orchestrator.service.journal import Journal
+from orchestrator.service.reception import Answer, Later
+from orchestrator.service.status import station_status
+from orchestrator.service.store import KEPT_WITHIN_S, Store
+from orchestrator.service.strays import Strays
+from orchestrator.text.catalogue import say
+
+#: A request is decided by the next step, and answered when it is on disk or after 2 s; longer is a loop that hangs.
+ANSWER_S = 3.0
+
+
+class RequestHandler:
+    """Answers for a station. `wake` has the control loop step the bay with this number."""
+
+    def __init__(
+        self,
+        station: Station,
+        bays: Sequence[BayRunner],
+        journal: Journal,
+        store: Store,
+        strays: Strays,
+        clock: Callable[[], float],
+        wake: Callable[[int], None],
+    ) -> None:
+        self._station, self._bays = station, bays
+        self._journal, self._store, self._strays = journal, store, strays
+        self._clock, self._wake = clock, wake
+
+    def answer(self, request: Mapping[str, object]) -> Answer | Later:
+        """Whatever was asked; ServiceError where it cannot be understood or done."""
+        verb = request.get("verb")
+        if verb == "status":
+            name = request.get("bay")
+            bays = self._bays if name is None else [self._named(name)]
+            now_s, shown = self._clock(), [bay.status() for bay in bays]
+            problem, unkept = self._journal.problem(now_s), self._store.unkept(now_s)
+            alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
+            return station_status(self._station, alarm, shown, problem, unkept, self._strays.status())
+        if isinstance(verb, str) and verb in set(Request):
+            names, port = request.get("bays"), request.get("port")
+            if verb == Request.RESET and isinstance(port, str):
+                return self._drop(port)
+            bays = self._bays if names is None else [self._named(name) for name in _names(names)]
+            return self._ask(list(dict.fromkeys(bays)), Request(verb))
+        raise ServiceError(f"unknown verb {verb!r}: status, {', '.join(Request)}")
+
+    def _drop(self, port: str) -> Later:
+        """Forget a charger that no bay has any more; told when the disk has it."""
+        self._store.refuse_unkept(self._clock())
+        what, revision = self._strays.drop(port)
+        end_s = self._clock() + KEPT_WITHIN_S
+
+        def results() -> Answer | None:
+            if self._store.kept_revision >= revision:
+                return {"results": {what: ""}}
+            why = self._store.unkept(self._clock()) or "the disk has not taken it"
+            return {"results": {what: f"dropped, but not kept: {why}"}} if self._clock() >= end_s else None
+
+        return results
+
+    def _named(self, name: object) -> BayRunner:
+        for bay in self._bays:
+            if bay.name == name:
+                return bay
+        raise ServiceError(f"no bay {name!r} here: {', '.join(bay.name for bay in self._bays)}")
+
+    def _ask(self, bays: Sequence[BayRunner], request: Request) -> Later:
+        """Hand the request to each bay; what they say is there later, "" is yes."""
+        asked = {bay.name: Asked(request) for bay in bays}
+        for bay in bays:
+            bay.ask(asked[bay.name])
+            self._wake(self._bays.index(bay))
+        end_s = self._clock() + ANSWER_S
+        late = Cause("no_answer")
+
+        def results() -> Answer | None:
+            if not all(one.done.is_set() for one in asked.values()) and self._clock() < end_s:
+                return None
+            answers = {name: one.answer if one.done.is_set() else late for name, one in asked.items()}
+            return {
+                "results": {name: say(answer, self._station.language.value) for name, answer in answers.items()},
+                "causes": {name: plain(answer) for name, answer in answers.items() if answer is not None},
+            }
+
+        return results
+
+
+def _names(value: object) -> list[object]:
+    if not isinstance(value, list):
+        raise ServiceError("'bays' is a list of names, or null for all")
+    return value

@@ -1,0 +1,152 @@
+"""The verbs of the running service: it is started, looked at, and asked to start, pause, stop or reset its bays.
+
+Each imports what it needs when it runs, so that none waits for another's libraries.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import cast
+
+from orchestrator.errors import NoServiceError, ServiceError, UsageError
+
+REQUESTS = {
+    "start": "let a bay charge (again): after a stop, a pause or a reset",
+    "pause": "stop charging until `start`; the session goes on",
+    "stop": "stop charging; only `start` begins again",
+    "reset": "clear latched faults whose cause is gone; `start` then begins again",
+}
+
+
+#: Those that are done only when the charger was seen to stand by, and how long that is waited for: a charger that does
+#: not obey is uncontrollable after 3 s.
+STOPS = ("stop", "pause")
+STANDBY_S, LOOK_S = 4.0, 0.1
+#: `status --watch` looks this often.
+WATCH_S = 1.0
+
+
+def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """`run`, `status` and the requests."""
+    run = verbs.add_parser("run", help="run the service for a station, until it is told to end")
+    run.add_argument("station", nargs="?", default="station.yaml", help="the station file (default: %(default)s)")
+    run.set_defaults(run=_run)
+    status = verbs.add_parser("status", help="what every bay does, and why")
+    status.add_argument("bay", nargs="?", help="only this bay")
+    status.add_argument("--json", action="store_true", help="the status document, for programs")
+    status.add_argument("--watch", action="store_true", help="again and again, until interrupted")
+    _add_socket(status)
+    status.set_defaults(run=_status)
+    for verb, about in REQUESTS.items():
+        request = verbs.add_parser(verb, help=about)
+        request.add_argument("bay", nargs="*", help="the bays")
+        request.add_argument("--all", action="store_true", help="every bay of the station")
+        if verb == "reset":
+            request.add_argument("--port", help="forget the charger on this port, which no bay has and which is gone")
+        _add_socket(request)
+        request.set_defaults(run=_request, verb=verb)
+
+
+def _add_socket(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--socket",
+        help="the service's control socket (default: $ORCHESTRATOR_SOCKET, else that of station.yaml here, else of the "
+        "installed service)",
+    )
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from orchestrator.lastresort.guardian import guard
+
+    return guard([arguments.station])
+
+
+def _status(arguments: argparse.Namespace) -> int:
+    from orchestrator.lastresort.asking import ask
+    from orchestrator.service.where import find_socket
+
+    path, seen, lost = find_socket(arguments.socket), False, ""
+    while True:
+        try:
+            answer = ask(path, {"verb": "status", "bay": arguments.bay})
+        except NoServiceError as error:
+            if not (arguments.watch and seen):  # one that has never answered may be the wrong one
+                raise
+            if not lost:
+                lost = str(error)
+                print(f"orchestrator: still watching: {error}", file=sys.stderr, flush=True)
+        else:
+            answer.pop("ok")
+            _show_status(answer, as_json=arguments.json, clear=arguments.watch and sys.stdout.isatty())
+            if lost:
+                print("orchestrator: the service answers again", file=sys.stderr, flush=True)
+            seen, lost = True, ""
+        if not arguments.watch:
+            return 0
+        time.sleep(WATCH_S)
+
+
+def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
+    from orchestrator.show import own_language, page
+
+    if as_json:
+        print(json.dumps(document, ensure_ascii=False), flush=True)
+        return
+    text = page(document, own_language())
+    print(f"\x1b[H\x1b[2J{document['station']}\n{text}" if clear else text, flush=True)
+
+
+def _request(arguments: argparse.Namespace) -> int:
+    from orchestrator.lastresort.asking import ask
+    from orchestrator.service.where import find_socket
+    from orchestrator.show import own_language
+    from orchestrator.text.document import refusals
+
+    port = getattr(arguments, "port", None)
+    if bool(arguments.bay) + arguments.all + (port is not None) != 1:
+        raise UsageError(f"{arguments.verb}: name bays, or --all{', or --port' if arguments.verb == 'reset' else ''}")
+    bays, path = None if arguments.all else arguments.bay, find_socket(arguments.socket)
+    request = {"verb": arguments.verb, "bays": bays} | ({} if port is None else {"port": os.path.abspath(port)})  # noqa: PTH100 - not resolved
+    try:
+        results = refusals(ask(path, request), own_language())
+    except NoServiceError as error:
+        without = "; to stop chargers without a service: orchestrator estop" if arguments.verb in STOPS else ""
+        raise ServiceError(f"{error}{without}") from None
+    accepted = [bay for bay, refusal in results.items() if not refusal]
+    unverified, then = {}, ""
+    if arguments.verb in STOPS:
+        # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
+        looked_at = list(results) if arguments.verb == "stop" else accepted
+        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), "; stands by, verified"
+    for line in (*unverified.values(), *(f"{bay}: {refusal}" for bay, refusal in results.items() if refusal)):
+        print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
+    for bay in accepted:
+        print(f"{bay}: {arguments.verb} accepted{'' if bay in unverified else then}")
+    return 1 if unverified or any(results.values()) else 0
+
+
+def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[str, str]:
+    """Look at these bays until their chargers stand by; what to do about each that was not seen to in time.
+
+    `every`: and at chargers that are no bay's any more.
+    """
+    from orchestrator.lastresort.asking import ask
+    from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do
+    from orchestrator.text.document import in_language
+
+    end_s, language = time.monotonic() + STANDBY_S, own_language()
+    while True:
+        try:
+            document = in_language(ask(path, {"verb": "status"}, max(end_s - time.monotonic(), LOOK_S)), language)
+        except ServiceError as error:
+            return {name: f"{name}: NOT verified, run `orchestrator estop`: {error}" for name in names}
+        found = cast("list[dict[str, object]]", document["bays"])
+        bays = [bay for bay in found if bay["name"] in names and not stands_by(bay)]
+        others = strays(document, language) if every else []
+        if time.monotonic() >= end_s or (all(map(is_alarming, bays)) and not others):
+            return {str(bay["name"]): what_to_do(bay, language) for bay in bays} | {text: text for text in others}
+        time.sleep(LOOK_S)

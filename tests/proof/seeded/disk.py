@@ -1,0 +1,211 @@
+"""Seeds of what must be on the disk."""
+
+from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
+
+UNKNOWN_PAST = "return own.persisted if own else Persisted(hold=unknown)"
+
+DISK: tuple[Seed, ...] = (
+    scene(
+        "a running charge is not kept",
+        "disk",
+        "it is not written down that a charger may be running",
+        ("charging, then no power",),
+        (
+            f"{CORE}persisted.py",
+            "running=memory.state in RUNNING or memory.intends or memory.unverified,",
+            "running=False,",
+        ),
+        (
+            f"{SERVICE}bay.py",
+            "running_kept=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,",
+            "running_kept=True,",
+        ),
+    ),
+    scene(
+        "who ran is not held",
+        "disk",
+        "a charge that a crash has ended goes on by itself after the restart",
+        ("charging, then no power",),
+        (f"{CORE}persisted.py", "        if self.running:\n", "        if False:\n"),
+    ),
+    scene(
+        "a charge begins before it is written down",
+        "disk",
+        "RUN goes out though the disk has not taken that the charger may be running",
+        ("fsync hangs, begun, killed", "disk full"),
+        (
+            f"{SERVICE}bay.py",
+            "running_kept=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,",
+            "running_kept=True,",
+        ),
+        (
+            f"{SERVICE}store.py",
+            '        if self._problem:\n            return f"a restart',
+            '        if False:\n            return f"a restart',
+        ),
+        (
+            f"{SERVICE}store.py",
+            "        if pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:",
+            "        if False:",
+        ),
+    ),
+    scene(
+        "a request is answered before it is kept",
+        "disk",
+        "a stop is answered with yes while the disk has not taken it",
+        ("stopped at rest, then no power at once",),
+        (f"{SERVICE}asked.py", "        if answer is not None:\n", "        if True:\n"),
+    ),
+    part(
+        "nobody is told what is not kept",
+        "disk",
+        "a disk that takes nothing is not reported, and a charge may begin",
+        ("tests/service/test_store.py",),
+        (
+            f"{SERVICE}store.py",
+            '        """Why a restart would forget something; "" while it would not."""\n',
+            '        """Why a restart would forget something; "" while it would not."""\n        return ""\n',
+        ),
+    ),
+    hostile(
+        "an end that has kept nothing is a good one",
+        "disk",
+        "the service ends with 0 though the disk has not taken what the next start must know",
+        ("tests/whole/test_survives.py::test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one",),
+        (
+            f"{SERVICE}supervisor.py",
+            "        unkept = self._store.close(KEEP_S)\n",
+            '        self._store.close(KEEP_S)\n        unkept = ""\n',
+        ),
+    ),
+    scene(
+        "standard error is written before the state",
+        "disk",
+        "who writes the persisted state first waits for whoever reads standard error",
+        ("standard error is not read",),
+        (
+            f"{SERVICE}store.py",
+            "        stamp = self._stamp()\n        with self._lock:\n",
+            '        stamp = self._stamp()\n        os.write(2, b"keeping\\n" * 1000)\n        with self._lock:\n',
+        ),
+    ),
+    scene(
+        "a hold is not kept",
+        "disk",
+        "an operator's stop is forgotten with a restart",
+        ("stopped, then no power",),
+        (f"{CORE}persisted.py", "            hold=memory.hold,\n", '            hold="",\n'),
+    ),
+    scene(
+        "latches are not kept",
+        "disk",
+        "a fault that waits for a person is forgotten with a restart",
+        ("tripped, taken out, put back", "tripped at rest, then no power"),
+        (
+            f"{CORE}persisted.py",
+            "            if fault.raised_s is not None or fault.strikes\n",
+            "            if False\n",
+        ),
+    ),
+    part(
+        "a fault is no reason to write",
+        "disk",
+        "a fault that latches is written down with the next counters only",
+        ("tests/core/test_persisted.py",),
+        (
+            f"{CORE}persisted.py",
+            "return self.running, self.hold, self.paused, faults, resets,",
+            "return self.running, self.hold, self.paused, resets,",
+        ),
+    ),
+    part(
+        "the directory is not synchronised",
+        "disk",
+        "after the rename the directory is not brought to the disk",
+        ("tests/service/test_store.py",),
+        (
+            f"{SERVICE}disk.py",
+            "    os.replace(fresh, path)\n    sync_directory(path.parent)",
+            "    os.replace(fresh, path)",
+        ),
+    ),
+    part(
+        "the file is not synchronised",
+        "disk",
+        "a file is renamed before its bytes are on the disk",
+        ("tests/service/test_store.py",),
+        (
+            f"{SERVICE}disk.py",
+            "            data = data[os.write(fd, data) :]\n        os.fsync(fd)",
+            "            data = data[os.write(fd, data) :]",
+        ),
+    ),
+    scene(
+        "an absent bay is forgotten",
+        "disk",
+        "entries of bays that the station file lacks are dropped, and a bay without an entry is a new one",
+        ("tripped, taken out, put back",),
+        (f"{SERVICE}past.py", "        if old in pasts or any(", "        if True or any("),
+        (
+            f"{SERVICE}past.py",
+            UNKNOWN_PAST,
+            "return own.persisted if own else Persisted()",
+        ),
+    ),
+    part(
+        "a bay without a past is free to go",
+        "disk",
+        "a bay that the persisted state does not know charges at once",
+        ("tests/service/test_past.py", "tests/service/test_store.py"),
+        (
+            f"{SERVICE}past.py",
+            UNKNOWN_PAST,
+            "return own.persisted if own else Persisted()",
+        ),
+    ),
+    scene(
+        "what is kept belongs to the name alone",
+        "disk",
+        "a bay that has got another name in the station file has no past",
+        ("stopped, then renamed",),
+        (
+            f"{SERVICE}past.py",
+            "return self.bay == other.bay or self.is_port_of(other) or self.bmu == other.bmu",
+            "return self.bay == other.bay",
+        ),
+        (
+            f"{SERVICE}past.py",
+            UNKNOWN_PAST,
+            "return own.persisted if own else Persisted()",
+        ),
+    ),
+    scene(
+        "estop ignores ports in hand",
+        "disk",
+        "estop stops what the file names, not what was written down as running",
+        ("file edited, then both killed",),
+        (f"{LASTRESORT}inhand.py", '            if entry.get("running") and', "            if False and"),
+    ),
+    hostile(
+        "a start ignores ports in hand",
+        "disk",
+        "a charger that the station file has lost runs on under the next service",
+        ("tests/whole/test_survives.py::test_a_charger_that_the_station_file_has_lost_is_stopped_by_the_next_start",),
+        (
+            f"{SERVICE}store.py",
+            "            running = [place for place, put in self._table.items() if put.persisted.running]",
+            "            running: list[Place] = []",
+        ),
+    ),
+    hostile(
+        "two services keep their state in one place",
+        "disk",
+        "the directory of the persisted state is not locked",
+        ("tests/whole/test_survives.py::test_a_second_service_on_the_same_journal_ends_with_a_sentence",),
+        (
+            f"{SERVICE}disk.py",
+            "        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)\n",
+            "        fcntl.flock(fd, 0)\n",
+        ),
+    ),
+)

@@ -1,0 +1,83 @@
+"""Seeds of errors of our own."""
+
+from tests.proof.seeded.seed import CORE, SERVICE, WORKBENCH, Change, Seed, part, scene
+
+#: An arithmetic on a reading without its bounds.
+DIVIDES: Change = (
+    f"{CORE}witnesses/measured.py",
+    "    if abs(volts - pack_v) <= volts_differ(f.rules.policy.faults, pack_v):",
+    "    if abs(volts - pack_v) / pack_v <= volts_differ(f.rules.policy.faults, pack_v) / pack_v:",
+)
+#: A row that raises takes the whole step with it.
+NOT_CAUGHT: Change = (
+    f"{CORE}latches.py",
+    "    except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it\n",
+    "    except KeyError as error:\n",
+)
+OURS: tuple[Seed, ...] = (
+    scene(
+        "a reading is divided by",
+        "exception",
+        "a BMU that reads 0.00 V makes a check raise",
+        ("a BMU that reads 0.00 V",),
+        DIVIDES,
+    ),
+    part(
+        "a row takes the others with it",
+        "exception",
+        "a check that raises ends the whole step",
+        ("tests/core/test_failed.py",),
+        NOT_CAUGHT,
+    ),
+    scene(
+        "after an exception nothing is known",
+        "exception",
+        "an exception leaves the memory as it was: no fault is shown, and a stop is never given up",
+        ("a BMU that reads 0.00 V",),
+        DIVIDES,
+        NOT_CAUGHT,
+        (
+            f"{SERVICE}bay.py",
+            "            self.decision, self._memory = carry_on(now_s, snapshot, memory, internal)\n",
+            '            self.decision = Decision(State.STOPPING, f"internal error: {internal}", STOP)\n',
+        ),
+    ),
+    part(
+        "after an exception a stop is not given up",
+        "exception",
+        "a bay that cannot be judged is never out of control",
+        ("tests/core/test_failed.py",),
+        (f"{CORE}failed.py", "    if tried_s >= OBEY_STOP_S:\n", "    if False:\n"),
+    ),
+    scene(
+        "a torn line ends the replay",
+        "record",
+        "a journal with one line that cannot be read is not replayed",
+        ("a record over lives",),
+        (
+            f"{WORKBENCH}replay/recording.py",
+            "        except (BaseValidationError, LookupError, TypeError, ValueError, ",
+            "        except (",
+        ),
+    ),
+    scene(
+        "runs are one run",
+        "record",
+        "a restart in a journal is taken for a deviation",
+        ("a record over lives",),
+        (f"{WORKBENCH}replay/recording.py", 'BREAKS = frozenset({"run", "lost"})', 'BREAKS = frozenset({"lost"})'),
+        (f"{WORKBENCH}replay/again.py", "if recorded.gap or recorded.memory.last_s is None:", "if recorded.gap:"),
+    ),
+    part(
+        "a reboot loses events",
+        "record",
+        "events of the second boot are looked for in the first one's steps",
+        ("tests/workbench/test_replay.py",),
+        (
+            f"{WORKBENCH}replay/recording.py",
+            '            later = [step for step in near if step.wall >= line["wall"]]  # a step is '
+            "written down after its events\n",
+            "            later = near[-1:]\n",
+        ),
+    ),
+)

@@ -1,0 +1,83 @@
+"""Seeds of restarts: what a new life of the gateway must know."""
+
+from tests.proof.seeded.seed import CORE, Seed, part, scene
+
+RESTARTS: tuple[Seed, ...] = (
+    scene(
+        "what flowed before a kill is forgotten",
+        "restart",
+        "ampere-hours that went in after the counters were last written count as nothing",
+        ("ampere-hours over kills",),
+        (
+            f"{CORE}persisted.py",
+            "min(seconds if unseen_s is None else unseen_s, COUNTERS_S) if self.running else 0.0",
+            "0.0",
+        ),
+    ),
+    part(
+        "a charger that ran at the start was never stopped",
+        "restart",
+        "one that ran at the start and runs again after each stop is called uncontrollable one return later",
+        ("tests/core/test_safestop.py::test_a_charger_that_ran_at_the_start_has_been_stopped_once_already",),
+        (
+            f"{CORE}safestop.py",
+            '        if memory.stopping_s is None and "found_running" in f.raised:',
+            "        if False:",
+        ),
+    ),
+    scene(
+        "the open charge is not kept",
+        "restart",
+        "ampere-hours and seconds of a charge begin anew with a restart",
+        ("ampere-hours over restarts",),
+        (
+            f"{CORE}persisted.py",
+            "            session=replace(session, started_s=now_s - session.started_s) if session is not "
+            "None else None,\n            full_pct=memory.full_pct,",
+            "            full_pct=memory.full_pct,",
+        ),
+    ),
+    scene(
+        "a lost BMU ends the charge",
+        "restart",
+        "the limits of a charge begin anew when its BMU was silent for a while",
+        ("ampere-hours over silences",),
+        (
+            f"{CORE}step.py",
+            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED})",
+            "frozenset({State.FULL, State.IDLE, State.HELD, State.TRIPPED, State.OFFLINE, State.SUSPENDED})",
+        ),
+    ),
+    scene(
+        "a precharge begins anew",
+        "restart",
+        "the time in which a precharged pack must rise begins anew with a restart",
+        ("precharge over restarts",),
+        (
+            f"{CORE}persisted.py",
+            "            session=replace(session, started_s=now_s - session.started_s) if session is not "
+            "None else None,\n            full_pct=self.full_pct,",
+            "            session=replace(session, started_s=now_s - session.started_s, rise_s=0.0, rise_v=None) "
+            "if session is "
+            "not None else None,\n            full_pct=self.full_pct,",
+        ),
+    ),
+    part(
+        "strikes are not kept",
+        "restart",
+        "a fault that comes again after each restart never latches",
+        ("tests/core/test_persisted.py",),
+        (
+            f"{CORE}persisted.py",
+            "                strikes=tuple(now_s - t_s for t_s in fault.strikes),\n",
+            "                strikes=(),\n",
+        ),
+    ),
+    part(
+        "resets are not kept",
+        "restart",
+        "a restart allows three more resets",
+        ("tests/core/test_persisted.py",),
+        (f"{CORE}persisted.py", "            resets=tuple((now_s - t_s, name) for t_s, name in memory.resets),\n", ""),
+    ),
+)

@@ -1,0 +1,66 @@
+"""Seeds of what people are told."""
+
+from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
+
+WORDS: tuple[Seed, ...] = (
+    scene(
+        "out of control is told with advice about cables",
+        "words",
+        "UNCONTROLLABLE does not begin with what to do",
+        ("says standby", "cut off, then killed"),
+        (
+            f"{CORE}outofcontrol.py",
+            '    id_ = "uncontrollable" if _heard(f) and f.runs else "uncontrollable_unproved"\n',
+            "    return _witnesses(f)\n",
+        ),
+    ),
+    scene(
+        "a restart ends the alarm",
+        "words",
+        "a charger that ran when the service died and is not heard is no alarm",
+        ("cut off and not heard, then killed",),
+        (f"{CORE}alarm.py", "    unknown = memory.unverified and", "    unknown = False and"),
+        (f"{CORE}safestop.py", "        return memory.unverified and f.state_s >= LOST_S\n", "        return False\n"),
+        (
+            f"{CORE}course.py",
+            "if state is State.STARTING and not memory.unverified and not f.charger.online",
+            "if state is State.STARTING and not f.charger.online",
+        ),
+    ),
+    hostile(
+        "a stop that is not verified is a success",
+        "words",
+        "orchestrator stop ends with 0 whatever becomes of the stop",
+        ("tests/whole/test_operator.py::test_a_stop_that_is_not_obeyed_begins_with_what_to_do",),
+        (
+            f"{SERVICE}verbs.py",
+            "        unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), ",
+            "        unverified, then = dict[str, str](), ",
+        ),
+    ),
+    hostile(
+        "estop finds no station by itself",
+        "words",
+        "estop without arguments knows the file of this folder only",
+        ("tests/guardian/test_emergency.py::test_else_those_of_the_services_that_run",),
+        (
+            f"{LASTRESORT}inhand.py",
+            "    for place in PLACES:\n        yield _existing([place])\n    yield _existing(",
+            "    yield _existing([PLACES[0]])\n    return\n    yield _existing(",
+        ),
+    ),
+    part(
+        "old values are not marked",
+        "words",
+        "a current that was last heard long ago is shown as one of now",
+        ("tests/service/test_status.py", "tests/service/test_show.py"),
+        (f"{SERVICE}status.py", '"old": age_s is not None and age_s > CHARGER_STALE_S,', '"old": False,'),
+    ),
+    hostile(
+        "a success reads like a failure",
+        "words",
+        "an estop without a service ends with a complaint",
+        ("tests/guardian/test_estop.py::test_ports_without_a_service",),
+        (f"{LASTRESORT}running_service.py", "        if not _listens(self._named):\n", "        if False:\n"),
+    ),
+)
