@@ -1,4 +1,4 @@
-"""What is wrong with a CAN bus, in sentences for the technician who stands before it."""
+"""Problems of a CAN bus, in sentences for the technician on site."""
 
 import errno
 import os
@@ -25,7 +25,7 @@ _ADVICE: Mapping[int, str] = {
     errno.ENOBUFS: "the transmit queue is full, nobody acknowledges: check cable, terminators, bit rate, BMU's power",
 }
 
-#: What to do where there is no errno, by a part of what the libraries say.
+#: What to do without an errno, by a part of the library's message.
 _HINTS: Mapping[str, str] = {
     "msgpack": "udp_multicast needs it: pip install msgpack",
     "Write timeout": "the adapter takes nothing any more: unplug it and plug it in again",
@@ -42,18 +42,18 @@ QUEUE_FULL = _ADVICE[errno.ENOBUFS]
 
 
 def place(name: str, settings: Settings) -> str:
-    """Which bus it is: its name in the station file, and what that stands for."""
+    """The bus: its name in the station file, with interface and channel."""
     return f"CAN bus {name} ({settings.get('interface', 'no interface')} {settings.get('channel', '')}".rstrip() + ")"
 
 
 def filled(text: str, settings: Settings) -> str:
-    """An advice with this bus's channel and bit rate in it."""
+    """The advice with this bus's channel and bit rate filled in."""
     channel, bitrate = settings.get("channel", "can0"), settings.get("bitrate", 250_000)
     return text.replace("{channel}", str(channel)).replace("{bitrate}", str(bitrate))
 
 
 def chain(error: BaseException) -> Iterator[BaseException]:
-    """An exception and all that it was raised from, the outermost first."""
+    """An exception and the chain of its causes, the outermost first."""
     seen: BaseException | None = error
     while seen is not None:
         yield seen
@@ -61,10 +61,10 @@ def chain(error: BaseException) -> Iterator[BaseException]:
 
 
 def errno_of(error: BaseException) -> int | None:
-    """The operating system's number of what went wrong, wherever in the chain it is; None if there is none."""
+    """The operating system's error number, wherever it is in the chain; None if there is none."""
     for link in chain(error):
         number = _number(link)
-        if isinstance(number, int) and number > 0:  # a name that cannot be resolved has a negative one of its own
+        if isinstance(number, int) and number > 0:  # name resolution errors have negative numbers
             return number
     return None
 
@@ -98,7 +98,7 @@ def _unnumbered(error: BaseException) -> tuple[str, str]:
 
 
 def error_frame(can_id: int, data: bytes) -> str | None:
-    """What an error frame says of the bus: `BUS_OFF`, `PASSIVE`, `NO_ACK`, "" for recovered; None for passing noise."""
+    """The bus state in an error frame: `BUS_OFF`, `PASSIVE`, `NO_ACK`, "" for recovered; None for transient noise."""
     if can_id & _BUS_OFF:
         return BUS_OFF
     if can_id & _RESTARTED:

@@ -32,13 +32,13 @@ WATCH_S = 1.0
 
 def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """`run`, `status` and the requests."""
-    run = verbs.add_parser("run", help="run the service for a station, until it is told to end")
+    run = verbs.add_parser("run", help="run the service for a station until told to end")
     run.add_argument("station", nargs="?", default="station.yaml", help="the station file (default: %(default)s)")
     run.set_defaults(run=_run)
-    status = verbs.add_parser("status", help="what every bay does, and why")
+    status = verbs.add_parser("status", help="show what every bay is doing, and why")
     status.add_argument("bay", nargs="?", help="only this bay")
     status.add_argument("--json", action="store_true", help="the status document, for programs")
-    status.add_argument("--watch", action="store_true", help="again and again, until interrupted")
+    status.add_argument("--watch", action="store_true", help="refresh until interrupted")
     _add_socket(status)
     status.set_defaults(run=_status)
     for verb, about in REQUESTS.items():
@@ -46,7 +46,7 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
         request.add_argument("bay", nargs="*", help="the bays")
         request.add_argument("--all", action="store_true", help="every bay of the station")
         if verb == "reset":
-            request.add_argument("--port", help="forget the charger on this port, which no bay has and which is gone")
+            request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
 
