@@ -1,22 +1,22 @@
-"""What the thread of a charger's port needs of the open port."""
+"""The interface of an open port, as used by the thread of a charger's port."""
 
 from typing import Protocol
 
 
 class ChargerLine(Protocol):
-    """The open port, as `link.serial.SerialLine` is. Every method but `close` may raise LinkError."""
+    """An open port, such as `link.serial.SerialLine`. Every method except `close` may raise LinkError."""
 
     def write(self, data: bytes) -> None:
         """Hand over a frame."""
 
     def read(self, timeout_s: float, expected: int = 0) -> bytes:
-        """What came in, as soon as `expected` bytes had their time on the wire; b"" after the time-out."""
+        """Received bytes, once `expected` bytes have had their time on the wire; b"" after the time-out."""
 
     def restore(self) -> str:
-        """Set the port up again if another program has changed it; what was found, "" where all was well."""
+        """Set the port up again if another program has changed it; returns what was found, "" if all was well."""
 
     def locked_by(self) -> str:
-        """Which program holds the port's lock instead of us, "" where it is ours."""
+        """The program that holds the port's lock instead of us, "" if it is ours."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""

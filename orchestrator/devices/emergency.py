@@ -1,4 +1,4 @@
-"""EMCY frames in words (CiA 301, table 26): what a node says unasked when something is wrong with it."""
+"""EMCY frames as text (CiA 301, table 26): unsolicited error reports from a node."""
 
 _CLASSES = (  # code, mask, meaning; the narrower ones first
     (0xFF00, 0xFF00, "device-specific"),
@@ -16,12 +16,12 @@ _CLASSES = (  # code, mask, meaning; the narrower ones first
 
 
 def emergency_cob_id(node_id: int) -> int:
-    """EMCY frames of this node."""
+    """The COB-ID of EMCY frames from this node."""
     return 0x080 + node_id
 
 
 def emergency_text(data: bytes) -> str | None:
-    """The frame in words; "" for "error reset"; None if it is too short to hold a code. Short ones count, too."""
+    """The frame as text; "" for "error reset"; None if it is too short for a code. Other short frames count as well."""
     if len(data) < 2:
         return None
     code = int.from_bytes(data[:2], "little")

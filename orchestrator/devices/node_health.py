@@ -1,19 +1,19 @@
-"""Whether the frames of one node id look like those of one healthy node."""
+"""Judges whether the frames with one node id look like those of a single healthy node."""
 
 from orchestrator.devices.sdo_client import Verdict
 
-BABBLE_HZ = 500  #: frames a second; a node that is read as fast as allowed sends a tenth of that
-#: Second answers are added up, answers as they should be taken off: with a second node on the id every exchange has
-#: one too many, and the sum climbs; one frame that the bus repeated falls off again.
+BABBLE_HZ = 500  #: frames per second; a node that is read as fast as allowed sends a tenth of that
+#: Second answers add to a sum, proper answers subtract: with a second node on the id every exchange has one too many,
+#: and the sum climbs; a single frame repeated by the bus fades again.
 _STRAY, _CLEAN, _DOUBLED, _MOST = 2, 1, 6, 8
 
 
-#: Answers that another master explains.
+#: Answers explained by another master.
 NOT_OURS = (Verdict.THEIRS, Verdict.FRAGMENT, Verdict.UNCLEAR)
 
 
 class NodeHealth:
-    """Counts what is odd about a node."""
+    """Counts a node's irregularities."""
 
     __slots__ = ("_babbling", "_doubled", "_frames", "_last", "_reason", "_strays", "_window_s")
 
@@ -35,11 +35,11 @@ class NodeHealth:
             self._frames, self._window_s = 0, now_s
 
     def excuse(self) -> None:
-        """That frame was another master's, or an answer to it: as many as that one likes are no babble."""
+        """That frame was another master's, or an answer to one: those are not babble, however many there are."""
         self._frames -= 1
 
     def answer(self, verdict: Verdict, reason: str = "") -> None:
-        """An SDO answer came; `reason` says what is wrong with a malformed one."""
+        """Count an SDO answer; `reason` says what is wrong with a malformed one."""
         if verdict in NOT_OURS:
             self.excuse()
             return
@@ -52,7 +52,7 @@ class NodeHealth:
 
     @property
     def problem(self) -> str:
-        """Why its answers must not be relied upon, although it answers; "" if nothing is odd."""
+        """Why its answers must not be relied on, although it answers; "" if all is well."""
         if self._doubled:
             return "requests are answered twice: two BMUs have this node id, or something else answers for this one"
         if self._babbling:
@@ -60,7 +60,7 @@ class NodeHealth:
         return ""
 
     def silence(self, timeout_s: float) -> str:
-        """The best guess why no answer was accepted for some time."""
+        """The most likely reason that no answer was accepted for some time."""
         if self._last is Verdict.LATE:
             return f"its answers come later than {timeout_s:g} s (sdo_timeout_s)"
         if self._last is Verdict.MALFORMED:
