@@ -1,8 +1,7 @@
 """One BMU on a CAN bus, without I/O: frames and the time go in, requests come out, `view` is the present knowledge.
 
-Fast objects are read every sweep, slow ones once a second. There is one request in flight (`sdo_client.py` rejects late
-answers), and the next follows as soon as the answer is there and the bus's budget allows. A silent node is queried
-twice a second.
+Fast objects are read every sweep, slow ones once a second; one request in flight (`sdo_client.py` rejects late
+answers), the next as soon as answer and bus budget allow. A silent node is queried twice a second.
 """
 
 from collections.abc import Callable
@@ -43,8 +42,7 @@ TOGGLE = 0x80  #: the alternating bit of a node-guarding answer; a heartbeat has
 class BatteryNode:
     """A BMU. Everything but `view` belongs to the thread of its bus.
 
-    `view` is replaced as a whole; `on_change()` is called after each replacement that brings news (a heartbeat does
-    not).
+    `view` is replaced as a whole; `on_change()` is called after each replacement with news (a heartbeat is not news).
     """
 
     def __init__(self, bus: str, config: BatteryConfig, budget: BusBudget, on_change: Callable[[], None]) -> None:

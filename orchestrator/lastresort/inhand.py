@@ -24,8 +24,7 @@ def stations() -> Iterator[list[str]]:
     """Existing station files that may be meant, the likeliest first; several at once if they are equally likely."""
     for place in PLACES:
         yield _existing([place])
-    yield _existing([os.path.join(directory(pid), name) for pid, words in orchestrators() if (name := _station(words))])
-    # noqa: PTH118
+    yield _existing([os.path.join(directory(pid), name) for pid, words in orchestrators() if (name := _station(words))])  # noqa: PTH118
 
 
 def _existing(paths: list[str]) -> list[str]:

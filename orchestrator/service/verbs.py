@@ -1,6 +1,6 @@
-"""The verbs of the running service: it is started, looked at, and asked to start, pause, stop or reset its bays.
+"""The verbs of the running service: run it, show its status, and request start, pause, stop or reset of its bays.
 
-Each imports what it needs when it runs, so that none waits for another's libraries.
+Each imports its dependencies when it runs, so that none waits for another's libraries.
 """
 
 import argparse
@@ -15,18 +15,18 @@ from typing import cast
 from orchestrator.errors import NoServiceError, ServiceError, UsageError
 
 REQUESTS = {
-    "start": "let a bay charge (again): after a stop, a pause or a reset",
-    "pause": "stop charging until `start`; the session goes on",
-    "stop": "stop charging; only `start` begins again",
-    "reset": "clear latched faults whose cause is gone; `start` then begins again",
+    "start": "let a bay charge (again) after a stop, a pause or a reset",
+    "pause": "stop charging until `start`; the session continues",
+    "stop": "stop charging; only `start` lets the bay charge again",
+    "reset": "clear latched faults whose cause is gone; `start` then lets the bay charge again",
 }
 
 
-#: Those that are done only when the charger was seen to stand by, and how long that is waited for: a charger that does
-#: not obey is uncontrollable after 3 s.
+#: The requests that are complete only once the charger is verified in standby, and how long to wait for that: a
+#: disobedient charger is uncontrollable after 3 s.
 STOPS = ("stop", "pause")
 STANDBY_S, LOOK_S = 4.0, 0.1
-#: `status --watch` looks this often.
+#: The refresh interval of `status --watch`.
 WATCH_S = 1.0
 
 
@@ -119,20 +119,20 @@ def _request(arguments: argparse.Namespace) -> int:
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified, then = {}, ""
     if arguments.verb in STOPS:
-        # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
+        # A stop may be carried out and still be answered with a problem, e.g. not persisted: watch its charger as well.
         looked_at = list(results) if arguments.verb == "stop" else accepted
         unverified, then = _wait_for_standby(path, looked_at, every=arguments.all), "; stands by, verified"
     for line in (*unverified.values(), *(f"{bay}: {refusal}" for bay, refusal in results.items() if refusal)):
-        print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
+        print(line, file=sys.stderr, flush=True)  # what to do, before anything else
     for bay in accepted:
         print(f"{bay}: {arguments.verb} accepted{'' if bay in unverified else then}")
     return 1 if unverified or any(results.values()) else 0
 
 
 def _wait_for_standby(path: Path, names: Sequence[str], *, every: bool) -> dict[str, str]:
-    """Look at these bays until their chargers stand by; what to do about each that was not seen to in time.
+    """Watch these bays until their chargers are in standby; returns what to do about each that is not in time.
 
-    `every`: and at chargers that are no bay's any more.
+    `every`: also watch chargers without a bay.
     """
     from orchestrator.lastresort.asking import ask
     from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do

@@ -63,8 +63,8 @@ DISK: tuple[Seed, ...] = (
         ("tests/service/test_store.py",),
         (
             f"{SERVICE}store.py",
-            '        """Why a restart would forget something; "" while it would not."""\n',
-            '        """Why a restart would forget something; "" while it would not."""\n        return ""\n',
+            '        """Why a restart would forget something; "" if it would not."""\n',
+            '        """Why a restart would forget something; "" if it would not."""\n        return ""\n',
         ),
     ),
     hostile(

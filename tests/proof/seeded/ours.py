@@ -75,8 +75,8 @@ OURS: tuple[Seed, ...] = (
         ("tests/workbench/test_replay.py",),
         (
             f"{WORKBENCH}replay/recording.py",
-            '            later = [step for step in near if step.wall >= line["wall"]]  # a step is '
-            "written down after its events\n",
+            '            later = [step for step in near if step.wall >= line["wall"]]  # a decision '
+            "is recorded after its events\n",
             "            later = near[-1:]\n",
         ),
     ),
