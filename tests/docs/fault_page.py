@@ -12,8 +12,8 @@ from tests.docs.catalogue import CATALOGUE
 HEAD = """\
 # Why did it stop?
 
-Every fault that the service knows, as named in `status`, log and journal. The sentence there gives the evidence: what was
-seen, the limit, and the line of the file that sets it. This page is generated from the fault table.
+Every fault that the service knows, as named in `status`, log and journal. The sentence there gives the evidence: what
+was seen, the limit, and the line of the file that sets it. This page is generated from the fault table.
 
 | effect | what happens |
 | --- | --- |
@@ -24,27 +24,28 @@ seen, the limit, and the line of the file that sets it. This page is generated f
 | STOP | charging stops; the last column says how it resumes |
 | TRIP | charging stops, and the bay stays stopped until a person resets and then starts it |
 
-No fault requires its condition to last without interruption: while the condition is absent, its accumulated time drains
-at a quarter of the speed. And no reading counts alone if a second witness can be heard: the charger's readings are checked
-against the BMU's in every state, and the sentence names the device more likely to be wrong.
+No fault requires its condition to last without interruption: while the condition is absent, its accumulated time
+drains at a quarter of the speed. And no reading counts alone if a second witness can be heard: the charger's readings
+are checked against the BMU's in every state, and the sentence names the device more likely to be wrong.
 
 """
 NUMBERS = """
 ## By the numbers of the catalogue
 
-The faults that this service must handle: C for the charger, B for battery and bus, G for the gateway, P for policies and
-people. The code refers to them as FAULTS C1. The rows are the faults that report it; the last column says what else is
-done, or where it is handled.
+The faults that this service must handle: C for the charger, B for battery and bus, G for the gateway, P for policies
+and people. The code refers to them as FAULTS C1. The rows are the faults that report it; the last column says what
+else is done, or where it is handled.
 
 """
 STUCK = """
 ## A stuck temperature sensor
 
 A sensor with an implausible reading (a value at or beyond its range, a jump of 5 K in a second, no value) stops every
-charge. A sensor that keeps reporting a plausible temperature is not detected, because no rule can tell it from a good one:
+charge. A sensor that keeps reporting a plausible temperature is not detected, because no rule can tell it from a good
+one:
 
-- A gently charged pack in a hall at constant temperature need not warm by the sensor's 0.1 °C for hours.
-- More current does not reliably change that. The loss in the cells' resistance warms them, but during part of the charge
+- A gently charged pack in a hall at constant temperature need not warm by the sensor's 0.1 °C for hours. - More
+  current does not reliably change that. The loss in the cells' resistance warms them, but during part of the charge
   the reaction itself absorbs about as much heat at moderate currents: the two may cancel for an hour.
 - The pack's resistance and heat capacity, from which to predict a rise, are unknown.
 

@@ -12,11 +12,12 @@ Reasons = Mapping[tuple[str, str, str, str], str]
 HEAD = """\
 # Would a test notice?
 
-`make mutation` breaks the product in every small way that [mutmut](https://mutmut.readthedocs.io) knows, one at a time
-(a `<` to `<=`, an `and` to `or`, a number by one, an argument to None, a changed text), and runs the tests that reach the
-broken function, the quick ones first. A mutant that no test notices survives: either a test is missing, or the change has
-no effect. At least 95 % must be killed, and each survivor needs a reason below. Only the bodies of functions and methods
-are mutated, not a module's tables and constants, nor functions with a decorator (a property, for example).
+`make mutation` breaks the product in every small way that [mutmut](https://mutmut.readthedocs.io) knows, one at a
+time (a `<` to `<=`, an `and` to `or`, a number by one, an argument to None, a changed text), and runs the tests that
+reach the broken function, the quick ones first. A mutant that no test notices survives: either a test is missing, or
+the change has no effect. At least 95 % must be killed, and each survivor needs a reason below. Only the bodies of
+functions and methods are mutated, not a module's tables and constants, nor functions with a decorator (a property,
+for example).
 
 `make mutation ARGS='orchestrator.protocol.frame.*'` tries some again. The command writes this page and keeps the
 reasons; `?` marks a missing one. A mutant that times out counts as killed: it hung the test.

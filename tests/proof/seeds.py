@@ -230,7 +230,7 @@ def page(results: Sequence[Result]) -> Iterator[str]:
     yield ""
     yield "Each hole that was once open is kept as a seeded bug: a small change that opens it again. `make campaign"
     yield "ARGS=seeds` applies each of them to a copy of the package, runs the proofs until one finds it, and writes"
-    yield "this page. A bug that no proof finds is a proof to be written."
+    yield "this page. A bug that no proof finds calls for a new proof."
     yield ""
     yield f"{len(found)} of {len(results)} are found, in {mean_s:.0f} s each on average."
     yield ""
