@@ -41,12 +41,12 @@ STUCK = """
 ## A stuck temperature sensor
 
 A sensor with an implausible reading (a value at or beyond its range, a jump of 5 K in a second, no value) stops every
-charge. A sensor that keeps reporting a plausible temperature is not detected, because no rule can tell it from a good
-one:
+charge. A sensor that keeps reporting a plausible temperature is not detected, because no rule can tell it from a
+good one:
 
-- A gently charged pack in a hall at constant temperature need not warm by the sensor's 0.1 °C for hours. - More
-  current does not reliably change that. The loss in the cells' resistance warms them, but during part of the charge
-  the reaction itself absorbs about as much heat at moderate currents: the two may cancel for an hour.
+- A gently charged pack in a hall at constant temperature need not warm by the sensor's 0.1 °C for hours.
+- More current does not reliably change that. The loss in the cells' resistance warms them, but during part of the
+  charge the reaction itself absorbs about as much heat at moderate currents: the two may cancel for an hour.
 - The pack's resistance and heat capacity, from which to predict a rise, are unknown.
 
 People switch off a rule that stops good charges. What remains: the BMU's own high-temperature bit, its own protection

@@ -1,8 +1,8 @@
 """The long form: `make fuzz ARGS='charger --runs 1000000'`. Inputs with findings are written to files.
 
-First atheris looks for inputs that reach new code, at ten times the cost of the code itself; then those inputs
-are mutated blindly until the number is reached. `make fuzz ARGS='charger FILE…'` gives files to the target
-again; a directory stands for the files in it.
+First atheris looks for inputs that reach new code, at ten times the cost of the code itself; then those inputs are
+mutated blindly until the number is reached. `make fuzz ARGS='charger FILE…'` gives files to the target again; a
+directory stands for the files in it.
 """
 
 import argparse

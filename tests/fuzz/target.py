@@ -1,7 +1,7 @@
 """Fuzz targets and their inputs: good ones, mutated piece by piece.
 
-An input is bytes for every target, so a crash is a file. The same inputs come from hypothesis in
-`make test` and from atheris, guided by coverage, in `make fuzz`.
+An input is bytes for every target, so a crash is a file. The same inputs come from hypothesis in `make test` and from
+atheris, guided by coverage, in `make fuzz`.
 """
 
 import re

@@ -1,8 +1,8 @@
 """The guest's first process, until systemd takes over: `python first.py FOLDER`.
 
-The guest sees the host's files read-only, below a layer in memory that takes all writes. So the
-guest has a complete system, /etc and /opt included, and the host stays unchanged. FOLDER is the one place
-shared with the host: its `job.json` is the job, `status` is the answer; it is /mnt in the guest.
+The guest sees the host's files read-only, below a layer in memory that takes all writes. So the guest has a complete
+system, /etc and /opt included, and the host stays unchanged. FOLDER is the one place shared with the host: its
+`job.json` is the job, `status` is the answer; it is /mnt in the guest.
 """
 
 import ctypes

@@ -1,7 +1,7 @@
 """A serial CAN adapter that can be unplugged.
 
-The kernel's slcan driver and the emulated BMU each have a pty. The relay between them plays the adapter:
-it passes lines between both sides and sends an adapter's own messages.
+The kernel's slcan driver and the emulated BMU each have a pty. The relay between them plays the adapter: it passes
+lines between both sides and sends an adapter's own messages.
 """
 
 import fcntl

@@ -1,4 +1,4 @@
-"""Other programs that use a charger's port: each a process of its own, as on a real machine."""
+"""Other programs that use a charger's port, in separate processes as on a real machine."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ sys.stdin.read()
 
 @contextmanager
 def holding(port: str, how: str = "flock", name: str = sys.executable) -> Iterator["subprocess.Popen[bytes]"]:
-    """A program that has the port open, and locked by "flock" or "TIOCEXCL"; `name` is how it was called."""
+    """A program with the port open and locked by "flock" or "TIOCEXCL"; `name` is its command name."""
     process = subprocess.Popen(
         [name, "-c", _HOLD, port, how], executable=sys.executable, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
@@ -32,5 +32,5 @@ def holding(port: str, how: str = "flock", name: str = sys.executable) -> Iterat
 
 
 def stty(port: str, *words: str) -> None:
-    """As a person would, or a program that opens the port for itself."""
+    """Like a person, or a program that opens the port itself."""
     subprocess.run(["stty", "-F", port, *words], check=True, capture_output=True)

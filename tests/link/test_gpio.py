@@ -1,4 +1,4 @@
-"""The GPIO line where there is none to be had: the sentence for everything that goes wrong, as the library says it."""
+"""The GPIO line where none is available: the sentence for every error reported by the library."""
 
 import errno
 import os
@@ -14,7 +14,7 @@ from orchestrator.link.gpio import OutputLine, describe
 
 
 def failures(chip: str, line: int) -> set[str]:
-    """What taking the line says, and what only looking at it says."""
+    """The messages of taking the line and of only looking at it."""
     said = set()
     for attempt in (lambda: OutputLine.open(chip, line, active_low=False), lambda: describe(chip, line)):
         with pytest.raises(LinkError) as caught:

@@ -1,9 +1,9 @@
 """Break the product in every small way, one at a time, and check that a test notices: `python -m tests.mutation`.
 
-mutmut makes and tries the mutants; pyproject.toml sets the modules and tests. The results go to
-docs/mutation.md, where people write the reasons for survivors. Arguments select mutants, such as
-`orchestrator.protocol.frame.*`; the default is new mutants and those of changed functions. Each is tried
-with the quick tests; survivors without a reason are tried again with the slow ones.
+mutmut makes and tries the mutants; pyproject.toml sets the modules and tests. The results go to docs/mutation.md, where
+people write the reasons for survivors. Arguments select mutants, such as `orchestrator.protocol.frame.*`; the default
+is new mutants and those of changed functions. Each is tried with the quick tests; survivors without a reason are tried
+again with the slow ones.
 """
 
 import json

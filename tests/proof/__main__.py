@@ -4,8 +4,8 @@
     python -m tests.proof core            only this one, which takes longer than those four together
     python -m tests.proof seeds           only this one: which proof finds which bug, into docs/proofs.md
 
-Each has its own main with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`,
-`environment`, `exploring`, `seeds`.
+Each has its own main with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`, `environment`, `exploring`,
+`seeds`.
 """
 
 import argparse

@@ -68,7 +68,7 @@ def _stay(dice: Random, t_s: float, happenings: list[Happening]) -> float:
 
 
 def _break(dice: Random, t_s: float, happenings: list[Happening]) -> None:
-    """Something breaks; it is repaired within three minutes, before the battery leaves, then the bay is reset, started."""
+    """Something breaks and is repaired within three minutes, before the battery leaves; reset and start follow."""
     name = dice.choice(INJECTIONS)
     happenings.append(Happening(t_s, 0, name, dice.choice((None, *STRENGTHS.get(name, ())))))
     mended_s = t_s + dice.uniform(0.1, 3) * MINUTE_S

@@ -1,8 +1,8 @@
 """A whole station over many lives of its gateway, in virtual time: devices stay, processes come and go.
 
-Only the product's foundations are replaced: the kernel, the CAN driver below `link/can.py`, and the
-control socket (requests reach the handler behind it, in a service thread). The guardian is the real one, with
-the controller it starts; `estop` is the real one; their files are on an emulated disk with realistic losses.
+Only the product's foundations are replaced: the kernel, the CAN driver below `link/can.py`, and the control socket
+(requests reach the handler behind it, in a service thread). The guardian is the real one, with the controller it
+starts; `estop` is the real one; their files are on an emulated disk with realistic losses.
 """
 
 import json

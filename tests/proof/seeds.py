@@ -1,11 +1,11 @@
-"""Testing the tester: each hole that was closed is opened again in a copy of the package, and the proofs must find it.
+"""Testing the tester: each closed hole is reopened in a copy of the package, and the proofs must find it.
 
     python -m tests.proof seeds                       all of them; writes docs/proofs.md
-    python -m tests.proof.seeds --only NAME ...       some of them, nothing is written
+    python -m tests.proof.seeds --only NAME ...       some of them; writes nothing
 
-A seed is a text that stands in the package exactly once and what takes its place (`seeded/`). The likeliest proof
-runs first, and of that the likeliest part; then all proofs, one after the other, until one finds something. What the
-package itself makes them find does not count.
+A seed is a text that occurs in the package exactly once and its replacement (`seeded/`). The likeliest proof runs
+first, starting with its likeliest part; then all proofs in turn until one finds something. Findings in the unchanged
+package do not count.
 """
 
 import argparse
@@ -30,19 +30,19 @@ from tests.proof.seeded.seed import Seed
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs" / "proofs.md"
 HEADING = "## Which proof finds which bug"
-#: Who goes on working here meanwhile must not be what is found.
+#: A copy, so that ongoing edits in this tree are not what is found.
 COPIED = ("orchestrator", "tests")
-#: Of the seeds, at least this share must be found.
+#: At least this share of the seeds must be found.
 ENOUGH = 0.95
-#: What the package itself makes the proofs find is looked for once.
+#: Findings in the unchanged package are determined once.
 LOOKING = Lock()
-#: A seed may take this long in all, in the mean.
+#: Mean time allowed per seed.
 SEED_S = 180.0
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """One of the proofs: its command, and how long it may take. `usual` is what it looks at if nothing is named."""
+    """One of the proofs: its command and time limit. `usual` is what it plays if nothing is named."""
 
     about: str
     sees: str
@@ -50,7 +50,7 @@ class Proof:
     command: tuple[str, ...]
     within_s: float
     usual: tuple[str, ...] = ()
-    named: str = ""  #: the option before what is named, once for each
+    named: str = ""  #: the option before each name
 
     def words(self, where: Sequence[str]) -> list[str]:
         """The command line."""
@@ -59,7 +59,7 @@ class Proof:
 
 
 PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60")
-#: Random scripts that are played after the scenes, for what no scene finds.
+#: Random scripts played after the scenes, for bugs no scene finds.
 RUNS = "40"
 PROOFS: Mapping[str, Proof] = {
     "environment": Proof(
@@ -124,17 +124,17 @@ PROOFS: Mapping[str, Proof] = {
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What became of a seed."""
+    """The result for a seed."""
 
     seed: Seed
-    proof: str  #: that found it; "" none
-    by: str  #: which scene or test of it
+    proof: str  #: the proof that found it; "" none
+    by: str  #: its scene or test
     took_s: float  #: of that proof
     all_s: float  #: of all that were tried
 
 
 def apply(seed: Seed, root: Path) -> None:
-    """Open the hole in the package below `root`; ValueError if a text does not stand there exactly once."""
+    """Reopen the hole in the package below `root`; ValueError if a text does not occur exactly once."""
     for name, old, new in seed.changes:
         path = root / name
         text = path.read_text(encoding="utf-8")
@@ -146,7 +146,7 @@ def apply(seed: Seed, root: Path) -> None:
 
 @contextmanager
 def copied(seed: Seed | None) -> Iterator[Path]:
-    """A tree with the package changed, everything else as it is."""
+    """A tree with the changed package; everything else is unchanged."""
     with tempfile.TemporaryDirectory(prefix="seed") as directory:
         root = Path(directory)
         for name in COPIED:
@@ -160,7 +160,7 @@ def copied(seed: Seed | None) -> Iterator[Path]:
 
 
 def run(words: Sequence[str], within_s: float, root: Path) -> tuple[bool, str]:
-    """Whether it finds something in the tree, and what it said. One that takes too long has found nothing."""
+    """Whether it finds something in the tree, and its output. A proof that takes too long has found nothing."""
     environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
     with subprocess.Popen(
         [sys.executable, *words], cwd=root, env=environment, stdout=subprocess.PIPE,
@@ -176,7 +176,7 @@ def run(words: Sequence[str], within_s: float, root: Path) -> tuple[bool, str]:
 
 @cache
 def known() -> tuple[str, ...]:
-    """What the package as it is makes the environment find, as options that leave it out; asked for where it counts."""
+    """The environment's findings in the unchanged package, as options that exclude them; computed when needed."""
     with LOOKING, copied(None) as root:
         command = ("-m", "tests.proof.environment", "--names", "--runs", RUNS)
         found, said = run(command, 600.0, root)
@@ -187,7 +187,7 @@ def known() -> tuple[str, ...]:
 
 
 def attempts(seed: Seed) -> Iterator[tuple[str, Sequence[str]]]:
-    """Proofs in the order in which they are tried, and what of each."""
+    """The proofs in the order tried, and the parts of each."""
     if seed.where:
         yield seed.likely, seed.where
     for name in sorted(PROOFS, key=lambda name: name != seed.likely):
@@ -211,7 +211,7 @@ def search(seed: Seed) -> Result:
 
 
 def _finding(said: str) -> tuple[str, str]:
-    """Which scene, script or test it was, and what it said."""
+    """The scene, script or test, and its message."""
     lines = said.splitlines()
     for line in lines:
         if line.startswith(("scene ", "seed ")):

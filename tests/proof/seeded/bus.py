@@ -1,4 +1,4 @@
-"""Seeds of who else is on the CAN bus."""
+"""Seeds about others on the CAN bus."""
 
 from tests.proof.seeded.seed import DEVICES, LINK, Seed, part, scene
 

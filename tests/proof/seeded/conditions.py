@@ -1,4 +1,4 @@
-"""Seeds of conditions that come, go, and count."""
+"""Seeds about conditions that come and go, and their timers."""
 
 from tests.proof.seeded.seed import CORE, DEVICES, SERVICE, Seed, part, scene
 

@@ -1,4 +1,4 @@
-"""Seeds of what must be on the disk."""
+"""Seeds about what must be on the disk."""
 
 from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
 

@@ -1,4 +1,4 @@
-"""Seeds at the line: settings that another program has changed."""
+"""Seeds about the line: settings changed by another program."""
 
 from tests.proof.seeded.seed import CORE, DEVICES, LASTRESORT, LINK, Seed, hostile, part, scene
 

@@ -1,14 +1,14 @@
-"""Seeds of errors of our own."""
+"""Seeds about internal errors."""
 
 from tests.proof.seeded.seed import CORE, SERVICE, WORKBENCH, Change, Seed, part, scene
 
-#: An arithmetic on a reading without its bounds.
+#: Arithmetic on a reading without a range check.
 DIVIDES: Change = (
     f"{CORE}witnesses/measured.py",
     "    if abs(volts - pack_v) <= volts_differ(f.rules.policy.faults, pack_v):",
     "    if abs(volts - pack_v) / pack_v <= volts_differ(f.rules.policy.faults, pack_v) / pack_v:",
 )
-#: A row that raises takes the whole step with it.
+#: A row that raises aborts the whole decision.
 NOT_CAUGHT: Change = (
     f"{CORE}latches.py",
     "    except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it\n",

@@ -1,4 +1,4 @@
-"""Seeds of ports that hang, are busy, or come and go."""
+"""Seeds about ports that hang, are busy, or come and go."""
 
 from tests.proof.seeded.seed import DEVICES, LASTRESORT, SERVICE, Seed, hostile, part, scene
 

@@ -1,4 +1,4 @@
-"""Seeds of restarts: what a new life of the gateway must know."""
+"""Seeds about restarts: what a new life of the gateway must know."""
 
 from tests.proof.seeded.seed import CORE, Seed, part, scene
 

@@ -1,4 +1,4 @@
-"""Seeds of the surroundings: starters, clients, clocks, other programs."""
+"""Seeds about the surroundings: starters, clients, clocks, other programs."""
 
 from tests.proof.seeded.seed import LASTRESORT, SERVICE, Seed, hostile, part
 

@@ -1,4 +1,4 @@
-"""Seeds of the two witnesses: what charger and BMU say of each other."""
+"""Seeds about the two witnesses: what charger and BMU reveal about each other."""
 
 from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
 

@@ -1,4 +1,4 @@
-"""Seeds of what people are told."""
+"""Seeds about messages to people."""
 
 from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
 
