@@ -1,4 +1,4 @@
-"""What a value of a parametrised test is called in the test's id, where pytest itself would only number it."""
+"""Names of parameter values in test ids, where pytest itself would only number them."""
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -6,13 +6,13 @@ from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
 from typing import Any
 
-#: Ids are read in one line, and some values are long.
+#: Ids should fit on one line, and some values are long.
 LONGEST = 56
 MOST_BYTES = 24
 
 
 def name_of(value: object) -> str | None:
-    """None where pytest's own way is as good."""
+    """None where pytest's own id is as good."""
     if isinstance(value, Enum):
         return value.name
     if isinstance(value, str):
@@ -41,7 +41,7 @@ def shown(value: object) -> str:
 
 
 def short(text: str, longest: int = LONGEST) -> str:
-    """No longer than an id may be."""
+    """Cut to the maximum length of an id."""
     return text if len(text) <= longest else f"{text[: longest - 2].rstrip()}.."
 
 
@@ -52,7 +52,7 @@ def _hex(data: bytes) -> str:
 
 
 def _record(value: Any) -> str:
-    """By its name, if it has one (a policy's is in `policy`), else by what differs from its defaults."""
+    """By its name, if it has one (a policy's is in `policy`), or by its differences from the defaults."""
     kind = type(value).__name__
     for name in (getattr(value, "name", None), getattr(value, kind.lower(), None)):
         if isinstance(name, str) and name:

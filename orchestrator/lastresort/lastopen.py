@@ -2,7 +2,7 @@
 
 Theory of operation. A GPIO line requested from the kernel is an open file; any process that has it can drive the line
 with one ioctl, whatever library requested it. The guardian has duplicates of the controller's lines; `estop`, which
-runs when nobody else may be left, requests the lines anew. Values are logical: the kernel knows which lines are active
+runs when nobody else may be left, requests the lines again. Values are logical: the kernel knows which lines are active
 low.
 
 First the stop, then the contactor. A contactor that breaks a load wears out, and may weld when it is next needed; a

@@ -68,7 +68,7 @@ def _plain(value: Any) -> object:  # noqa: ANN401 - as `params`
 
 
 def from_plain(value: object, depth: int = DEPTH) -> Cause:
-    """The cause in a JSON value; ValueError for anything else. A `text` beside it is ignored: texts are made anew.
+    """The cause in a JSON value; ValueError for anything else. A `text` beside it is ignored: texts are generated.
 
     Parameters may be an object, or a list of pairs as produced by `dataclasses.asdict`.
     """

@@ -64,17 +64,17 @@ RUNS = "40"
 PROOFS: Mapping[str, Proof] = {
     "environment": Proof(
         "scenes, then random trouble with lines, disk, bus and people, over several lives of the gateway",
-        "the whole service in virtual time, held against wire and plant: what flows, who is told, what a restart keeps",
-        "the kernel's own processes, sockets and signals; drivers; what only a second guard hides",
+        "the whole service in virtual time, checked against wire and plant: current, messages, restarts",
+        "real processes, sockets and signals; drivers; bugs hidden by a second guard",
         ("-m", "tests.proof.environment", "--names", "--until-found"),
         300.0,
         ("--runs", RUNS),
         "--only",
     ),
     "hostile": Proof(
-        "real processes, pseudo terminals, sockets and disks among hostile ones",
-        "what virtual time replaces: signals, killed and frozen processes, drivers that hang, imports, clients",
-        "rare interleavings: it is as slow as the world",
+        "real processes, pseudo terminals, sockets and disks in a hostile environment",
+        "everything virtual time replaces: signals, killed and frozen processes, hanging drivers, imports, clients",
+        "rare interleavings: it runs in real time",
         PYTEST,
         300.0,
         (
@@ -92,7 +92,7 @@ PROOFS: Mapping[str, Proof] = {
     ),
     "parts": Proof(
         "the tests of single parts",
-        "a guard behind which another one stands, so that the whole station is safe without it",
+        "a guard backed by another one, so that the whole station is safe without it",
         "how parts work together",
         PYTEST,
         300.0,
@@ -100,22 +100,22 @@ PROOFS: Mapping[str, Proof] = {
     ),
     "scripts": Proof(
         "random fault scripts on a station",
-        "faults of chargers and BMUs in combinations that nobody thought of",
-        "whoever else is on the machine, and restarts",
+        "faults of chargers and BMUs in unforeseen combinations",
+        "other programs on the machine, and restarts",
         ("-m", "tests.proof.campaign", "--scripts", "120"),
         120.0,
     ),
     "calls": Proof(
-        "every call of a charge made to fail in turn",
-        "an error that nobody expects, wherever it comes",
-        "what hangs, and what is wrong without an error",
+        "every call during a charge fails in turn",
+        "an unexpected error at any place",
+        "hanging calls, and bugs without an error",
         (*PYTEST, "tests/proof/test_nth_call.py"),
         120.0,
     ),
     "core": Proof(
-        "everything that the core can come to",
-        "each state under each input: what may follow, and that all ends at rest",
-        "everything outside of the core",
+        "everything the core can reach",
+        "each state under each input: every transition is allowed, and everything ends at rest",
+        "everything outside the core",
         (*PYTEST, "tests/proof/test_explore.py"),
         120.0,
     ),
@@ -242,7 +242,7 @@ def page(results: Sequence[Result]) -> Iterator[str]:
         number = sum(result.proof == name for result in results)
         yield f"| {name} | {proof.about} | {proof.sees} | {proof.blind} | {number} |"
     yield ""
-    yield "The likeliest proof is asked first, so a proof that finds nothing first may still be able to find a bug."
+    yield "The likeliest proof is tried first, so a proof that found nothing first may still be able to find a bug."
     yield ""
     yield "### The bugs"
     yield ""

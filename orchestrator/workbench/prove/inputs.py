@@ -1,7 +1,7 @@
 """The classes of inputs: everything that a charger and a battery can show at the moment of a decision, as tables.
 
 A battery's classes are cut at the policy's own thresholds: just below, at, and just above each bound. A charger's
-classes are its possible reactions to a command, and its possible reports. Both are made anew for each decision, so that
+classes are its possible reactions to a command, and its possible reports. Both are made fresh for each decision, so
 a story can leave any of them at any time.
 """
 

@@ -25,14 +25,14 @@ OURS: tuple[Seed, ...] = (
     part(
         "a row takes the others with it",
         "exception",
-        "a check that raises ends the whole step",
+        "a check that raises aborts the whole decision",
         ("tests/core/test_failed.py",),
         NOT_CAUGHT,
     ),
     scene(
         "after an exception nothing is known",
         "exception",
-        "an exception leaves the memory as it was: no fault is shown, and a stop is never given up",
+        "an exception leaves the memory unchanged: no fault is shown, and a stop is never given up",
         ("a BMU that reads 0.00 V",),
         DIVIDES,
         NOT_CAUGHT,
@@ -52,7 +52,7 @@ OURS: tuple[Seed, ...] = (
     scene(
         "a torn line ends the replay",
         "record",
-        "a journal with one line that cannot be read is not replayed",
+        "a journal with one unreadable line is not replayed",
         ("a record over lives",),
         (
             f"{WORKBENCH}replay/recording.py",
@@ -63,7 +63,7 @@ OURS: tuple[Seed, ...] = (
     scene(
         "runs are one run",
         "record",
-        "a restart in a journal is taken for a deviation",
+        "a restart in a journal counts as a deviation",
         ("a record over lives",),
         (f"{WORKBENCH}replay/recording.py", 'BREAKS = frozenset({"run", "lost"})', 'BREAKS = frozenset({"lost"})'),
         (f"{WORKBENCH}replay/again.py", "if recorded.gap or recorded.memory.last_s is None:", "if recorded.gap:"),
@@ -71,7 +71,7 @@ OURS: tuple[Seed, ...] = (
     part(
         "a reboot loses events",
         "record",
-        "events of the second boot are looked for in the first one's steps",
+        "events of the second boot are searched in the first boot's decisions",
         ("tests/workbench/test_replay.py",),
         (
             f"{WORKBENCH}replay/recording.py",

@@ -6,7 +6,7 @@ PORTS: tuple[Seed, ...] = (
     scene(
         "ports are stopped one after another",
         "ports",
-        "estop opens and stops one port after the other",
+        "estop opens and stops one port after another",
         ("half dead adapter, estop",),
         (
             f"{LASTRESORT}laststop.py",
@@ -18,7 +18,7 @@ PORTS: tuple[Seed, ...] = (
     hostile(
         "a close holds the guardian up",
         "ports",
-        "the guardian waits for a driver that takes its time over a close",
+        "the guardian waits for a driver with a slow close",
         ("tests/guardian/test_guardian_messages.py::test_a_port_whose_close_hangs_keeps_nobody_from_watching",),
         (f"{LASTRESORT}guardian.py", "            aside(partial(drop_port, old))", "            drop_port(old)"),
     ),
@@ -39,7 +39,7 @@ PORTS: tuple[Seed, ...] = (
     part(
         "an opened port goes on",
         "ports",
-        "a port that was opened does not begin with a stop",
+        "an opened port does not begin with a stop",
         ("tests/devices/test_charger_port.py::test_an_opened_port_stops_the_whole_charger_before_it_asks_anything",),
         (
             f"{DEVICES}schedule.py",
