@@ -3,7 +3,7 @@
 Theory of operation. `orchestrator run` is this process; it starts the controller and then only waits. The controller
 hands it a duplicate of every serial port and contactor line that it opens (SCM_RIGHTS), and sends a heartbeat once
 *all* of its loops have made progress. No heartbeat for SILENCE_S, or the end of the connection, means that nothing
-controls the chargers: the guardian kills what is left, stops the charger on every port that it was ever told of,
+controls the chargers: the guardian kills what is left, stops the charger on every port it was ever given,
 verifies the stops, and exits with an error, so that systemd restarts the service. A charger that runs again meanwhile
 was not verified, and is stopped again. Contactors open after the first round of stops; `lastopen.py` explains why not
 before. The guardian answers each heartbeat; a controller without answers knows that its guardian is gone, stops the

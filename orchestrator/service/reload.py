@@ -15,7 +15,7 @@ from orchestrator.service.bay import BayRunner
 class Reload:
     """Reads the station's files in its own thread: the control loop must not wait for a disk.
 
-    However often it is asked meanwhile, it reads once more, which covers all of the requests.
+    However many requests arrive meanwhile, it reads once more for all of them.
     """
 
     def __init__(self, station: Station, bays: Sequence[BayRunner], say: Callable[[str], None]) -> None:
