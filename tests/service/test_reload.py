@@ -134,7 +134,7 @@ def test_a_comment_changes_the_lines_that_reasons_name(site: Site) -> None:
     line = (
         site.policy_file.read_text()
         .splitlines()
-        .index("  soc_below_pct: 98                    # with less than this; a fuller one is left alone")
+        .index("  soc_below_pct: 98                    # below this; a fuller one is left alone")
         + 1
     )
     assert f"mine.yaml:{line}" in str(site.bench.bay.status()["reason"])
