@@ -30,7 +30,9 @@ def shown(value: object) -> str:
         return _hex(bytes(value))
     if isinstance(value, Mapping):
         return " ".join(f"{shown(key)}={shown(item)}" for key, item in value.items()) or "nothing"
-    if isinstance(value, (Sequence, AbstractSet)) and not isinstance(value, (str, range)):
+    if isinstance(value, AbstractSet):
+        return " ".join(sorted(map(shown, value))) or "nothing"  # the same in every process: sets have no order
+    if isinstance(value, Sequence) and not isinstance(value, (str, range)):
         return " ".join(map(shown, value)) or "nothing"
     if is_dataclass(value) and not isinstance(value, type) and type(value).__str__ is object.__str__:
         return _record(value)
