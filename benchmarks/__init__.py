@@ -1,1 +1,1 @@
-"""Measures the service beside floors and a naive controller: `make bench`. Numbers to read, not a test."""
+"""Measures the service against floors and a naive controller: `make bench`. Numbers to read, not a test."""

@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: the service beside floors and a naive controller, as medians and p99 over many runs."""
+"""`python -m benchmarks`: the service against floors and a naive controller, as medians and p99 over many runs."""
 
 import argparse
 import sys
@@ -23,7 +23,7 @@ PARTS: Mapping[str, Callable[[Effort], Iterator[Result]]] = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Measure what is asked for and print the table. The exit status tells only whether it could be measured."""
+    """Run the requested measurements and print the table. The exit status only tells whether they succeeded."""
     arguments = _arguments(argv)
     facts = ", ".join(f"{name} {value}" for name, value in machine().items())
     print(facts, flush=True)

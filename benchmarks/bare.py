@@ -2,7 +2,7 @@
 
     python -m benchmarks.bare '[{"port", "node_id", "can": {…}}, …]' SDO_READS_PER_SECOND_ON_EACH_BUS
 
-One thread a bus (python-can), one thread a port (pyserial), as the service has them.
+One thread per bus (python-can) and one per port (pyserial), as in the service.
 """
 
 import json
@@ -36,7 +36,7 @@ def main() -> None:
 
 
 def read_objects(settings: dict[str, Any], nodes: list[int], period_s: float) -> None:
-    """One SDO read after the other, from one node after the other."""
+    """One SDO read after another, from one node after another."""
     bus = can.Bus(**settings)
     next_s = time.monotonic()
     for node, index in cycle([(node, index) for index in OBJECTS for node in nodes]):
@@ -49,7 +49,7 @@ def read_objects(settings: dict[str, Any], nodes: list[int], period_s: float) ->
 
 
 def poll(path: str) -> None:
-    """One status request a slot; as thrifty as a thread can be: it sleeps while the bytes are on the wire."""
+    """One status request per slot, as cheaply as a thread can: it sleeps while the bytes are on the wire."""
     port = serial.Serial(path, 19200, timeout=0.1)
     next_s = time.monotonic()
     while True:

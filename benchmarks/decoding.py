@@ -1,4 +1,4 @@
-"""How many bytes a second the frame decoder takes. One charger sends at most 0.0019 MB/s, 128 of them 0.25 MB/s.
+"""Throughput of the frame decoder. One charger sends at most 0.0019 MB/s, 128 of them 0.25 MB/s.
 
 The floor is `bytes.find` walking from start to start over the same bytes. p99 is the slowest of the runs.
 """
@@ -14,12 +14,12 @@ from orchestrator.protocol.frame import START, Frame, FrameDecoder
 SIZE = 200_000
 #: A whole status reply: 8 values of two bytes.
 REPLY = Frame(0x03, 0x90, bytes.fromhex("13 93 09 07 00 01 00 01 00 03 00 04 00 00 00 01")).encode()
-#: A start in every 8 bytes, each with a length that fits and an end in its place: only the checksum says no.
+#: A start in every 8 bytes, each with a valid length and an end in its place: only the checksum is wrong.
 TRAP = bytes.fromhex("AF FA 90 22 00 00 AF A0")
 
 
 def measure(effort: Effort) -> Iterator[Result]:
-    """Clean frames, as they come and byte by byte; garbage; the worst that we could think of."""
+    """Clean frames, in chunks and byte by byte; garbage; the worst case we could think of."""
     runs = effort.choose(40, 5)
     garbage = random.Random(1).randbytes(SIZE)  # noqa: S311 - noise, no secret
     cases = (

@@ -1,11 +1,11 @@
-"""How much is measured."""
+"""The number of runs."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """All of it, or what takes less than two minutes."""
+    """Full runs, or quick ones of less than two minutes in all."""
 
     quick: bool = False
 

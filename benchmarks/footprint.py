@@ -1,7 +1,7 @@
-"""Memory and processor time of a station while every bay charges; the emulators run in a process of their own.
+"""Memory and processor time of a station while every bay charges; the emulators run in a separate process.
 
-The service is two processes, guardian and controller. Processor time is that of both; memory is shown for each. The
-floor for processor time is `bare.py`, which does as many SDO reads and polls as the service was seen to do.
+The service is two processes, guardian and controller. Processor time is for both together; memory is shown for each.
+The floor for processor time is `bare.py`, with as many SDO reads and polls as measured for the service.
 """
 
 import json
@@ -18,14 +18,14 @@ from benchmarks.stations import Controllers, Side, module, naive, one_station, o
 from orchestrator.sim.client import PlantProcess
 
 BITRATE = 250_000  #: of each bus: SDO reads take at most 30 % of it
-SETTLE_S = 3.0  #: the start's own work is over by then
+SETTLE_S = 3.0  #: the work of starting is over by then
 WINDOW_S = 1.0
 MANY = 64
 
 
 @dataclass(slots=True)
 class Use:
-    """What one controller used, window by window."""
+    """The usage of one controller, window by window."""
 
     controller_mib: list[float] = field(default_factory=list)
     guardian_mib: list[float] = field(default_factory=list)
@@ -67,7 +67,7 @@ def _each_further_bay(one: Use, many: Use, bays: int, naive_one: Use, naive_sixt
 
 
 def _processor(buses: int, use: Use, windows: int) -> Iterator[Result]:
-    """All bays together and each, beside as many bytes in bare loops."""
+    """All bays together and per bay, against the same traffic in bare loops."""
     bare = _use(_bare(use.reads_per_s / buses), MANY, buses, windows)
     title = f"CPU, {MANY} bays, {buses} bus{'es' if buses > 1 else ''}, {use.reads_per_s:.0f} SDO/s"
     yield Result(title, "%", Series("ours", use.cpu_pct), Series("bare loops", bare.cpu_pct), Goal(median=25.0))
@@ -110,12 +110,12 @@ def _reads(process: PlantProcess) -> int:
 
 
 def _cpu_s(pid: int) -> float:
-    """Seconds on a processor of all its threads, to the nanosecond where /proc/PID/stat has ticks of 10 ms."""
+    """CPU seconds of all its threads, in nanosecond resolution; /proc/PID/stat has ticks of 10 ms."""
     tasks = Path(f"/proc/{pid}/task").iterdir()
     return sum(int((task / "schedstat").read_text(encoding="ascii").split()[0]) for task in tasks) / 1e9
 
 
 def _rss_mib(pid: int) -> float:
-    """What it has in memory, shared files included (VmRSS)."""
+    """Its resident memory, shared files included (VmRSS)."""
     pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20

@@ -1,4 +1,4 @@
-"""When the controller itself is what failed: from its death, or from an emergency stop's exec, to the first stop byte.
+"""When the controller itself failed: from its death, or from an emergency stop's exec, to the first stop byte.
 
 The stop is seen by the emulators, in another process; their clock and ours are the same.
 """
@@ -17,15 +17,15 @@ from benchmarks.report import Goal, Result, Series
 from benchmarks.stations import Controllers, Station, a_station_each, ours, plant
 from orchestrator.sim.client import PlantProcess
 
-#: Single-bay stations that are started together and then die one after the other, each on a bus of its own.
+#: Single-bay stations, started together, that then die one after another, each on its own bus.
 STATIONS = 8
-#: The time between two deaths is uniform in here: no multiple of anything.
+#: The time between two deaths is uniformly distributed in this range: a multiple of no period.
 GAP_S = (0.15, 0.45)
-#: A service has got going when it has polled its charger so often.
+#: A service is under way after this many polls of its charger.
 POLLS = 5
-#: Who has not stopped by then does not stop.
+#: A stop not seen by then counts as missing.
 STOPS_S = 5.0
-#: A bare process of the same interpreter that opens the port and writes the one frame.
+#: A bare process of the same interpreter that opens the port and writes the single frame.
 FLOOR = (
     "import os, sys, termios, tty; fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); tty.setraw(fd); "
     "line = termios.tcgetattr(fd); line[4] = line[5] = termios.B19200; termios.tcsetattr(fd, 0, line); "
@@ -34,7 +34,7 @@ FLOOR = (
 
 
 def measure(effort: Effort) -> Iterator[Result]:
-    """Deaths first, then emergency stops with nobody else there."""
+    """Deaths first, then emergency stops without a service."""
     rss_mib: list[float] = []
     for what, number, goal in (
         ("controller SIGKILL → stop byte", signal.SIGKILL, Goal(p99=20.0)),
@@ -46,7 +46,7 @@ def measure(effort: Effort) -> Iterator[Result]:
 
 
 def _deaths(number: signal.Signals, runs: int, rss_mib: list[float]) -> tuple[list[float], int]:
-    """Milliseconds of all that were stopped, and how many were not."""
+    """Milliseconds of all stops, and the number of missing ones."""
     phase = random.Random(number.name)  # noqa: S311 - no secret
     took_ms: list[float | None] = []
     with plant(STATIONS, STATIONS) as (process, directory):
@@ -68,21 +68,21 @@ def _polls(process: PlantProcess) -> list[int]:
 
 
 def _death(process: PlantProcess, bay: int, pid: int, number: signal.Signals) -> float | None:
-    process.inject("heal", bay)  # from now on, look out for the first stop
+    process.inject("heal", bay)  # watch for the first stop from here on
     began_s = time.monotonic()
     os.kill(pid, number)
     return _first_stop_ms(process, bay, began_s)
 
 
 def _first_stop_ms(process: PlantProcess, bay: int, began_s: float) -> float | None:
-    """None where none came within STOPS_S."""
+    """None if none came within STOPS_S."""
     while (stop_s := process.state(bay)["first_stop_s"]) is None and time.monotonic() < began_s + STOPS_S:
         time.sleep(0.02)
     return None if stop_s is None else 1000 * (stop_s - began_s)
 
 
 def _estops(runs: int) -> Iterator[Result]:
-    """From before the fork to the stop, with a port alone and with a station file."""
+    """From before the fork to the stop, with only a port and with a station file."""
     estop = [sys.executable, "-m", "orchestrator", "estop"]
     with plant(1) as (process, directory):
         station = Station(directory / "station", (1,), tuple(process.bays))

@@ -1,8 +1,8 @@
-"""A decoded reading that means stop → the stop frame handed to the port: what lies between is our own code alone.
+"""From a decoded reading that means stop to the stop frame handed to the port: only our own code lies in between.
 
-From the moment at which the BMU's hot temperature can be seen in its view, before the control loop is woken, to the
-return of the write to the pty; 16 bays, emulators in another process. "Line idle": no poll was under way in between.
-Else the rest of that transaction, at most 120 ms, is waited for; what comes after its last byte is shown as well.
+From the moment the BMU's high temperature is visible in its view, before the control loop wakes, to the return of the
+write to the pty; 16 bays, emulators in another process. "Line idle": no poll was under way meanwhile. Otherwise the
+rest of that transaction, at most 120 ms, comes first; the time after its last byte is shown as well.
 """
 
 import json
@@ -18,9 +18,8 @@ from benchmarks.stations import Controllers, Station, module, one_station, plant
 BAYS = 16
 WARM_C, HOT_C = 42.0, 45.0
 GAP_S = (0.15, 0.45)
-#: A stop is handed over long before this.
+#: Every stop is handed over long before this.
 AFTER_S = 1.0
-#: DESIGN §6.
 IDLE = Goal(median=2.0, p99=10.0)
 IN_FLIGHT = Goal(p99=120.0 + 10.0)
 
@@ -40,7 +39,7 @@ def timed(station: Station) -> list[str]:
 
 
 def measure(effort: Effort) -> Iterator[Result]:
-    """On a quick line mostly idle, on one with a slow converter (80 ms) as often as not in flight."""
+    """Mostly idle on a fast line; on one with a slow converter (80 ms), in flight about half of the time."""
     stops = list(_stops("real", effort.choose(3, 0)))
     stops += _stops("delayed", effort.choose(4, 1))
     idle = [stop.took_ms for stop in stops if not stop.in_flight]
@@ -72,5 +71,5 @@ def _stops(line: str, rounds: int) -> Iterator[Stop]:
 def _stop(text: str) -> Stop:
     times = json.loads(text)
     hot_s, stop_s = times["hot_s"], times["stop_s"]
-    in_flight = hot_s < times["free_s"]  # also if the poll began after the reading, yet before anybody was told of it
+    in_flight = hot_s < times["free_s"]  # also if the poll began after the reading but before it was reported
     return Stop(in_flight, 1000 * (stop_s - hot_s), 1000 * (stop_s - times["free_s"]))

@@ -1,9 +1,9 @@
-"""The unchanged service with two clocks read: when a decoded reading means stop, and when the stop has been written.
+"""The unchanged service with two timestamps: when a decoded reading means stop, and when the stop was written.
 
     python -m benchmarks.latency_service STATION HOT_C
 
-Guardian and controller, as `orchestrator run` has them. Ends with SIGTERM; then the controller prints a JSON line for
-each bay: {"bay", "hot_s", "stop_s", "free_s"}.
+Guardian and controller, as in `orchestrator run`. Ends on SIGTERM; then the controller prints a JSON line for each bay:
+{"bay", "hot_s", "stop_s", "free_s"}.
 """
 
 import json
@@ -24,16 +24,16 @@ from orchestrator.protocol.charger import STOP_FRAME
 from orchestrator.service import supervisor
 from orchestrator.service.guarded import GuardianLink
 
-CONTROLLER_ARGUMENTS = 3  #: more than so many: the guardian's socket is the last
+CONTROLLER_ARGUMENTS = 3  #: more arguments than this: the guardian's socket is the last
 
 
 class Times:
     """Of one bay, monotonic seconds."""
 
     def __init__(self) -> None:
-        self.hot_s: float | None = None  #: the first reading of a hot pack has been decoded and is there to be seen
-        self.stop_s: float | None = None  #: the first stop frame after it has been handed to the port
-        self.free_s = 0.0  #: the last read of a poll's answer has returned, before the stop
+        self.hot_s: float | None = None  #: the first reading of a hot pack is decoded and visible
+        self.stop_s: float | None = None  #: the first stop frame after it was handed to the port
+        self.free_s = 0.0  #: the last read of a poll's answer before the stop returned
 
 
 def main() -> int:
@@ -49,7 +49,7 @@ def main() -> int:
 
 
 def control(path: str, hot_c: float, fd: int) -> int:
-    """Serve, then tell."""
+    """Serve, then report."""
     station = load_station(path)
     of_port = {bay.charger.port: Times() for bay in station.bays}
     with (
@@ -65,7 +65,7 @@ def control(path: str, hot_c: float, fd: int) -> int:
 
 def _line_class(of_port: dict[str, Times]) -> type[SerialLine]:
     class TimedLine(SerialLine):
-        """Stamps what is handed over and when reads return."""
+        """Timestamps frames handed over and returning reads."""
 
         @property
         def times(self) -> Times:
@@ -90,7 +90,7 @@ def _node_class(station: Station, of_port: dict[str, Times], hot_c: float) -> ty
     place = {(bay.battery.can, bay.battery.node_id): of_port[bay.charger.port] for bay in station.bays}
 
     class TimedNode(BatteryNode):
-        """Stamps the moment from which its view shows a hot pack, before anybody is told."""
+        """Timestamps the moment its view first shows a hot pack, before it is reported."""
 
         def __init__(self, bus: str, config: BatteryConfig, budget: BusBudget, on_change: Callable[[], None]) -> None:
             times = place[bus, config.node_id]

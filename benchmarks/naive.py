@@ -1,4 +1,4 @@
-"""The naive controller: the script that an integrator would write today, as a yardstick. Never run it on real devices.
+"""The naive controller: the script an integrator would write today, as a yardstick. Never run it on real devices.
 
 One thread. For each bay in turn: canopen's own SDO client, then pyserial, then a decision; then `sleep(0.2)`.
 """
@@ -34,7 +34,7 @@ class Bay:
             _soh, soc, _minutes = struct.unpack("<BBH", self.node.sdo.upload(0x6002, 0))
             (decicelsius,) = struct.unpack("<h", self.node.sdo.upload(0x6004, 0)[:2])
         except (canopen.SdoCommunicationError, canopen.SdoAbortedError) as error:
-            print(f"BMU {self.node.id}: {error}")  # perhaps it answers next time
+            print(f"BMU {self.node.id}: {error}")  # it may answer next time
             return
         self.port.write(STATUS)
         reply = self.port.read(25)

@@ -1,6 +1,6 @@
-"""What it costs to keep: from a change to its being on the disk, and of the control loop's time.
+"""The cost of persisting: the time from a change until it is on the disk, and the control loop's time.
 
-python -m benchmarks.persisted [DIRECTORY]     default: the present one; the disk is what is measured
+python -m benchmarks.persisted [DIRECTORY]     default: the current one; its disk is measured
 """
 
 import sys
@@ -22,7 +22,7 @@ STEPS = 20_000
 
 
 def to_the_disk(directory: Path) -> list[float]:
-    """Seconds from each change to the moment when whoever waits for it is told, with so many bays in the file."""
+    """Seconds from each change to its confirmation, with that many bays in the file."""
     places = [Place(f"bay-{number}", f"/dev/ttyS{number}", "can0", number) for number in range(BAYS)]
     told = Event()
     store = Store(directory, places, time.monotonic, time.time, on_kept=lambda _: told.set())
@@ -42,7 +42,7 @@ def to_the_disk(directory: Path) -> list[float]:
 
 
 def of_a_step(directory: Path) -> float:
-    """Seconds of the control loop's time that a step spends on it while it charges."""
+    """Seconds of the control loop's time it takes per decision during a charge."""
     place = Place("bay-1", "/dev/ttyS1", "can0", 1)
     store = Store(directory, [place], time.monotonic, time.time)
     store.past(place)
@@ -56,7 +56,7 @@ def of_a_step(directory: Path) -> float:
 
 
 def main(arguments: list[str]) -> int:
-    """Measure and tell."""
+    """Measure and report."""
     with tempfile.TemporaryDirectory(dir=arguments[0] if arguments else ".") as scratch:
         taken = sorted(to_the_disk(Path(scratch)))
         each_s = of_a_step(Path(scratch) / "other")

@@ -1,7 +1,7 @@
-"""Plant changes → first stop byte at the emulator: our service beside the naive controller, on the same emulators.
+"""From a change of the plant to the first stop byte at the emulator: our service and the naive controller compared.
 
-Both clocks are the emulator's. Faults are injected at random phases, in one charging bay after the other; then all
-controllers end, the bays heal, and new controllers begin the next round, so that nothing is left of the last one.
+Both times are the emulator's. Faults are injected at random phases, in one charging bay after another; then all
+controllers end, the bays heal, and new controllers start the next round, so nothing of the last one remains.
 """
 
 import random
@@ -25,13 +25,13 @@ from benchmarks.stations import (
 )
 from orchestrator.sim.client import PlantProcess
 
-#: So warm that `over_temperature` (4 K at once) crosses the limit of 45 °C in that moment.
+#: Warm enough for `over_temperature` (4 K at once) to cross the limit of 45 °C at that moment.
 WARM_C = 42.0
-#: The time between two injections is uniform in here: no multiple of anything.
+#: The time between two injections is uniformly distributed in this range: a multiple of no period.
 GAP_S = (0.1, 0.4)
-#: After the last injection: who has not stopped by then does not stop.
+#: After the last injection: a stop not seen by then counts as missing.
 PATIENCE_S = 4.0
-#: Single-bay stations that run side by side, each on a bus of its own; few enough that the machine stays half idle.
+#: Single-bay stations running side by side, each on its own bus; few enough to leave the machine half idle.
 STATIONS = 12
 
 
@@ -45,7 +45,7 @@ class Case:
     quick_runs: int = 0
     bays: int = 1
     bitrate: int | None = None
-    share: float | None = None  #: the goal: at most this share of the naive controller's
+    share: float | None = None  #: the goal: at most this share of the naive controller's time
 
 
 CASES = (
@@ -58,7 +58,7 @@ CASES = (
 
 
 def measure(effort: Effort) -> Iterator[Result]:
-    """A row for each case. The naive controller knows no bit rate, so that it is asked once for each fault and size."""
+    """A row per case. The naive controller knows no bit rate, so it is measured once for each fault and size."""
     known: dict[tuple[str, int], Series] = {}
     for case in CASES:
         runs = effort.choose(case.runs, case.quick_runs)
@@ -72,7 +72,7 @@ def measure(effort: Effort) -> Iterator[Result]:
 
 
 def _react(case: Case, side: Side, runs: int) -> tuple[list[float], int]:
-    """Milliseconds of all that stopped, and how many did not."""
+    """Milliseconds of all stops, and the number of missing ones."""
     phase = random.Random(case.what)  # noqa: S311 - no secret
     reactions: list[float | None] = []
     bays, buses = (case.bays, 1) if case.bays > 1 else (STATIONS, STATIONS)
@@ -89,7 +89,7 @@ def _react(case: Case, side: Side, runs: int) -> tuple[list[float], int]:
 def _round(
     process: PlantProcess, stations: Sequence[Station], side: Side, fault: str, phase: random.Random
 ) -> list[float | None]:
-    """Each bay's reaction in s; None where no stop came."""
+    """Each bay's reaction in s; None without a stop."""
     numbers = [number for station in stations for number in station.numbers]
     phase.shuffle(numbers)
     with Controllers(stations, side) as controllers:

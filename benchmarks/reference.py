@@ -1,9 +1,9 @@
-"""`make reference`: the workbench's battery beside PyBaMM's, how far they differ and how fast each is.
+"""`make reference`: the workbench's battery against PyBaMM's: the difference, and the speed of each.
 
-Accuracy: the charge that a policy made of each shipped scenario is taken as it was, current and weather by time, and
-flows once more through PyBaMM's Thevenin model with the same parameters and PyBaMM's own solver. Speed: one charge from
-10 % to 1 A at constant voltage, by `orchestrator simulate` with its policy in charge of every step, and by PyBaMM's
-experiment runner, which is told when to do what and decides nothing.
+Accuracy: the charge a policy made in each shipped scenario, as current and weather over time, is run again through
+PyBaMM's Thevenin model with the same parameters and PyBaMM's own solver. Speed: one charge from 10 % to 1 A at constant
+voltage, by `orchestrator simulate` with its policy deciding every step, and by PyBaMM's experiment runner, which
+follows a fixed program and decides nothing.
 """
 
 import argparse
@@ -26,11 +26,11 @@ from orchestrator.workbench.simulate.simulation import Run, simulate
 from orchestrator.workbench.simulate.trail import Moment
 
 POLICY = "li-ion-48v"
-#: How far beyond 100 % PyBaMM's state of charge reaches here; it ends a simulation at its own 0 and 1.
+#: How far PyBaMM's state of charge reaches beyond 100 % here; it ends a simulation at its own 0 and 1.
 OVER = 1.05
-#: Goals: no more than this far apart, as a share of 100 % and of the voltage.
+#: Goals: the maximum difference, as a share of 100 % and of the voltage.
 GOAL_PCT = 1.0
-#: The length of the charge that speed is measured with.
+#: The length of the charge used to measure speed.
 HOURS = 4.0
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Apart:
-    """How far the two models are apart at most over one visit of a battery."""
+    """The maximum difference of the two models over one visit of a battery."""
 
     soc_pct: float
     volts_pct: float
@@ -46,7 +46,7 @@ class Apart:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print both tables; the exit status says whether the models agree to within the goal."""
+    """Print both tables; the exit status tells whether the models agree within the goal."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.reference", description=__doc__)
     parser.add_argument("--runs", type=int, default=5, help="of each speed, of which the median counts")
     arguments = parser.parse_args(argv)
@@ -70,7 +70,7 @@ def _scenario(name: str) -> Apart:
 
 
 def _visit(run: Run, visit: Visit) -> Apart:
-    """One battery's stay, once more through PyBaMM's model."""
+    """One battery's visit, again through PyBaMM's model."""
     end_s = (visit.to_h if visit.to_h is not None else run.scenario.hours) * 3600
     moments = [m for m in run.trail.moments if visit.from_h * 3600 < m.t_s <= end_s and m.soc_pct is not None]
     pack = pack_of(run.scenario.batteries[visit.battery])
@@ -114,12 +114,12 @@ def _solve(pack: Pack, moments: Sequence[Moment], t_s: Floats) -> pybamm.Solutio
 
 
 def _range(pack: Pack) -> tuple[float, float]:
-    """What lies between PyBaMM's 0 and 1 here, and which part of it below 0 %, in Ah."""
+    """The charge between PyBaMM's 0 and 1 here, and the part of it below 0 %, in Ah."""
     return pack.deep_ah + OVER * pack.usable_ah, pack.deep_ah
 
 
 def parameters(pack: Pack) -> pybamm.ParameterValues:
-    """PyBaMM's parameters for the same battery; its jig is as warm as its surroundings."""
+    """PyBaMM's parameters for the same battery; its jig has the ambient temperature."""
     total_ah, held_ah = _range(pack)
     deep = [((1 + share) * held_ah / total_ah, volts) for share, volts in pack.chemistry.deep if -1 <= share < 0]
     rest = [((held_ah + soc * pack.usable_ah) / total_ah, volts) for soc, volts in pack.chemistry.ocv if soc <= OVER]
@@ -176,7 +176,7 @@ def _speed(runs: int) -> Iterator[str]:
 
 
 def _experiment(pack: Pack, charge: Scenario) -> Callable[[], pybamm.Simulation]:
-    """What makes the same charge for PyBaMM."""
+    """The same charge as a PyBaMM experiment."""
     total_ah, held_ah = _range(pack)
     volts, most_a, kelvin = charge.charger.cv_v, charge.charger.steps_a[-1], charge.weather[0].ambient_c - ZERO_C
     steps = (f"Charge at {most_a} A until {volts} V", f"Hold at {volts} V until 1 A", "Rest for 1 hour")

@@ -1,4 +1,4 @@
-"""What a measurement says, and the table that people read."""
+"""The results of measurements, and the table for people."""
 
 import json
 import os
@@ -14,21 +14,21 @@ COLUMNS = ("what", "goal", "median", "p99", "n", "beside it", "median", "p99", "
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Many runs of one measurement. `missing` runs gave nothing at all in the time they had."""
+    """Many runs of one measurement. `missing` is the number of runs without a result in time."""
 
     label: str
     samples: Sequence[float]
     missing: int = 0
-    more_is_better: bool = False  #: then p99 is the value that at most one run in a hundred falls below
+    more_is_better: bool = False  #: then p99 is the value at most one run in a hundred falls below
 
     @property
     def median(self) -> float | None:
-        """None where half of the runs gave nothing."""
+        """None if half of the runs have no result."""
         return _known(statistics.median(self._worst_last)) if self.n else None
 
     @property
     def p99(self) -> float | None:
-        """The value that at most one run in a hundred exceeds; None where more than that gave nothing."""
+        """The value at most one run in a hundred exceeds; None if more than that have no result."""
         return _known(self._worst_last[ceil(0.99 * self.n) - 1]) if self.n else None
 
     @property
@@ -43,7 +43,7 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """At most so much: absolute in the result's unit, or as a share of what is beside it."""
+    """An upper limit: absolute in the result's unit, or as a share of the value it is compared with."""
 
     median: float | None = None
     p99: float | None = None
@@ -70,7 +70,7 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """One row of the table: ours, what it is measured beside, and what it should be."""
+    """One row of the table: our result, the one it is compared with, and the goal."""
 
     what: str
     unit: str
@@ -80,7 +80,7 @@ class Result:
 
     @property
     def met(self) -> bool | None:
-        """None where there is no goal."""
+        """None without a goal."""
         return self.goal.met(self.ours, self.other) if self.goal else None
 
     def cells(self) -> tuple[str, ...]:
@@ -153,6 +153,6 @@ def _processor() -> str:
 
 
 def write_json(path: Path, results: Sequence[Result]) -> None:
-    """Everything, for a program that compares two runs."""
+    """Everything, for programs that compare two runs."""
     document = {"machine": machine(), "results": [result.facts() for result in results]}
     path.write_text(json.dumps(document, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")

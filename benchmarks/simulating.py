@@ -1,7 +1,7 @@
-"""What `orchestrator simulate` costs: one charge of four hours, and many of them on all cores.
+"""The cost of `orchestrator simulate`: one charge of four hours, and many of them on all cores.
 
-One charge is measured in processor time of its thread, beside the same one with every tick stepped through. The many
-are a sweep, in time on the clock, with the start of its processes left out.
+One charge is measured in processor time of its thread, against the same one simulated tick by tick. The many are a
+sweep, in wall-clock time, without the start of its processes.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,7 +29,7 @@ def charge() -> Scenario:
 
 
 def measure(effort: Effort) -> Iterator[Result]:
-    """One charge, and the share of many."""
+    """One charge alone, and one of many."""
     scenario, policy = charge(), load_policy(POLICY)
     short = replace(scenario, hours=HOURS / effort.choose(1, 8))
     ours = Series("ours", _times_ms(lambda: simulate(policy, scenario), effort.choose(40, 3), thread_time))

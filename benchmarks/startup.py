@@ -1,6 +1,6 @@
 """From exec to the first status request on the wire. The service stops the charger first and polls it two slots later.
 
-The floor is a bare Python that opens the same port with pyserial and writes the one frame.
+The floor is a bare Python that opens the same port with pyserial and writes the single frame.
 """
 
 import os
@@ -19,15 +19,15 @@ from benchmarks.effort import Effort
 from benchmarks.report import Goal, Result, Series
 from benchmarks.stations import Station, ours
 
-POLL = bytes.fromhex("AF FA 90 05 01 90")  #: a status request, up to the kinds that it asks for
+POLL = bytes.fromhex("AF FA 90 05 01 90")  #: a status request, up to the requested kinds
 STOP = bytes.fromhex("AF FA 90 04 10 90 00 34 AF A0")
 FLOOR = "import serial, sys; serial.Serial(sys.argv[1], 19200).write(bytes.fromhex('AFFA90050190131F58AFA0'))"
-#: Nothing came within this: the program is broken.
+#: If nothing comes within this, the program is broken.
 BROKEN_S = 20.0
 
 
 def measure(effort: Effort) -> Iterator[Result]:
-    """Our first poll beside the floor's, then our first stop."""
+    """Our first poll against the floor's, then our first stop."""
     runs = effort.choose(20, 5)
     with _port() as (master, bay), TemporaryDirectory(prefix="bench-") as name:
         argv = ours(Station(Path(name), (1,), (bay,)))
@@ -41,7 +41,7 @@ def measure(effort: Effort) -> Iterator[Result]:
 
 @contextmanager
 def _port() -> Iterator[tuple[int, dict[str, str | int]]]:
-    """A pty on which nobody answers, and the bay that it belongs to."""
+    """A pty on which nobody answers, and its bay."""
     master, slave = os.openpty()
     tty.setraw(slave)
     try:
@@ -52,9 +52,9 @@ def _port() -> Iterator[tuple[int, dict[str, str | int]]]:
 
 
 def _first(argv: Sequence[str], master: int) -> dict[bytes, float]:
-    """When each of the two frames came first, in s from the start of the program."""
+    """When each of the two frames first came, in s from the start of the program."""
     while _comes(master, 0.0):
-        os.read(master, 4096)  # of the program before
+        os.read(master, 4096)  # from the previous program
     begin_s = time.monotonic()
     with subprocess.Popen(
         argv, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
@@ -62,7 +62,7 @@ def _first(argv: Sequence[str], master: int) -> dict[bytes, float]:
         try:
             return _listen(master, begin_s)
         finally:
-            os.killpg(process.pid, signal.SIGKILL)  # guardian and controller at once: neither shall stop anything
+            os.killpg(process.pid, signal.SIGKILL)  # guardian and controller at once, so that neither stops anything
 
 
 def _listen(master: int, begin_s: float) -> dict[bytes, float]:

@@ -1,4 +1,4 @@
-"""Stations to measure on: emulated bays in another process, and a controller for them, ours or the naive one."""
+"""Stations for measurements: emulated bays in another process, and a controller for them, ours or the naive one."""
 
 import json
 import os
@@ -17,14 +17,14 @@ from typing import Any, Self
 
 from orchestrator.sim.client import PlantProcess
 
-#: Beyond this the naive controller or the service is broken, not slow.
+#: After this the naive controller or the service is broken, not slow.
 CHARGING_S = 60.0
 END_S = 10.0
 LOG_LINES = 10
-#: Bus number n listens on this port + n; two benchmarks at a time do not meet.
+#: Bus number n listens on this port + n; two benchmarks running at once do not meet.
 FIRST_UDP_PORT = 20_000 + os.getpid() * 64 % 30_000
 
-Wiring = Mapping[str, Any]  #: a bay as the plant names it: name, port, node_id, can (the bus's number)
+Wiring = Mapping[str, Any]  #: a bay as named by the plant: name, port, node_id, can (the bus's number)
 
 
 def bus(number: int) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def bus(number: int) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """The bays that one controller is responsible for. Bay numbers are the plant's, from 1."""
+    """The bays of one controller. Bay numbers are the plant's, from 1."""
 
     directory: Path
     numbers: tuple[int, ...]
@@ -43,7 +43,7 @@ class Station:
     bitrate: int | None = None
 
     def station_file(self) -> Path:
-        """Written for our service, which finds nothing of an earlier run: it would go on holding latched faults."""
+        """Written for our service, without state of an earlier run, whose latched faults it would keep."""
         shutil.rmtree(self.directory / "run", ignore_errors=True)
         used = sorted({bay["can"] for bay in self.bays})
         rate = {} if self.bitrate is None else {"bitrate": self.bitrate}
@@ -83,12 +83,12 @@ def naive(station: Station) -> list[str]:
 
 
 def wirings(station: Station) -> list[dict[str, Any]]:
-    """The bays as `naive.py` and `bare.py` want them."""
+    """The bays in the form for `naive.py` and `bare.py`."""
     return [{"port": bay["port"], "node_id": bay["node_id"], "can": bus(bay["can"])} for bay in station.bays]
 
 
 class Controller:
-    """A started controller. What it prints on standard output is `output` after `end()`."""
+    """A started controller. Its standard output is `output` after `end()`."""
 
     def __init__(self, station: Station, side: Side) -> None:
         station.directory.mkdir(parents=True, exist_ok=True)
@@ -104,17 +104,17 @@ class Controller:
 
     @property
     def has_ended(self) -> bool:
-        """By itself, which it should not."""
+        """It ended by itself, which it should not."""
         return self._process.poll() is not None
 
     @property
     def output(self) -> str:
-        """What it printed."""
+        """Its standard output."""
         return (self._directory / "output").read_text(encoding="utf-8")
 
     @property
     def log(self) -> str:
-        """What it said to people."""
+        """Its messages to people."""
         return (self._directory / "log").read_text(encoding="utf-8")
 
     def tell_to_end(self) -> None:
@@ -122,7 +122,7 @@ class Controller:
         self._process.send_signal(signal.SIGTERM)
 
     def end(self) -> None:
-        """Wait for its end, which `tell_to_end` has asked for."""
+        """Wait for the end requested by `tell_to_end`."""
         try:
             self._process.wait(END_S)
         except subprocess.TimeoutExpired:
@@ -152,16 +152,16 @@ class Controllers:
 
     @property
     def pids(self) -> list[int]:
-        """Of all processes: those that were started, and their children."""
+        """All processes: those started, and their children."""
         return [pid for controller in self.running for pid in (controller.pid, *_children(controller.pid))]
 
     def check(self) -> None:
-        """RuntimeError if one of them has ended by itself: then nothing is measured."""
+        """RuntimeError if one of them has ended by itself, which invalidates the measurement."""
         if any(controller.has_ended for controller in self.running):
             raise RuntimeError(f"a controller has ended by itself:\n{self.log()}")
 
     def log(self) -> str:
-        """What each of them said last, for the message of a failure."""
+        """The last output of each, for a failure's message."""
         return "\n".join("\n".join(controller.log.splitlines()[-LOG_LINES:]) for controller in self.running)
 
 
@@ -172,7 +172,7 @@ def _children(pid: int) -> list[int]:
 
 @contextmanager
 def plant(bays: int, buses: int = 1, *args: str) -> Iterator[tuple[PlantProcess, Path]]:
-    """An emulated station of so many bays, in equal parts on so many CAN buses, and a directory for its things."""
+    """An emulated station of that many bays, spread evenly over that many CAN buses, with a directory for its files."""
     with TemporaryDirectory(prefix="bench-") as name:
         directory = Path(name)
         cans = [text for number in range(buses) for text in ("--can", json.dumps(bus(number)))]
@@ -193,7 +193,7 @@ def a_station_each(process: PlantProcess, directory: Path) -> list[Station]:
 
 
 def wait_until_charging(process: PlantProcess, controllers: Controllers) -> None:
-    """Until current flows in every bay; RuntimeError with the controllers' logs where that takes too long."""
+    """Wait until current flows in every bay; RuntimeError with the controllers' logs if that takes too long."""
     end_s = time.monotonic() + CHARGING_S
     while not all(is_charging(bay) for bay in process.ask({"query": "state"})["bays"]):
         controllers.check()
@@ -203,5 +203,5 @@ def wait_until_charging(process: PlantProcess, controllers: Controllers) -> None
 
 
 def is_charging(state: Mapping[str, Any]) -> bool:
-    """By the emulator's own word."""
+    """As reported by the emulator."""
     return bool(state["operation"] == 1 and state["current_a"] > 1.0)

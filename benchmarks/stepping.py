@@ -1,7 +1,7 @@
-"""What one `step()` of the core costs: situations of a live bay, recorded first and then decided again and again.
+"""The cost of one decision of the core (`step()`): recorded situations of a live bay, decided repeatedly.
 
-Processor time of the thread, so that whatever else the machine does is not counted. Floors: the look-up of a transition
-in a dict, and `transitions` firing one.
+Processor time of the thread, so the machine's other load does not count. Floors: the look-up of a transition in a dict,
+and `transitions` firing one.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,13 +18,13 @@ from orchestrator.model import Request, Snapshot, State
 from tests.core.world import World, bay
 
 GOAL = Goal(median=100.0, p99=100.0)
-BATCH = 20  #: the floors are so quick that the clock would be most of what is measured
+BATCH = 20  #: the floors are so fast that reading the clock would dominate
 LEADS = {(source, trigger): target or source for trigger, sources, target in TABLE for source in sources}
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The arguments of one step."""
+    """The arguments of one decision."""
 
     now_s: float
     snapshot: Snapshot
@@ -32,21 +32,21 @@ class Moment:
 
 
 class Recorder(World):
-    """A world that keeps what each step was given."""
+    """A world that records the arguments of each decision."""
 
     def __init__(self, **battery: float) -> None:
         super().__init__(bay(), **battery)
         self.moments: list[Moment] = []
 
     def snapshot(self, request: Request | None, internal: str) -> Snapshot:
-        """Called right before each step."""
+        """Called right before each decision."""
         snapshot = super().snapshot(request, internal)
         self.moments.append(Moment(self.now_s, snapshot, self.memory))
         return snapshot
 
 
 def idle() -> Recorder:
-    """No battery wants to be charged."""
+    """No battery to be charged."""
     world = Recorder(soc_pct=99.0)
     world.until(State.IDLE)
     return world
@@ -71,7 +71,7 @@ def faulty() -> Recorder:
 
 
 def measure(effort: Effort) -> Iterator[Result]:
-    """Each situation beside the floors."""
+    """Each situation against the floors."""
     seconds, rounds = 60.0, effort.choose(30, 3)
     trigger = Series("transitions, one trigger", _times(_fire, 300 * rounds))
     look_up = Series("dict look-up", _times(_look_up, 300 * rounds))

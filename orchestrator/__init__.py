@@ -1,3 +1,3 @@
-"""Charging-station orchestrator: stands between batteries and industrial chargers, and stops safely."""
+"""Charging-station orchestrator: drives industrial chargers from batteries' own readings, and stops safely."""
 
 __version__ = "0.1.0"

@@ -1,6 +1,6 @@
-"""`orchestrator`, and `python -m orchestrator`: two verbs that must not wait for anybody's imports, then the rest."""
+"""`orchestrator`, and `python -m orchestrator`: two verbs that must not wait for imports, then the rest."""
 
-import _signal  # type: ignore[import-not-found]  # what `signal` is made of, without the time that its import takes
+import _signal  # type: ignore[import-not-found]  # the core of `signal`, without that module's import time
 import os
 import sys
 
@@ -21,7 +21,7 @@ def main() -> int:
 
 def _run(arguments: list[str]) -> int:
     if arguments[:1] == ["estop"]:
-        _signal.signal(_signal.SIGINT, _signal.SIG_IGN)  # until it can say what it has stopped
+        _signal.signal(_signal.SIGINT, _signal.SIG_IGN)  # until it can report what it has stopped
         from orchestrator.lastresort.estop import main as estop
 
         return estop(arguments[1:], _catch)
@@ -35,21 +35,21 @@ def _run(arguments: list[str]) -> int:
 
 
 def _catch(wish: "Callable[[], None]") -> None:
-    """Ctrl-C, `kill` and a closed terminal do not end an emergency stop in silence. `nohup` stays what it is."""
+    """Ctrl-C, `kill` and a closed terminal do not end an emergency stop silently. `nohup` stays in effect."""
     for number in (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP):
         if number == _signal.SIGINT or _signal.getsignal(number) is not _signal.SIG_IGN:
             _signal.signal(number, lambda *_: wish())
 
 
 def _import_from_no_working_directory() -> None:
-    """A file there that is called as one of our libraries, say `serial.py`, must not be run, by no process of ours.
+    """No process of ours may run a file there that shares a name with one of our libraries, say `serial.py`.
 
-    Python looks there first under `-m`, and for each empty name in PYTHONPATH. A checkout may be imported from.
+    Python looks there first under `-m`, and for each empty name in PYTHONPATH. Importing from a checkout is allowed.
     """
     home = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - pathlib is a file, too
     try:
         here = os.getcwd()  # noqa: PTH109 - as above
-    except OSError:  # it was deleted: nothing can be there
+    except OSError:  # deleted: nothing can be there
         here = ""
     if here in (home, os.path.dirname(os.__file__)):  # noqa: PTH120 - as above; the latter is Python's own
         return
@@ -60,13 +60,13 @@ def _import_from_no_working_directory() -> None:
 
 
 def _fill_standard_streams() -> None:
-    """Let nothing that we say be an error.
+    """Make sure that printing never fails.
 
-    Descriptors 0 to 2 are given to nothing where they are free: a serial port with one of them would get what we say.
-    A terminal that has no °, → or Korean shows them escaped.
+    Point free descriptors 0 to 2 at /dev/null: a serial port opened on one of them would receive our messages. A
+    terminal that cannot show °, → or Korean shows them escaped.
     """
     while (fd := os.open(os.devnull, os.O_RDWR)) <= 2:
-        os.set_inheritable(fd, True)  # noqa: FBT003 - it takes it no other way
+        os.set_inheritable(fd, True)  # noqa: FBT003 - it takes no keyword
     os.close(fd)
     sys.stdout = sys.stdout or open(1, "w", closefd=False)  # noqa: SIM115 - None where it was closed
     sys.stderr = sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115 - as above
@@ -75,7 +75,7 @@ def _fill_standard_streams() -> None:
 
 
 def _flush() -> None:
-    """What nobody takes any more, a pipe whose reader has left or a full disk, is dropped: no traceback at the end."""
+    """Drop output that can no longer be delivered (reader of a pipe gone, disk full): no traceback at the end."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

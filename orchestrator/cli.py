@@ -1,6 +1,6 @@
-"""The command line: `orchestrator VERB`. Exit status 0: well; 1: the answer is no; 2: used wrongly.
+"""The command line: `orchestrator VERB`. Exit status 0: success; 1: the answer is no; 2: usage error.
 
-Each verb imports what it needs when it runs, so that none waits for another's libraries.
+Each verb imports its dependencies when it runs, so that none waits for another's libraries.
 """
 
 import argparse
@@ -32,10 +32,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2 if isinstance(error, UsageError | HexError) else 1
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+    except BrokenPipeError:  # the reader of our output has gone, e.g. `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except OSError as error:  # a full disk behind our output, as a rule
+    except OSError as error:  # usually a full disk behind our output
         print(f"orchestrator: {error}", file=sys.stderr)
         return 1
 
@@ -65,33 +65,31 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """For the list of verbs only: `__main__` runs it before any of this is imported."""
+    """Only for the list of verbs: `__main__` runs it before any of this is imported."""
     verbs.add_parser("estop", help="stop every charger now; needs no running service", add_help=False)
 
 
 def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    check = verbs.add_parser("check", help="every error of policies, stations and object maps, with its line")
-    check.add_argument("file", nargs="+", help="files; what each is, it says itself")
+    check = verbs.add_parser("check", help="report every error in policies, stations, object maps and scenarios")
+    check.add_argument("file", nargs="+", help="files of any kind; a key in each identifies its kind")
     check.add_argument(
-        "--exhaustive", action="store_true", help="explore all that can happen under a policy, too: a minute for each"
+        "--exhaustive", action="store_true", help="also explore all that can happen under a policy: a minute for each"
     )
-    check.add_argument("--jobs", type=int, metavar="N", help="processes for that (default: one for each core)")
+    check.add_argument("--jobs", type=int, metavar="N", help="processes for that (default: one per core)")
     check.set_defaults(run=_check)
-    schema = verbs.add_parser("schema", help="JSON Schema of a kind of file, so that an editor completes and checks")
-    schema.add_argument("kind", choices=SCHEMAS, help="which kind")
+    schema = verbs.add_parser("schema", help="print the JSON Schema of a kind of file, for editors")
+    schema.add_argument("kind", choices=SCHEMAS, help="the kind of file")
     schema.set_defaults(run=_schema)
     decode = verbs.add_parser("decode", help="explain frames of the charger's protocol")
     decode.add_argument("hex", nargs="+", help="bytes in hexadecimal, e.g. AF FA 90 04 10 90 00 34 AF A0")
-    decode.add_argument("--kinds", type=_kinds, metavar="K1,K2", help="which values a reply holds, e.g. 03,04")
-    decode.add_argument("--json", action="store_true", help="for programs")
+    decode.add_argument("--kinds", type=_kinds, metavar="K1,K2", help="the values in a reply, e.g. 03,04")
+    decode.add_argument("--json", action="store_true", help="JSON output, for programs")
     decode.set_defaults(run=_decode)
-    probe = verbs.add_parser("probe", help="ask the devices of a station once and show everything they say")
+    probe = verbs.add_parser("probe", help="query the devices of a station once and show everything they report")
     probe.add_argument("station", help="the station file")
     probe.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
     probe.add_argument("--nmt", choices=NMT, help="first send this NMT command to the bay's BMU")
-    probe.add_argument(
-        "--old-protocol", action="store_true", help="ask for the BMU's older, undocumented pages as well"
-    )
+    probe.add_argument("--old-protocol", action="store_true", help="also request the BMU's older, undocumented pages")
     probe.set_defaults(run=_probe)
     add_workbench_verbs(verbs)
     demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
@@ -105,7 +103,7 @@ NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
 def _kinds(text: str) -> tuple[int, int]:
-    """Two masks in hexadecimal, as a status request has them; argparse makes a message of a ValueError."""
+    """Two masks in hexadecimal, as in a status request; argparse turns a ValueError into a message."""
     first, second = bytes.fromhex(text.replace("0x", "").replace(",", " "))
     return first, second
 
@@ -127,7 +125,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _station(file: str) -> "Station | None":
-    """The station in a file; None where it is a policy or an object map."""
+    """The station in a file; None if it is of another kind."""
     from orchestrator.config.load import load_station
 
     try:

@@ -1,7 +1,7 @@
-"""Everything this package raises on purpose.
+"""Every exception that this package raises on purpose.
 
-One tree, so that a caller can catch by what must happen next: a configuration is mended by a person, a link comes back
-by itself, a refusal is answered.
+They form one tree, so that callers can catch them by what must happen next: a person fixes a configuration, a link
+recovers by itself, a refusal is reported.
 """
 
 from dataclasses import dataclass
@@ -12,25 +12,25 @@ if TYPE_CHECKING:
 
 
 class OrchestratorError(Exception):
-    """Root of every error that is raised on purpose; its text is written for the person who must act."""
+    """Root of every error raised on purpose; its text addresses the person who must act."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Finding:
-    """One thing wrong in a file that a person wrote: where it is, what it is and what is allowed there."""
+    """One mistake in a file that a person wrote: where it is, what it is and what is allowed there."""
 
     file: str
     line: int
     column: int
     text: str
-    severity: str = "error"  #: or "warning": it can be used as it is, and can hardly be meant
+    severity: str = "error"  #: or "warning": valid, but probably unintended
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}: {self.severity}: {self.text}"
 
 
 class ConfigError(OrchestratorError):
-    """A station, policy or object-map file cannot be used; `findings` has every reason, not only the first."""
+    """A station, policy, object-map or scenario file is unusable; `findings` has every reason, not only the first."""
 
     def __init__(self, findings: tuple[Finding, ...]) -> None:
         super().__init__("\n".join(map(str, findings)))
@@ -46,23 +46,23 @@ class CauseError(OrchestratorError):
 
 
 class LinkError(CauseError):
-    """A port or a bus cannot be used now: unplugged, stalled, busy, down. It may come back."""
+    """A port or a bus cannot be used now: unplugged, stalled, busy, down. It may recover."""
 
 
 class ProtocolError(OrchestratorError):
-    """An answer came whole and with a good checksum, but it is not what was asked for: expected and got."""
+    """A reply arrived complete and with a good checksum, but does not match the request; says expected and got."""
 
 
 class UsageError(OrchestratorError):
-    """The command line cannot be understood; the text says what is missing."""
+    """The command line is invalid; the text says what is missing."""
 
 
 class HexError(OrchestratorError):
-    """Text that a person gave is not hexadecimal: which characters, and where."""
+    """A person's input is not hexadecimal; the text names the characters and their positions."""
 
 
 class RefusedError(OrchestratorError):
-    """The interlock or the state machine did not let something through; the text names the reason."""
+    """The interlock or the state machine refused something; the text names the reason."""
 
 
 class ServiceError(OrchestratorError):
@@ -74,7 +74,7 @@ class ServiceError(OrchestratorError):
 
 
 class NoServiceError(ServiceError):
-    """The service cannot be reached: whatever is to be done must be done without it."""
+    """The service cannot be reached: the caller must do without it."""
 
 
 class RequestError(CauseError):

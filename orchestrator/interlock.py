@@ -1,7 +1,7 @@
-"""The last gate before the wire: a second, simpler opinion on every order, given right before it becomes bytes.
+"""The last gate before the wire: a second, simpler check of every command, right before it becomes bytes.
 
-It trusts nothing that the core concluded. It knows the station's hard limits, what the devices said lately (the grant)
-and what a charger can be told; whatever is not allowed by those is refused. Only a stop needs nobody's leave.
+It trusts no conclusion of the core. It knows the station's hard limits, the devices' recent readings (the grant) and
+the commands that a charger takes, and refuses everything else. Only a stop needs no permission.
 """
 
 from collections.abc import Mapping
@@ -11,12 +11,12 @@ from math import isfinite
 from orchestrator.config.station import ChargerConfig, Limits
 from orchestrator.model import Action, Cause, Command, ControlMode, Snapshot
 
-#: Five polls. A charger that has not answered for so long may be doing anything.
+#: Five polls. A charger silent for longer may be doing anything.
 CHARGER_MAX_AGE_S = 1.0
-#: As long as a BMU's silence may be bridged with its last values (DESIGN §6).
+#: The longest that a silent BMU's last values may be used.
 BATTERY_MAX_AGE_S = 1.5
 
-#: The values that each order may carry, by who sets the charger's values. What is not in here is refused.
+#: The values permitted with each command, by control mode. Anything else is refused.
 ALLOWED: Mapping[ControlMode, Mapping[Action, frozenset[int]]] = {
     ControlMode.MANUAL: {
         Action.RESUME: frozenset({0}),
@@ -31,17 +31,17 @@ ALLOWED: Mapping[ControlMode, Mapping[Action, frozenset[int]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What the devices said, as evidence for orders that let current flow, and until when it may be relied on."""
+    """Evidence that current may flow now: recent readings, and how long they may be relied on."""
 
-    expires_s: float  #: the first of these readings is too old from then on
-    voltage_v: float  #: the higher one of charger and pack
+    expires_s: float  #: when the first of these readings becomes too old
+    voltage_v: float  #: the higher of charger and pack
     temperature_c: float  #: of the pack
-    current_limit: int | None  #: the step that the charger showed last
-    kept: bool = True  #: it is on disk that this charger may be running, so that a restart would know
+    current_limit: int | None  #: the current step that the charger last reported
+    kept: bool = True  #: the disk records that this charger may be running, so a restart would know
 
 
 def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
-    """The evidence in a snapshot; None if a reading is missing, not a number, too old or from the future."""
+    """The grant from a snapshot; None if a reading is missing, not a number, too old or from the future."""
     charger, volts, temperature = snapshot.charger, snapshot.battery.voltage_v, snapshot.battery.temperature_c
     if charger is None or volts is None or temperature is None:
         return None
@@ -64,7 +64,7 @@ def permit(
 ) -> Cause | None:
     """Why the order must not go out now; None if it may. A stop always may.
 
-    `limits` are the hard ones of the station file; nothing here comes from a policy.
+    `limits` are the station file's hard limits; nothing here comes from a policy.
     """
     action, value = command.action, command.value
     if action is Action.STOP:

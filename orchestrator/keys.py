@@ -1,6 +1,6 @@
-"""How a key of a YAML file is described: once, beside the field that holds it.
+"""Describes each key of a YAML file once, beside the field that holds it.
 
-The strict reader, `orchestrator check`, and whatever else needs to know what is allowed where, read this.
+The strict reader, `orchestrator check` and the JSON Schema use these descriptions.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """What a key means and which values it may have; bounds are inclusive (`ge`, `le`) or exclusive (`gt`, `lt`)."""
+    """A key's meaning and permitted values; bounds are inclusive (`ge`, `le`) or exclusive (`gt`, `lt`)."""
 
     about: str
     unit: str = ""
@@ -18,7 +18,7 @@ class Key:
     le: float | None = None
     gt: float | None = None
     lt: float | None = None
-    is_path: bool = False  #: a text that names a device file, relative to the YAML file
+    is_path: bool = False  #: the path of a device file, relative to the YAML file
 
 
 def key(
@@ -33,7 +33,7 @@ def key(
     default: Any = MISSING,  # noqa: ANN401 - as in dataclasses.field
     default_factory: Callable[[], Any] | None = None,
 ) -> Any:  # noqa: ANN401 - as dataclasses.field, so that the field keeps its own type
-    """A dataclass field that a YAML key fills. Without a default the key is required."""
+    """A dataclass field filled from a YAML key. Without a default the key is required."""
     metadata = {"key": Key(about, unit, ge, le, gt, lt, is_path)}
     if default_factory is not None:
         return field(default_factory=default_factory, metadata=metadata)
@@ -56,14 +56,14 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The file that a configuration came from, and the line of each of its keys (`current.soc_pct[1]` → 41)."""
+    """The file that a configuration came from, and the line of each key (`current.soc_pct[1]` → 41)."""
 
     file: str
     lines: Mapping[str, int] = field(default_factory=dict, hash=False)
-    digest: str = ""  #: the beginning of the file's SHA-256, as `sha256sum` shows it
+    digest: str = ""  #: the first digits of the file's SHA-256, as `sha256sum` shows it
 
     def at(self, path: str) -> str:
-        """`FILE:LINE` of the key at `path`, or of its nearest written parent."""
+        """`FILE:LINE` of the key at `path`, or of its nearest parent in the file."""
         while path and path not in self.lines:
             path = path[: max(path.rfind("."), path.rfind("["), 0)]
         return f"{self.file}:{self.lines[path]}" if path else self.file

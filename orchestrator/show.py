@@ -1,4 +1,4 @@
-"""The status document as text for a terminal: what to do first, then one line a bay, and why."""
+"""The status document as text for a terminal: first what to do, then one line per bay, and why."""
 
 import os
 import shutil
@@ -14,27 +14,27 @@ from orchestrator.text.document import in_language, language_of_answer
 from orchestrator.text.language import language_of
 
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
-#: The battery's values in the table, with their words in the catalogue.
+#: The battery's values in the table, with their ids in the catalogue.
 BATTERY = {"soc_pct": "soc", "voltage_v": "pack_voltage", "temperature_c": "temperature"}
-#: The causes that begin with what to do about a charger that does not obey.
+#: The causes whose text begins with what to do about a disobedient charger.
 CUT_THE_MAINS = frozenset({
     "uncontrollable", "uncontrollable_unproved", "uncontrollable_contradicted", "uncontrollable_stands_by",
     "failed_uncontrollable",
 })  # fmt: skip
-#: States in which a charger stands by, if it obeys.
+#: States in which an obedient charger is in standby.
 RESTING = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"})
-#: The levels of `alarm`, worst first, as the table has its bays; all others come after them.
+#: The levels of `alarm`, worst first; the table sorts bays by them, all others last.
 LEVELS = ("danger", "attention")
 #: In a narrower column nobody reads why: it goes below its bay.
 LEAST_WHY = 40
-#: Standby may show so much at the charger, and so much at the BMU.
+#: The most current that standby may show, at the charger and at the BMU.
 STANDBY_A, BMU_A = 0.5, 1.0
 
 Bay = Mapping[str, object]
 
 
 def own_language() -> str:
-    """What the user of this terminal reads; "" where nobody says."""
+    """The language of this terminal's user; "" if unset."""
     return language_of(os.environ)
 
 
@@ -59,7 +59,7 @@ def page(document: Mapping[str, object], language: str = "", width: int = 0) -> 
 
 
 def strays(document: Mapping[str, object], language: str = "") -> list[str]:
-    """What to do about chargers that no bay has any more, and that nobody has seen to stand by."""
+    """What to do about chargers that belong to no bay any more and are not verified in standby."""
     found = cast("Sequence[Mapping[str, object]]", document.get("strays", ()))
     causes = [
         Cause.of("cut_mains_of_stray", port=one["port"], bay=one["bay"], why=one["problem"] or one["state"])
@@ -70,7 +70,7 @@ def strays(document: Mapping[str, object], language: str = "") -> list[str]:
 
 
 def table(bays: Sequence[Bay], language: str = "", width: int = 0) -> str:
-    """All bays, aligned, with what needs a person on top; below each one what else is to be known of it."""
+    """All bays, aligned, those that need a person first; below each bay its further details."""
     bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
     rows = [HEAD, *(_row(bay, language) for bay in bays)]
     widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
@@ -93,7 +93,7 @@ def other_faults(bay: Bay) -> list[Mapping[str, object]]:
 
 
 def _told(cause: object) -> Iterator[tuple[object, ...]]:
-    """Which causes a cause in the document tells: itself, then those in its parameters."""
+    """The causes contained in a cause of the document: itself, then those in its parameters."""
     if isinstance(cause, Mapping):
         yield cause.get("id"), cause.get("key"), cause.get("advice")
         params = cause.get("params")
@@ -103,18 +103,18 @@ def _told(cause: object) -> Iterator[tuple[object, ...]]:
 
 
 def is_alarming(bay: Bay) -> bool:
-    """Whether a charger may be running that nobody controls."""
+    """Whether a charger may be running out of control."""
     return _level(bay) == 0 or bay["state"] == "UNCONTROLLABLE"
 
 
 def _level(bay: Bay) -> int:
-    """Its place in `LEVELS`. A service that has not been restarted since an update may still say true for danger."""
+    """The bay's index in `LEVELS`. A service not restarted since an update may still report true for danger."""
     level = "danger" if bay.get("alarm") is True else bay.get("alarm")
     return LEVELS.index(level) if level in LEVELS else len(LEVELS)
 
 
 def stands_by(bay: Bay) -> bool:
-    """Whether the charger was verified to be stopped: by its own fresh word, and the BMU's where there is one."""
+    """Whether the charger is verified as stopped: by its own fresh reading, and by the BMU's if there is one."""
     charger, battery = _part(bay, "charger"), _part(bay, "battery")
     command = cast("Mapping[str, Mapping[str, object]]", bay["command"])
     amps, pack_a = charger["current_a"], battery["current_a"]
@@ -133,7 +133,7 @@ def stands_by(bay: Bay) -> bool:
 
 
 def what_to_do(bay: Bay, language: str = "") -> str:
-    """About a charger that was not verified to stand by: first what to do, then why."""
+    """For a charger not verified in standby: first what to do, then why."""
     if next(_told(bay.get("cause")), ("",))[0] in CUT_THE_MAINS:
         return f"{bay['name']}: {bay['reason']}"
     dangerous = is_alarming(bay) or bay["state"] not in RESTING | {"OFFLINE"}
@@ -154,7 +154,7 @@ def _labelled(id_: str, what: str, language: str) -> str:
 
 
 def _old_values(bay: Bay) -> Iterator[Cause]:
-    """What is shown although it may not be true any more, and since when; what else is known instead."""
+    """Values shown although they may be outdated, with their age and any fresher evidence."""
     charger, battery = _part(bay, "charger"), _part(bay, "battery")
     if charger.get("old"):
         fresh = battery.get("current_a") is not None and "current_a" not in _old(bay)
@@ -191,7 +191,7 @@ def _row(bay: Bay, language: str) -> tuple[str, ...]:
 
 
 def step_of(index: object, current_a: object) -> str:
-    """A current step as people count them, 1 (lowest) … 5, with its amperes; the protocol counts from 0."""
+    """A current step as people count it, 1 (lowest) … 5, with its amperes; the protocol counts from 0."""
     return f"{index + 1} ({figure(current_a, '{:.1f} A')})" if isinstance(index, int) else "–"
 
 
@@ -200,12 +200,12 @@ def _marked(text: str, language: str, *, old: bool) -> str:
 
 
 def figure(value: object, form: str) -> str:
-    """A number with its unit, a dash where there is none."""
+    """A number with its unit; a dash if there is none."""
     return form.format(value) if isinstance(value, int | float) else "–"
 
 
 def _age(age_s: object) -> str:
-    """In the unit that a person would use."""
+    """An age in the unit that a person would use."""
     if not isinstance(age_s, int | float):
         return "long"
     for unit, seconds in (("h", 3600), ("min", 60)):

@@ -1,8 +1,8 @@
-"""What holds for all tests, whoever starts them and on however busy a machine.
+"""Settings for all tests, however they are started and however busy the machine.
 
-Signals that the starter has ignored (`nohup`, a job in the background) are heard again: what is ignored stays ignored
-in all child processes, and ending a service by a signal is what some tests are about. Generated examples have no
-deadline: on a busy machine a slow one says nothing of the code.
+Signals ignored by the starter (`nohup`, a background job) are enabled again: an ignored signal stays ignored in all
+child processes, and some tests end a service by a signal. Generated examples have no deadline: on a busy machine a slow
+one says nothing about the code.
 """
 
 import signal
@@ -12,7 +12,7 @@ from hypothesis import settings
 
 from tests.ids import name_of
 
-#: What takes longest begins first, so that nobody waits for it alone at the end.
+#: The longest tests start first, so that the run does not end waiting for them alone.
 LONG = (
     "proof/test_explore.py", "whole/test_faults.py", "proof/test_seeded_bugs.py", "workbench/test_exhaustive.py",
     "proof/test_grid.py", "whole/test_survives.py", "proof/test_environment.py", "whole/test_operator.py",
@@ -28,10 +28,10 @@ settings.load_profile("all")
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:
-    """Ids that can be read, where a table has none of its own."""
+    """Readable ids where a table has none."""
     return name_of(val)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files side by side: the longest first."""
+    """With files in parallel, the longest first."""
     items.sort(key=lambda item: next((at for at, name in enumerate(LONG) if item.path.as_posix().endswith(name)), 99))

@@ -1,4 +1,4 @@
-"""What a value of a parametrised test is called in the test's id, where pytest itself would only number it."""
+"""Names of parameter values in test ids, where pytest itself would only number them."""
 
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -6,13 +6,13 @@ from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
 from typing import Any
 
-#: Ids are read in one line, and some values are long.
+#: Ids should fit on one line, and some values are long.
 LONGEST = 56
 MOST_BYTES = 24
 
 
 def name_of(value: object) -> str | None:
-    """None where pytest's own way is as good."""
+    """None where pytest's own id is as good."""
     if isinstance(value, Enum):
         return value.name
     if isinstance(value, str):
@@ -30,7 +30,9 @@ def shown(value: object) -> str:
         return _hex(bytes(value))
     if isinstance(value, Mapping):
         return " ".join(f"{shown(key)}={shown(item)}" for key, item in value.items()) or "nothing"
-    if isinstance(value, (Sequence, AbstractSet)) and not isinstance(value, (str, range)):
+    if isinstance(value, AbstractSet):
+        return " ".join(sorted(map(shown, value))) or "nothing"  # the same in every process: sets have no order
+    if isinstance(value, Sequence) and not isinstance(value, (str, range)):
         return " ".join(map(shown, value)) or "nothing"
     if is_dataclass(value) and not isinstance(value, type) and type(value).__str__ is object.__str__:
         return _record(value)
@@ -41,7 +43,7 @@ def shown(value: object) -> str:
 
 
 def short(text: str, longest: int = LONGEST) -> str:
-    """No longer than an id may be."""
+    """Cut to the maximum length of an id."""
     return text if len(text) <= longest else f"{text[: longest - 2].rstrip()}.."
 
 
@@ -52,7 +54,7 @@ def _hex(data: bytes) -> str:
 
 
 def _record(value: Any) -> str:
-    """By its name, if it has one (a policy's is in `policy`), else by what differs from its defaults."""
+    """By its name, if it has one (a policy's is in `policy`), or by its differences from the defaults."""
     kind = type(value).__name__
     for name in (getattr(value, "name", None), getattr(value, kind.lower(), None)):
         if isinstance(name, str) and name:

@@ -25,7 +25,7 @@ class Module:
         return ast.walk(ast.parse(self.source, self.name))
 
     def imports(self) -> Iterator[tuple[int, str]]:
-        """Line and dotted name of all that is imported; `from a import b` is "a.b"."""
+        """Line and dotted name of every import; `from a import b` is "a.b"."""
         for node in self.nodes():
             if isinstance(node, ast.Import):
                 yield from ((node.lineno, alias.name) for alias in node.names)
@@ -34,7 +34,7 @@ class Module:
                 yield from ((node.lineno, f"{origin}.{alias.name}") for alias in node.names)
 
     def _above(self, level: int) -> tuple[str, ...]:
-        """The package that a relative import of this level starts from."""
+        """The package a relative import of this level starts from."""
         if not level:
             return ()
         path = (PACKAGE, *filter(None, self.name.split(".")))

@@ -1,4 +1,4 @@
-"""The benchmarks still run. What they measure is nobody's test: numbers depend on the machine."""
+"""The benchmarks still run. Their results are not tested: numbers depend on the machine."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""The unit that is shipped fits the program that it runs, and the pages and files beside it fit each other."""
+"""The shipped unit fits the program it runs, and the pages and files in deploy/ fit each other."""
 
 import re
 import shutil
@@ -17,7 +17,7 @@ from orchestrator.service import supervisor
 ROOT = Path(__file__).resolve().parent.parent
 UNIT = ROOT / "deploy" / "orchestrator.service"
 PAGE = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
-#: systemd's own checker, where there is one: `systemd-analyze security` knows --offline since 250.
+#: systemd's own checker, if there is one: `systemd-analyze security` has --offline since version 250.
 ANALYZE = [path for path in (shutil.which("systemd-analyze"),) if path]
 
 
@@ -81,7 +81,7 @@ def test_the_page_names_verbs_that_there_are() -> None:
 
 
 def runnable(directory: Path) -> Path:
-    """The unit with a program that exists here; else that is all that its checker has to say."""
+    """The unit with an existing program; otherwise the checker complains about nothing else."""
     copy = directory / UNIT.name
     program = SERVICE["ExecStart"][0].split()[0]
     copy.write_text(UNIT.read_text(encoding="utf-8").replace(program, sys.executable), encoding="utf-8")

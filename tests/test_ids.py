@@ -1,4 +1,4 @@
-"""What is called how in a test's id."""
+"""Names of values in test ids."""
 
 from dataclasses import dataclass, field
 

@@ -1,6 +1,6 @@
-"""The one direction of the code, as tables: who imports whom, who owns a library, who may touch the outside world.
+"""The direction of the code, as tables: who imports whom, who owns a library, who may touch the outside world.
 
-The rules read the source, so that an import inside a function or for typing only counts like any other.
+The rules read the source, so an import inside a function or only for typing counts like any other.
 """
 
 import ast
@@ -13,12 +13,12 @@ import pytest
 
 from tests.sources import PACKAGE, Module, product
 
-#: Part of the package → the parts, or single modules of them, that it may import besides itself.
+#: Part of the package → the parts, or single modules of them, it may import besides itself.
 EDGES: dict[str, tuple[str, ...]] = {
     "keys": (),
     "model": (),
     "errors": ("model",),
-    # Core makes causes; sentences are made of them at the edges only.
+    # Core makes causes; only the edges turn them into sentences.
     "text": ("model",),
     "protocol": ("errors", "keys", "model"),
     "config": ("errors", "keys", "model", "protocol.objects"),
@@ -27,7 +27,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     # What must work when nothing else does. Only the station file needs PyYAML.
     "lastresort": ("config.ports", "errors", "protocol.standby"),
     "link": ("errors", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
-    # The link is known to the devices by typing.Protocol only: they run on anything that sends and receives.
+    # The devices know the link only as a typing.Protocol: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol",
         "show", "text",
@@ -35,9 +35,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     "commissioning": (
         "config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile", "text",
     ),
-    # The emulators share no encoder or decoder with the product, else a mistake in one would hide in the other.
+    # The emulators share no encoder or decoder with the product: a mistake in one could hide in the other.
     "sim": ("model", "protocol.objects"),
-    # What it checks and tries is the core itself, on the models of the emulators, without any line between them.
+    # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
         "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
         "sim.chemistry", "sim.pack", "text",
@@ -51,7 +51,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     ),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
-#: Third-party library → its owners; nobody else imports it, and nothing else is imported at all.
+#: Third-party library → its owners; nobody else imports it, and no other library is imported.
 OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
@@ -67,7 +67,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "transitions": ("core.machine",),
     "yaml": ("config",),
 }
-#: These give the same answer to the same arguments, for ever: of the standard library they may use only LIBRARY.
+#: These always give the same answer to the same arguments: of the standard library they may use only LIBRARY.
 PURE = ("core", "errors", "interlock", "keys", "model", "protocol", "text")
 LIBRARY = frozenset({
     "abc", "bisect", "collections", "contextlib", "dataclasses", "decimal", "enum", "fractions", "functools", "heapq",
@@ -82,7 +82,7 @@ CLOCKS = frozenset({
     "time_ns",
 })  # fmt: skip
 MAX_FILE_LINES = 250
-#: Longer for the time being, until they are cut.
+#: Longer for now, until they are split.
 LONGER: dict[str, int] = {"core.course": 280, "core.track": 270}
 MAX_FUNCTION_LINES = 40
 
@@ -92,7 +92,7 @@ def within(name: str, places: tuple[str, ...]) -> bool:
 
 
 def edges(module: Module) -> Iterator[str]:
-    """Parts import only what lies before them."""
+    """Parts import only parts before them."""
     allowed = EDGES.get(module.part)
     if module.name and allowed is None:
         yield f"{module.name}: this part has no row in EDGES"
@@ -104,7 +104,7 @@ def edges(module: Module) -> Iterator[str]:
 
 
 def owners(module: Module) -> Iterator[str]:
-    """One module per library; libraries without an owner do not come in."""
+    """One module per library; libraries without an owner are not imported."""
     for line, name in module.imports():
         library = name.partition(".")[0]
         if library in sys.stdlib_module_names or library == PACKAGE:
@@ -127,7 +127,7 @@ def purity(module: Module) -> Iterator[str]:
 
 
 def clocks(module: Module) -> Iterator[str]:
-    """Time is an argument everywhere but where the loops are."""
+    """Time is an argument everywhere except in the loops."""
     if within(module.name, CLOCK_READERS):
         return
     for line, name in module.imports():
@@ -143,14 +143,14 @@ def clocks(module: Module) -> Iterator[str]:
 
 
 def light_packages(module: Module) -> Iterator[str]:
-    """Where single modules of a part may be imported, its __init__ brings in nothing else."""
+    """Where single modules of a part may be imported, its __init__ imports nothing else."""
     piecemeal = {target.partition(".")[0] for allowed in EDGES.values() for target in allowed if "." in target}
     if module.is_package and module.name in ("", *piecemeal):
         yield from (f"{module.name}:{line}: imports {name}" for line, name in module.imports())
 
 
 def sizes(module: Module) -> Iterator[str]:
-    """Files and functions that fit into a head."""
+    """Files and functions small enough to keep in one's head."""
     lines = module.source.count("\n")
     allowed = LONGER.get(module.name, MAX_FILE_LINES)
     if lines > allowed:
@@ -248,7 +248,7 @@ def test_what_is_allowed_is_not_complained_about(name: str, source: str) -> None
     assert [complaint for rule in RULES for complaint in rule(Module(name, source))] == []
 
 
-#: Parts that make causes. A sentence in them is one that nobody can translate, or compare.
+#: Parts that make causes. A sentence in them could be neither translated nor compared.
 SILENT = (
     "core", "devices", "interlock", "link", "model", "protocol.sdo", "protocol.words", "service", "show",
 )  # fmt: skip
@@ -257,7 +257,7 @@ WORD, WORDS = re.compile("[('\"]?[A-Za-z]?[a-z]+['a-z]*[.,;:)'\"]*"), 3
 DIAGNOSTICS = frozenset({"ValueError", "RefusedError", "UsageError", "SerialException", "NoServiceError"})
 #: Calls of argparse: what `--help` prints.
 HELP = frozenset({"add_argument", "add_parser"})
-#: (module, the beginning of what is still said there)
+#: (module, the beginning of a sentence still in it)
 SAID = frozenset({
     ("core.machine", " is not possible in "),  # an error of the program
     ("devices.bus_load", ""),  # warnings of `check`: about a file

@@ -1,4 +1,4 @@
-"""The locked lists: exact, hashed, the same everywhere, and each a part of the next, but for the fuzzer's own."""
+"""The locked lists: exact, hashed, the same everywhere, and all contained in dev, except the lists for one command."""
 
 import re
 import tomllib
@@ -10,13 +10,13 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
-#: runtime is a part of each of the others, and all are a part of dev.
+#: runtime is part of every other list, and all are part of dev.
 LISTS = ("runtime", "demo", "gpio", "workbench", "dev")
 EXTRAS = ("demo", "gpio", "workbench")
-OWN = ("fuzz", "mutation", "reference")  #: what only its own command needs
+OWN = ("fuzz", "mutation", "reference")  #: needed only by their own command
 ALL = (*LISTS, *OWN)
 
-#: What a locked list consists of. Options, addresses and paths do not match.
+#: The lines of a locked list. Options, addresses and paths do not match.
 LINE = re.compile(r"#.*|[a-z0-9-]+(\[[a-z0-9,-]+\])?==[0-9][0-9a-z.]* \\|    --hash=sha256:[0-9a-f]{64}( \\)?|")
 
 
@@ -69,7 +69,7 @@ def test_the_lists_have_all_that_is_asked_for() -> None:
 
 
 def test_what_is_asked_for_with_an_extra_is_pinned_with_it() -> None:
-    """pip 23 does not take a pin without the extra for it: at the next release it wants that one, and its hash."""
+    """pip 23 does not match a pin without its extra: at the next release it wants that version, and its hash."""
     extras = {plain: extras for plain, extras, _ in pinned("dev")}
     asked = [Requirement(text) for plain in extras for text in metadata.requires(plain) or ()]
     needed = {one.name: one.extras for one in asked if one.extras and (one.marker is None or one.marker.evaluate())}

@@ -1,4 +1,4 @@
-"""What lies in the working directory, and what kind of terminal or pipe we speak to, changes nothing."""
+"""Files in the working directory, and the kind of terminal or pipe, change nothing."""
 
 import os
 import subprocess
@@ -13,7 +13,7 @@ from tests.whole.station import die_with_parent
 
 ROOT = Path(__file__).resolve().parent.parent
 STATION = shipped_dir() / "configs" / "stations" / "one-bay.yaml"
-#: Names of what any of our verbs imports sooner or later.
+#: Names of modules imported by any of our verbs.
 TRAPS = (
     "serial",
     "yaml",
@@ -40,7 +40,7 @@ WAYS = {
 
 @pytest.fixture(name="folder")
 def _folder(tmp_path: Path) -> Path:
-    """Somebody else's files wait in it for whoever imports by name."""
+    """A directory with foreign files named like modules we import."""
     for name in TRAPS:
         (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'RAN')!r}, 'a').write('{name} ')", encoding="utf-8")
     return tmp_path
@@ -89,7 +89,7 @@ def test_nothing_in_the_working_directory_is_run(way: str, words: tuple[str, ...
 
 
 def test_with_p_not_even_what_python_itself_begins_with(tmp_path: Path) -> None:
-    """Under `-m` alone, Python has imported these from the working directory before a line of ours is run."""
+    """With `-m` alone, Python imports these from the working directory before any of our code runs."""
     for name in ("pkgutil", "collections", "functools", "warnings", "types"):
         (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'RAN')!r}, 'a').write('{name}')", encoding="utf-8")
     done = subprocess.run(
@@ -105,7 +105,7 @@ def test_with_p_not_even_what_python_itself_begins_with(tmp_path: Path) -> None:
 
 
 def test_nor_by_the_processes_that_are_started(folder: Path) -> None:
-    """The controller is a process of its own; its station is there, its devices are not."""
+    """The controller is a separate process; its station exists, its devices do not."""
     station = STATION.read_text(encoding="utf-8").replace("interface: socketcan", "interface: virtual")
     (folder / "station.yaml").write_text(station, encoding="utf-8")
     process = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""What `pip install .` brings: the program, what ships with it, and only five libraries."""
+"""What `pip install .` installs: the program, the shipped files, and only five libraries."""
 
 import re
 import shutil
@@ -18,7 +18,7 @@ RUNTIME = {"canopen", "pyserial", "python-can", "pyyaml", "transitions"}
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, built offline from a copy, so that nothing of an earlier build gets into it."""
+    """The wheel, built offline from a copy, so nothing of an earlier build gets into it."""
     source, target = tmp_path_factory.mktemp("source") / "copy", tmp_path_factory.mktemp("wheel")
     shutil.copytree(ROOT, source, symlinks=True, ignore=shutil.ignore_patterns(*LEFT_OUT))
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "wheel", "--quiet", "--no-index")
@@ -29,7 +29,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel unpacked where no checkout is."""
+    """The wheel unpacked outside any checkout."""
     target = tmp_path_factory.mktemp("installed")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(target)

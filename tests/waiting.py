@@ -8,7 +8,7 @@ from threading import Event
 def wait_until(
     condition: Callable[[], object], timeout_s: float = 5.0, what: str = "the condition", every_s: float = 0.005
 ) -> None:
-    """Return as soon as `condition()`, asked each `every_s`, is true; fail the test if it is not within `timeout_s`."""
+    """Return once `condition()`, checked every `every_s`, is true; fail the test if it is not within `timeout_s`."""
     deadline_s = time.monotonic() + timeout_s
     pause = Event()
     while not condition():

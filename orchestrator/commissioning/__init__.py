@@ -1,1 +1,1 @@
-"""Before a bay charges for the first time: its devices asked, its object map found."""
+"""Commissioning: query a bay's devices and find its object map before the first charge."""

@@ -1,4 +1,4 @@
-"""Object maps side by side: what each makes of a BMU's words, what speaks against it, and which fits best. Pure."""
+"""Compares object maps: how each decodes a BMU's words, the evidence against it, and which fits best. Pure."""
 
 from collections.abc import Iterator, Mapping
 from itertools import chain
@@ -12,16 +12,16 @@ from orchestrator.text.catalogue import say
 Key = tuple[int, int]
 Values = Mapping[str, Decoded]
 
-#: Two readings of a quantity, a second apart, agree if they differ by no more than this share of it, or so many counts.
+#: Two readings of a quantity, a second apart, agree if they differ by at most this share, or this many counts.
 AGREE_SHARE, AGREE_COUNTS = 0.05, 5
 
 
 def comparison(
     maps: Mapping[str, ObjectMap], chosen: ObjectMap, words: Mapping[Key, tuple[int, int]], pages: Values
 ) -> Iterator[str]:
-    """Every value by every map (and by the older protocol's pages), aligned; then what speaks against each map.
+    """Every value by every map (and by the older protocol's pages), aligned; then the evidence against each map.
 
-    `words` are the objects' raw words and the sizes that the answers declared.
+    `words` are the objects' raw words and the sizes declared by the answers.
     """
     decoded = {name: _decode(one, words) for name, one in maps.items()}
     columns: dict[str, Values] = {**decoded, **({"older protocol": pages} if pages else {})}
@@ -52,7 +52,7 @@ def _cell(field: str, values: Values) -> str:
 
 
 def _wrong(one: ObjectMap, values: Values, pages: Values) -> Iterator[str]:
-    """What cannot be, and what the older protocol says otherwise."""
+    """Implausible values, and contradictions with the older protocol."""
     yield from (say(value) for value in values.values() if isinstance(value, Cause))
     fields = chain(*(entry.fields for entry in one.objects), *PAGES.values())
     scales = {field.name: field.scale for field in fields}
@@ -60,7 +60,7 @@ def _wrong(one: ObjectMap, values: Values, pages: Values) -> Iterator[str]:
         value = values.get(name)
         if isinstance(value, Measurement) and isinstance(page, Measurement):
             allowed = max(AGREE_SHARE * abs(page.value), AGREE_COUNTS * abs(scales[name]))
-            if name == "status":  # bits, no quantity
+            if name == "status":  # bits, not a quantity
                 allowed = 0.0
             if abs(value.value - page.value) > allowed:
                 yield f"{name} {value.value:g}, but {page.value:g} by the older protocol"

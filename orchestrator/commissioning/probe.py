@@ -1,7 +1,7 @@
-"""`orchestrator probe`: asks each device of a station a few questions and shows everything that it says.
+"""`orchestrator probe`: queries each device of a station and shows everything that it reports.
 
-For the first day at a new station: is it wired right, does it answer, which object map is the right one? Nothing is
-commanded: the charger gets status requests, the BMU reads (and an NMT command, if it is asked for).
+For the first day at a new station: is it wired correctly, does it answer, which object map is right? It sends no
+commands: the charger receives status requests, the BMU reads (and an NMT command, on request).
 """
 
 from collections.abc import Callable, Sequence
@@ -38,8 +38,8 @@ def probe(
 ) -> int:
     """Probe the named bays, or all; 0 if every device answered, else 1.
 
-    `nmt` (a key of `NMT`) is sent to each BMU first. `old_protocol`: ask for the BMU's undocumented pages, too.
-    ServiceError if a service runs on this station, or for a bay that it does not have.
+    `nmt` (a key of `NMT`) is sent to each BMU first. `old_protocol`: also request the BMU's undocumented pages.
+    ServiceError if a service is running this station, or for an unknown bay.
     """
     known = {bay.name: bay for bay in station.bays}
     unknown = [name for name in bays if name not in known]

@@ -1,7 +1,7 @@
-"""What `orchestrator probe` asks a BMU: who it is, and every object, decoded by each object map side by side.
+"""The part of `orchestrator probe` that queries a BMU: its identity, and every object, decoded by each object map.
 
-The BMU's document does not say how the values lie in its objects. So an installer sees the raw words and what each map
-makes of them, beside the pages of the BMU's older protocol where it speaks that.
+The BMU's document does not specify the layout of values in its objects. So the installer sees the raw words and how
+each map decodes them, beside the pages of the BMU's older protocol if it supports that.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,12 +34,12 @@ from orchestrator.text.catalogue import say
 
 Key = tuple[int, int]
 
-#: The first object is asked for this often before the BMU counts as silent.
+#: The first object is requested this often before the BMU counts as silent.
 TRIES = 3
 #: How long to wait for a boot after a reset, for the pages, and at most for a heartbeat.
 BOOT_S, PAGES_S, HEARTBEAT_S = 5.0, 0.3, 3.0
 
-#: Who it is (CiA 301), where a BMU says it, and how its heartbeat is set.
+#: Its identity (CiA 301), if the BMU provides it, and its heartbeat setting.
 HEARTBEAT_PERIOD: Key = (0x1017, 0)
 IDENTITY: Mapping[Key, str] = {
     (0x1000, 0): "device type",
@@ -52,7 +52,7 @@ IDENTITY: Mapping[Key, str] = {
 
 
 class BmuProbe:
-    """One BMU on a bus that has not been opened yet. What `run` finds, it shows line by line."""
+    """One BMU on a bus that is not open yet. `run` shows its findings line by line."""
 
     def __init__(self, bus: CanBus, config: BatteryConfig, show: Callable[[str], None]) -> None:
         self._bus, self._config, self._show = bus, config, show
@@ -61,11 +61,11 @@ class BmuProbe:
         self._maps = {name: load_map(name) for name in shipped_names(MAP.folder)}
         if config.map not in self._maps.values():
             self._maps[f"{config.map.map} (yours)"] = config.map
-        for cob_id in range(0x800):  # all that a standard frame can have: the pages may come on any of them
+        for cob_id in range(0x800):  # every standard COB-ID: the pages may arrive on any of them
             bus.subscribe(cob_id, lambda cob_id, data: self._frames.append((cob_id, data)))
 
     def run(self, nmt: NmtCommand | None, *, old_protocol: bool) -> bool:
-        """Ask everything; False if the BMU does not answer. LinkError if the bus fails."""
+        """Query everything; False if the BMU does not answer. LinkError if the bus fails."""
         if nmt is not None:
             self._command(nmt)
         keys = dict.fromkeys((entry.index, entry.sub) for each in self._maps.values() for entry in each.objects)
@@ -89,7 +89,7 @@ class BmuProbe:
     # --- questions ---
 
     def _listen(self, seconds: float, cob_id: int, wanted: Callable[[bytes], bool]) -> bytes | None:
-        """The next frame on this COB-ID that is wanted; None if none comes in time."""
+        """The next wanted frame on this COB-ID; None if none arrives in time."""
         seen, end_s = len(self._frames), monotonic() + seconds
         while True:
             for heard, data in self._frames[seen:]:
@@ -101,7 +101,7 @@ class BmuProbe:
             self._bus.receive(left_s)
 
     def _read(self, key: Key, tries: int = 1) -> SdoReply | None:
-        """The answer about this object; None if there is none."""
+        """The answer to a read of this object; None if there is none."""
 
         def wanted(data: bytes) -> bool:
             reply = parse_reply(data)
@@ -131,7 +131,7 @@ class BmuProbe:
         self._show(f"  NMT state: {self._state() or 'unknown, no heartbeat came'}")
 
     def _state(self) -> str:
-        """What the newest heartbeat says."""
+        """The state in the newest heartbeat."""
         for cob_id, data in reversed(self._frames):
             if cob_id == heartbeat_cob_id(self._node_id) and len(data) == 1:
                 known = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
@@ -139,7 +139,7 @@ class BmuProbe:
         return ""
 
     def _pages(self) -> dict[str, Decoded]:
-        """Ask by the older protocol."""
+        """Query by the older protocol."""
         before = len(self._frames)
         self._bus.send(pages_request_cob_id(self._node_id), pages_request(self._node_id))
         self._listen(PAGES_S, -1, lambda _: False)
@@ -155,7 +155,7 @@ class BmuProbe:
 
     def _why_silent(self) -> str:
         ours = {NMT_COB_ID, request_cob_id(self._node_id), pages_request_cob_id(self._node_id)}
-        others = sorted({cob_id for cob_id, _ in self._frames} - ours)  # some buses return what one sends
+        others = sorted({cob_id for cob_id, _ in self._frames} - ours)  # some buses echo sent frames
         if self._state() == "stopped":
             return "an NMT command has stopped it; --nmt start wakes it"
         if others:

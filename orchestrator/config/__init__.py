@@ -1,1 +1,1 @@
-"""Station and policy files into frozen objects, every error with its file, line and column."""
+"""Reads station, policy, object-map and scenario files into frozen objects; every error has file, line and column."""

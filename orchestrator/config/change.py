@@ -1,4 +1,4 @@
-"""Other values in a file's tree, as if they had been written there: for trying out what a key does."""
+"""Replaces values in a file's tree, as if they had been written there: for trying out the effect of a key."""
 
 import re
 from collections.abc import Mapping
@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from orchestrator.config.yaml.scalars import UnfitError
 from orchestrator.config.yaml.tree import Entries, Items, Node, Scalar
 
-#: A name, or an index in brackets: `current.soc_pct[0].to` has four.
+#: A name, or an index in brackets: `current.soc_pct[0].to` has four parts.
 _PART = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
 
 def changed(tree: Node, changes: Mapping[str, str]) -> Node:
-    """The tree with the text of each dotted path in place of what is there; keys that are left out are added.
+    """The tree with the value at each dotted path replaced; missing keys are added.
 
-    Raises UnfitError for a path that leads nowhere. What its record does not know, the reader will say.
+    Raises UnfitError for a path that leads nowhere. The reader reports keys that the record does not have.
     """
     for path, text in changes.items():
         tree = _put(tree, [(name, index) for name, index in _PART.findall(path)], text, path)

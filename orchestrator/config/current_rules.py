@@ -1,4 +1,4 @@
-"""What must hold in the tables and rules of one policy's `current`."""
+"""Checks of the tables and rules in one policy's `current`."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -12,7 +12,7 @@ Rows = tuple[Band, ...]
 
 
 def table_problems(at: str, rows: Rows, low: float, high: float, unit: str) -> Problems:
-    """Rows in order, each beginning where the one before ends, from `low` or less to `high` or more."""
+    """Rows must be in order, each beginning where the previous one ends, from `low` or less to `high` or more."""
     for i, row in enumerate(rows):
         if row.from_ >= row.to:
             yield f"{at}[{i}]", f"from {row.from_:g} to {row.to:g} is empty: `from` must be below `to`"
@@ -56,7 +56,7 @@ _ROW = re.compile(r"current\.(?:\w+\.rows|where)\[\d+\]")
 
 
 def amperes_problems(values: Mapping[str, object]) -> Problems:
-    """Each row's amperes: said once, with a capacity where that is needed, and no more than the pack bears."""
+    """Each row's amperes must be given once, with a capacity if needed, and must not exceed the pack's current."""
     current_a, capacity_ah = values.get("pack.current_a"), values.get("pack.capacity_ah")
     for at, row in values.items():
         if not _ROW.fullmatch(at) or not isinstance(row, Band | Where):
@@ -71,7 +71,7 @@ def amperes_problems(values: Mapping[str, object]) -> Problems:
 
 
 def _too_much(at: str, row: Band | Where, current_a: float, capacity_ah: float | None) -> Problems:
-    """No row is above what the pack's data sheet allows."""
+    """No row may exceed the pack's data sheet."""
     for key, amps in _said(row, capacity_ah):
         if round(amps, 6) > current_a:
             yield f"{at}.{key}", f"{amps:g} A is above pack.current_a, {current_a:g} A, the most that the pack bears"

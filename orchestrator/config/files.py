@@ -1,4 +1,4 @@
-"""The four kinds of file, and how one is found by a path or by the name of a shipped one."""
+"""The four kinds of file, and finding one by path or by the name of a shipped file."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -20,7 +20,7 @@ from orchestrator.protocol.objects import ObjectMap
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of file: its first key, what it becomes, where shipped ones lie, and its rules."""
+    """One kind of file: its identifying key, its record, the folder of shipped ones, and its rules."""
 
     key: str
     about: str
@@ -38,28 +38,28 @@ KINDS = (POLICY, MAP, STATION, SCENARIO)
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A file: its path, and what it is called in messages."""
+    """A file: its path, and its name in messages."""
 
     path: Path
     shown: str
 
 
 def place(path: str | Path) -> Place:
-    """A file as its user wrote it."""
+    """A file as named by the user."""
     return Place(Path(path), str(path))
 
 
 def find(kind: Kind, text: str, base: Path) -> Place:
-    """The file that `text` names: a path relative to the directory `base`, or a shipped file's name.
+    """The file named by `text`: a path relative to the directory `base`, or a shipped file's name.
 
     Raises `UnfitError` with the shipped names if there is no such file.
     """
     if "/" in text or text.endswith((".yaml", ".yml")):
         path = Path(os.path.normpath(base / text))
         try:
-            if (base / text).exists():  # what is no file is told when it is read
+            if (base / text).exists():  # reading it reports what is not a regular file
                 return Place(base / text, str(path))
-        except OSError as error:  # e.g. a name that is too long
+        except OSError as error:  # e.g. the name is too long
             raise UnfitError(f"{shown(text)}: {error.strerror}") from None
         raise UnfitError(f"there is no file {path}{_instead(kind, path)}")
     names = shipped_names(kind.folder)
@@ -75,7 +75,7 @@ def _instead(kind: Kind, path: Path) -> str:
 
 
 def nearest_file(path: Path) -> str:
-    """What may have been meant by the name of a file that is not there."""
+    """What the name of a missing file may have meant."""
     if not path.parent.is_dir():
         return f": there is no directory {path.parent}"
     near = nearest(path.name, sorted(other.name for other in path.parent.glob("*.y*ml")))

@@ -1,7 +1,7 @@
-"""JSON Schema (draft 7) of the three kinds of file, for editors: made from the same dataclasses that the reader fills.
+"""JSON Schema (draft 7) of the four kinds of file, for editors: made from the dataclasses that the reader fills.
 
-It says what each key means and allows, so that an editor completes, explains and checks while one types. What holds
-between keys it cannot say: `orchestrator check` decides.
+It describes each key and its permitted values, so that an editor can complete, explain and check as you type. It cannot
+express rules between keys: `orchestrator check` has the final say.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from orchestrator.protocol.objects import ObjectMap
 
 Schema = dict[str, Any]
 
-#: Types that are named in the file and described in another one.
+#: Types that a file refers to by name, and that another file describes.
 REFERENCES: Mapping[object, Kind] = {Policy: POLICY, ObjectMap: MAP}
 _BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "exclusiveMaximum"}
 
@@ -73,7 +73,7 @@ def _value(hint: Any, key: Key) -> Schema:  # noqa: ANN401 - any type expression
 
 
 def _scalar(hint: object, key: Key) -> Schema | None:
-    """A number, a text …; None for anything else."""
+    """The schema of a number, a text …; None for anything else."""
     bounds = {_BOUNDS[name]: bound for name in _BOUNDS if (bound := getattr(key, name)) is not None}
     scalars: dict[object, Schema] = {
         float: {"type": "number", **bounds},
@@ -81,7 +81,7 @@ def _scalar(hint: object, key: Key) -> Schema | None:
         bool: {"type": "boolean"},
         str: {"type": "string", "minLength": 1, **({"pattern": "/"} if key.is_path else {})},
         Path: {"type": "string", "minLength": 1},
-        object: {},  # anything, for a library that is handed it as it is
+        object: {},  # anything: passed unchanged to a library
     }
     return scalars.get(hint)
 

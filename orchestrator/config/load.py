@@ -1,4 +1,4 @@
-"""From file names to a `Station`, a `Policy`, an `ObjectMap` or a `Scenario`; or to every finding in them, at once."""
+"""Loads a `Station`, a `Policy`, an `ObjectMap` or a `Scenario` from a file, or reports every finding in it at once."""
 
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -23,15 +23,15 @@ from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
 
 T = TypeVar("T")
-Lint = Callable[[Mapping[str, object]], Problems]  #: a file's values by their paths → what can hardly be meant
-#: So many hexadecimal digits tell two versions of a file apart.
+Lint = Callable[[Mapping[str, object]], Problems]  #: a file's values by path → what is probably unintended
+#: This many hexadecimal digits distinguish two versions of a file.
 DIGEST = 12
-#: What is expected wherever a file is named.
+#: The kind of file expected wherever one is named.
 OURS = "a YAML file: a station, a policy, an object map or a scenario"
 
 
 def load_station(path: str | Path) -> Station:
-    """The station in a file, with the policies and object maps that it names. Raises `ConfigError`."""
+    """The station in a file, with its policies and object maps. Raises `ConfigError`."""
     return _load(STATION, place(path), Station)
 
 
@@ -40,7 +40,7 @@ def load_policy(
 ) -> Policy:
     """A policy by a shipped name or a path (relative to the directory `relative_to`). Raises `ConfigError`.
 
-    `changes` are read instead of what is written, by dotted path: `{"current.soc_pct[0].to": "80"}`.
+    `changes` replace values in the file, by dotted path: `{"current.soc_pct[0].to": "80"}`.
     """
     return _load(POLICY, _find(POLICY, name_or_path, relative_to), Policy, changes or {})
 
@@ -56,10 +56,10 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
 
 
 def check(paths: Iterable[str | Path], lint: Mapping[str, Lint] | None = None) -> list[Finding]:
-    """Everything that is wrong in these files and in those that they name, sorted; without an error it is a yes.
+    """Everything wrong in these files and in the files that they name, sorted. Without an error the answer is yes.
 
-    What a file is, is told by its key `policy`, `station`, `map` or `scenario`. A file named twice is reported once.
-    `lint`, by that key, adds warnings about files without errors.
+    A file's kind is identified by its key `policy`, `station`, `map` or `scenario`. A file named twice is reported
+    once. `lint`, by that key, adds warnings about files without errors.
     """
     places = [place(path) for path in paths]
     loader = _Loader(places, lint=lint)
@@ -90,7 +90,7 @@ def _find(kind: Kind, name_or_path: str | Path, relative_to: Path | None) -> Pla
 
 
 class _Loader:
-    """Reads each file once, however many bays name it, and collects the findings of all."""
+    """Reads each file once, however many bays name it, and collects all findings."""
 
     def __init__(
         self,
@@ -105,10 +105,10 @@ class _Loader:
         self._trees: dict[str, Node | None] = {}
         self._digests: dict[str, str] = {}
         self._loaded: dict[tuple[str, str], object] = {}
-        self._steps_a: dict[str, Steps] = {}  # by policy file: the steps of the chargers that are to follow it
+        self._steps_a: dict[str, Steps] = {}  # by policy file: the steps of the chargers that use it
 
     def check(self, where: Place) -> None:
-        """Reads a file of a kind that it says itself."""
+        """Read a file whose kind its own key identifies."""
         node = self._tree(where)
         if node is None or isinstance(node, Refused):
             return
@@ -123,7 +123,7 @@ class _Loader:
     def load(self, kind: Kind, where: Place) -> object:
         """The record in a file, or `INVALID` if anything in it, or in a file that it names, is wrong.
 
-        Raises `UnfitError` if the file is of another kind, or has no place for a change.
+        Raises `UnfitError` if the file is of another kind, or if a change does not apply to it.
         """
         real = (os.path.realpath(where.path), kind.key)
         if real not in self._loaded:
@@ -178,7 +178,7 @@ class _Loader:
 
 
 def _kinds(node: Node | None) -> list[Kind]:
-    """Which kinds of file this may be, by its keys."""
+    """The kinds of file that this may be, by its keys."""
     keys = {name.text for name, _ in node.entries} if isinstance(node, Entries) else set()
     return [kind for kind in KINDS if kind.key in keys]
 

@@ -1,4 +1,4 @@
-"""What must hold between the keys of one object map."""
+"""Rules between the keys of one object map."""
 
 from itertools import pairwise
 
@@ -7,9 +7,9 @@ from orchestrator.config.rules import Problems, Rule
 from orchestrator.config.yaml.scalars import did_you_mean
 from orchestrator.protocol.objects import READING_FIELDS, ObjectEntry, Sweep, TpdoEntry
 
-SIZES = (1, 2, 4)  #: bytes that an expedited SDO answer of this BMU can have (CANopen manual §3.2)
-TPDO_BYTES = 8  #: of one CAN frame
-#: Without these no charge can be supervised. Those in FAST stop one, so they are read in every sweep.
+SIZES = (1, 2, 4)  #: possible bytes in an expedited SDO answer of this BMU (CANopen manual §3.2)
+TPDO_BYTES = 8  #: in one CAN frame
+#: Without these no charge can be supervised. Those in FAST can stop one, so every sweep must read them.
 FAST = ("voltage_v", "current_a", "temperature_c", "status")
 REQUIRED = (*FAST, "soc_pct", "soh_pct")
 

@@ -1,4 +1,4 @@
-"""Names that are typed on a command line and shown in every log line."""
+"""Names that people type on a command line and see in every log line."""
 
 import re
 
@@ -6,7 +6,7 @@ _NAME = re.compile(r"\w[\w.-]{0,63}")
 
 
 def name_problem(name: str) -> str:
-    """Why this is no good name; "" if it is one."""
+    """Why this is not a valid name; "" if it is."""
     if _NAME.fullmatch(name):
         return ""
     meant = re.sub(r"[^\w.]+", "-", name).strip("-.")[:64]

@@ -1,7 +1,7 @@
-"""Files that people name, read without ever waiting: what is no file, but a pipe, say, is told for what it is.
+"""Reads files named by people without ever blocking; anything else, such as a pipe, is reported as what it is.
 
-Opening a pipe waits for whoever writes into it, a device may never end, and a serial port is disturbed by being opened.
-So it is looked first. Standard library only: an emergency stop reads its station file by this, too.
+Opening a pipe blocks until somebody writes to it, a device may never end, and opening a serial port disturbs it. So the
+type is checked first. Standard library only: an emergency stop also reads its station file this way.
 """
 
 import errno
@@ -9,7 +9,7 @@ import os
 import stat
 from pathlib import Path
 
-#: What a name may stand for instead of a file, by the type in its mode.
+#: What a name may refer to instead of a file, by the type in its mode.
 OTHERS = {
     stat.S_IFDIR: "a directory",
     stat.S_IFIFO: "a pipe (FIFO)",
@@ -20,9 +20,9 @@ OTHERS = {
 
 
 def read_plain(path: Path, most: int, wanted: str) -> bytes:
-    """What is in it: at most `most` bytes, and one more if there are more. OSError says what is wrong with it.
+    """The file's content: at most `most` bytes, plus one if there are more. OSError says what is wrong with it.
 
-    `wanted` is what was expected there, for people.
+    `wanted` describes the expected file, for people.
     """
     check_plain(path, wanted)
     fd = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
@@ -36,10 +36,10 @@ def read_plain(path: Path, most: int, wanted: str) -> bytes:
 
 
 def check_plain(path: Path, wanted: str) -> None:
-    """OSError where `path` is no file that can be read now."""
+    """OSError unless `path` is a regular file that can be read now."""
     try:
         mode = path.stat().st_mode
-    except ValueError:  # a 0 in its name
+    except ValueError:  # a NUL in its name
         raise OSError(errno.ENOENT, os.strerror(errno.ENOENT), str(path)) from None
     if not stat.S_ISREG(mode):
         kind = OTHERS.get(stat.S_IFMT(mode), "no file")

@@ -1,6 +1,6 @@
-"""A charging policy: what people tune, each key with its meaning and its bounds.
+"""A charging policy: the values that people tune, each key with its meaning and bounds.
 
-It is written for a pack, in amperes or C; which step of a charger that is, is worked out at the bay (`core/limits.py`).
+A policy is written for a pack, in amperes or C; the bay translates them to its charger's steps (`core/limits.py`).
 """
 
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from orchestrator.keys import Range, Source, key
 
 
 class CellType(StrEnum):
-    """What the cells are made of: which volts belong to which state of charge, and what frost does to them."""
+    """The cells' chemistry: it determines the voltage at each state of charge, and the effect of cold."""
 
     NMC = "nmc"
     NCA = "nca"
@@ -19,7 +19,7 @@ class CellType(StrEnum):
 
 
 class Needs(StrEnum):
-    """How many of the signs of a full pack must be there."""
+    """How many signs of a full pack are required."""
 
     ANY = "any"
     ALL = "all"
@@ -27,7 +27,7 @@ class Needs(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pack:
-    """The battery that this policy is for. Outside of these values no current flows."""
+    """The battery that this policy is for. Outside these values no current flows."""
 
     chemistry: CellType = key("what the cells are made of: nmc, nca, lfp or lto")
     cells_in_series: int = key("cells in series; the voltages of this file are checked against it", ge=1, le=200)
@@ -43,14 +43,14 @@ class Pack:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """When a battery that has just arrived is charged."""
+    """When a newly arrived battery is charged."""
 
     soc_below_pct: float = key("charge a battery that arrives with less than this", unit="%", ge=1, le=100)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recharge:
-    """When a battery that was charged full, and stayed, is charged again."""
+    """When a full battery that has stayed in the bay is charged again."""
 
     soc_below_pct: float = key("charge again below this", unit="%", ge=1, lt=100)
 
@@ -72,7 +72,7 @@ class Continuous:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rise:
-    """What a pack that can be saved shows during precharge; a pack that does not is left alone, latched."""
+    """The voltage rise that a recoverable pack shows during precharge; a pack that does not rise is latched."""
 
     volts: float = key("the pack voltage must rise by this much …", unit="V", gt=0)
     within_min: float = key("… in every period of this length", unit="min", gt=0, le=30)
@@ -80,7 +80,7 @@ class Rise:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrechargeRule:
-    """How a deeply discharged pack is brought to where it may be charged; always on the charger's lowest step."""
+    """How a deeply discharged pack is prepared for charging; always on the charger's lowest step."""
 
     below_v: float = key("precharge below this pack voltage", unit="V", gt=0)
     max_a: float = key("no precharge at a charger whose lowest step is above this", unit="A", gt=0, le=1000)
@@ -91,9 +91,9 @@ class PrechargeRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """One row of a table: from `from` (included) to `to` (excluded; the last row's is included) at most this much.
+    """One row of a table: the maximum from `from` (included) to `to` (excluded, but included in the last row).
 
-    Without `max_a` and `max_c` the pack's own `current_a` holds.
+    Without `max_a` and `max_c`, the pack's own `current_a` applies.
     """
 
     from_: float = key("where the row begins (included)")
@@ -104,7 +104,7 @@ class Band:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """How much current by one quantity."""
+    """The current allowed by one quantity."""
 
     hysteresis: float | None = key(
         "more current only when the value is this far inside the next row; left out: twice the sensor's resolution",
@@ -115,7 +115,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Where:
-    """A rule on more than one quantity: inside all of its ranges (ends included) at most this much."""
+    """A rule on several quantities: the maximum inside all of its ranges (ends included)."""
 
     temperature_c: Range | None = key("[low, high] of the pack temperature", unit="°C", ge=-30, le=60, default=None)
     soc_pct: Range | None = key("[low, high] of the state of charge", unit="%", ge=0, le=100, default=None)
@@ -127,7 +127,7 @@ class Where:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Current:
-    """How much current: of everything that applies the lowest wins; down at once, up after a hold."""
+    """How much current: the lowest of everything that applies wins; it drops at once and rises after a hold."""
 
     raise_after_s: float = key("more is taken after it was allowed for this long", unit="s", ge=1, le=3600)
     temperature_c: Table = key("by pack temperature; must cover `pack.temperature_c`", unit="°C")
@@ -139,7 +139,7 @@ class Current:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Taper:
-    """The constant-voltage phase's end: the current has fallen and stays low."""
+    """The end of the constant-voltage phase: the current has fallen and stays low."""
 
     below_a: float | None = key("the charger's current is below this …", unit="A", gt=0, le=1000, default=None)
     below_c: float | None = key("… or below this share of pack.capacity_ah …", unit="C", gt=0, le=1, default=None)
@@ -151,7 +151,7 @@ class Taper:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Full:
-    """How it is known that a pack is full."""
+    """The signs of a full pack."""
 
     needs: Needs = key("any or all of those that stand here", default=Needs.ANY)
     soc_pct: float | None = key(
@@ -166,7 +166,7 @@ class Full:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finish:
-    """When a charge is over. Hours and Ah are limits and end it as a fault."""
+    """When a charge ends. Hours and Ah are limits; exceeding them is a fault."""
 
     target_soc_pct: float = key(
         "below 100: the charge ends at this state of charge", unit="%", ge=20, le=100, default=100.0
@@ -190,7 +190,7 @@ class Finish:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thresholds:
-    """Limits of the fault table. Each default is the loosest that is allowed: a policy may only be stricter."""
+    """Limits of the fault table. Each default is the loosest value allowed: a policy may only be stricter."""
 
     temperature_trip_c: float = key("latch at or above this", unit="°C", le=55, gt=0, default=55.0)
     temperature_rise_k_per_min: float = key(

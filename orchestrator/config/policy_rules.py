@@ -1,4 +1,4 @@
-"""What must hold between the keys of one policy."""
+"""Rules between the keys of one policy."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ from orchestrator.config.policy import CellType
 from orchestrator.config.rules import Problems, Rule, problems
 from orchestrator.keys import Range
 
-CELL_V = Range(2.0, 4.35)  #: no lithium cell is charged outside: below, copper dissolves; above is beyond LiHV
+CELL_V = Range(2.0, 4.35)  #: no lithium cell is charged outside: below it copper dissolves; above it exceeds LiHV
 PRECHARGE_MAX_MIN = 30.0  #: both stages together, FAULTS C15
 
 
@@ -85,7 +85,7 @@ def _recharge(recharge_pct: float, target_pct: float) -> Problems:
 
 
 def _chemistry(kind: CellType, cells: int, voltage_v: Range) -> Problems:
-    """No more volts than its cells bear; fewer are allowed, and are a warning where they can hardly be meant."""
+    """The voltage must not exceed what the cells bear; lint warns of a low one that is probably unintended."""
     most_v = CELL_VOLTS[kind].most_v
     if round(voltage_v.high / cells, 3) in CELL_V and voltage_v.high > round(most_v * cells, 3):
         yield (
@@ -105,7 +105,7 @@ def _frost(kind: CellType, temperature_c: Range) -> Problems:
 
 
 def _taper(above_v: float, kind: CellType, cells: int, voltage_v: Range) -> Problems:
-    """Low in the charge a low current means anything but full."""
+    """A low current early in the charge does not mean full."""
     end_v = min(CELL_VOLTS[kind].end_v * cells, voltage_v.high)
     if above_v < round(END_SHARE * end_v, 2):
         yield (
@@ -125,7 +125,7 @@ def _trip(trip_c: float, temperature_c: Range) -> Problems:
 
 
 def _limits(values: Mapping[str, object]) -> Problems:
-    """What has a default only where the capacity is known, and what makes no sense beside each other."""
+    """Keys whose default needs the capacity, and keys that make no sense together."""
     if "pack.capacity_ah" in values and values["pack.capacity_ah"] is None:
         for key, what in (("finish.max_hours", "the longest charge"), ("finish.max_ah", "the largest one")):
             if key in values and values[key] is None:
@@ -146,7 +146,7 @@ def _signs(values: Mapping[str, object]) -> list[object]:
 
 
 def policy_problems(values: Mapping[str, object]) -> Problems:
-    """All that the rules find in one policy; what is a finding already is left out."""
+    """The findings of all rules in one policy; keys that are already findings are skipped."""
     yield from problems(POLICY_RULES, values)
     yield from _limits(values)
     yield from amperes_problems(values)

@@ -1,4 +1,4 @@
-"""Ports, contactors, socket and journal of a station, even of one whose file has mistakes: for an emergency stop."""
+"""A station's ports, contactors, socket and journal, even from a file with mistakes: for an emergency stop."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -14,7 +14,7 @@ _SOCKET = re.compile(rb"""(?:^|[\s{,])socket:\s+["']?([^\s"',}#]+)""", re.MULTIL
 _DIRECTORY = re.compile(rb"""(?:^|[\s{,])directory:\s+["']?([^\s"',}#]+)""", re.MULTILINE)
 
 
-#: What every station file has at its top level: one that was cut off may still be YAML, yet lacks the last of them.
+#: Top-level keys of every station file: a truncated file may still be valid YAML, but lacks the last of them.
 _WHOLE = ("bays", "control", "journal")
 _LINE = re.compile(r"0x[0-9a-fA-F]{1,3}|[0-9]{1,4}")
 #: As `config/yaml/scalars.py` reads it.
@@ -23,22 +23,22 @@ _BOOLS = {"false": False, "true": True}
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """Every charger's port, in the file's order, with its bay's name; socket and journal. "" is what cannot be told.
+    """Every charger's port, in the file's order, with its bay's name; socket and journal. "" means unknown.
 
-    Contactors are (chip, line, active low), only those whose keys leave no doubt: a guess might close one.
+    Contactors are (chip, line, active low), and only unambiguous ones: a guess might close one.
     """
 
     ports: Mapping[str, str]
     socket: str
     contactors: tuple[tuple[str, int, bool], ...] = ()
     journal: str = ""  #: the journal's directory
-    damaged: bool = False  #: a part may be lost, and with it ports
+    damaged: bool = False  #: part of the file, and ports with it, may be missing
 
 
 def wiring(path: Path) -> Wiring:
-    """What a station file says about them. A mistake elsewhere must not keep a stop from being sent.
+    """The wiring in a station file. A mistake elsewhere in the file must not prevent a stop.
 
-    What looks like `port: /dev/…` counts wherever it stands, in a file that is not even YAML, too. Raises `OSError` if
+    Anything that looks like `port: /dev/…` counts, wherever it is, even if the file is not YAML. Raises `OSError` if
     the file cannot be read.
     """
     data = read_plain(path, MAX_BYTES, "a station file")
@@ -64,7 +64,7 @@ def _found(pattern: re.Pattern[bytes], data: bytes) -> str:
 
 
 def _shown(path: Path) -> str:
-    """The path, with a backslash for a 0: no file can have that, and asking for it would end a stop with an error."""
+    """The path, with NUL escaped: no file name can contain it, and opening it would abort a stop with an error."""
     return str(path).replace("\0", "\\0")
 
 
@@ -92,7 +92,7 @@ def _ports(node: Node) -> dict[str, str]:
 
 
 def _text(node: Node | None) -> str:
-    # Half a character, which YAML can write as an escape, is in no file's name: it is shown as what was written.
+    # YAML can escape a lone surrogate, which no file name contains: show it as it was written.
     return node.text.encode(errors="backslashreplace").decode() if isinstance(node, Scalar) else ""
 
 

@@ -1,4 +1,4 @@
-"""A scenario: what happens to one bay in hours of simulated time, so that policies can be tried on it."""
+"""A scenario: what happens to one bay over hours of simulated time, for trying policies on."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,14 +10,14 @@ from orchestrator.model import Request
 
 
 class Cell(StrEnum):
-    """What the cells are made of: which open-circuit voltage they have at which state of charge."""
+    """The cells' chemistry: it determines the open-circuit voltage at each state of charge."""
 
     NMC = "nmc"  #: and NCA
     LFP = "lfp"
 
 
 class Sensor(StrEnum):
-    """A value that the BMU tells and that a scenario can falsify."""
+    """A value reported by the BMU that a scenario can falsify."""
 
     VOLTAGE_V = "voltage_v"
     CURRENT_A = "current_a"
@@ -27,17 +27,17 @@ class Sensor(StrEnum):
 
 
 class Defect(StrEnum):
-    """What a sensor does instead of telling the truth."""
+    """What is wrong with a sensor."""
 
-    STUCK = "stuck"  #: goes on telling what it told last
-    SILENT = "silent"  #: tells nothing
-    OFFSET = "offset"  #: tells `by` more
-    DRIFT = "drift"  #: tells more and more, by `by` in each hour
+    STUCK = "stuck"  #: repeats its last value
+    SILENT = "silent"  #: reports nothing
+    OFFSET = "offset"  #: reads `by` too high
+    DRIFT = "drift"  #: reads increasingly high, by `by` per hour
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weather:
-    """The temperature around the bay at one time; straight from row to row."""
+    """The ambient temperature at one time; linear between rows."""
 
     at_h: float = key("when, from the beginning", unit="h", ge=0, le=168)
     ambient_c: float = key("how warm it is then", unit="°C", ge=-40, le=60)
@@ -58,7 +58,7 @@ class ChargerModel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatteryModel:
-    """One battery: an equivalent circuit, and a lump of heat."""
+    """One battery: an equivalent circuit and a lumped thermal mass."""
 
     cells: Cell = key("nmc or lfp: which voltage belongs to which state of charge")
     cells_in_series: int = key("cells in series", ge=1, le=200)
@@ -99,7 +99,7 @@ class Visit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorFault:
-    """A time in which the BMU tells something wrong."""
+    """A period in which the BMU reports a wrong value."""
 
     sensor: Sensor = key("voltage_v, current_a, temperature_c, soc_pct or soh_pct")
     defect: Defect = key("stuck, silent, offset or drift")
@@ -110,7 +110,7 @@ class SensorFault:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ask:
-    """What the operator asks for, as with `orchestrator start` and the others."""
+    """An operator's request, as with `orchestrator start` and the other verbs."""
 
     at_h: float = key("when", unit="h", ge=0, le=168)
     request: Request = key("start, pause, stop or reset")

@@ -1,4 +1,4 @@
-"""What must hold between the keys of one scenario."""
+"""Rules between the keys of one scenario."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -26,7 +26,7 @@ def _weather(weather: tuple[Weather, ...]) -> Problems:
 
 
 def _stays(visits: Visits, hours: float) -> Problems:
-    """One after the other, all of them within the scenario."""
+    """Visits must follow one another, all within the scenario."""
     for i, visit in enumerate(visits):
         if visit.from_h >= hours:
             yield f"visits[{i}].from_h", f"{visit.from_h:g} h is after the end, `hours` is {hours:g}"
@@ -40,7 +40,7 @@ def _stays(visits: Visits, hours: float) -> Problems:
 
 
 def _arrivals(visits: Visits, batteries: Mapping[str, BatteryModel]) -> Problems:
-    """Every battery is known, and so is its charge."""
+    """Every battery must be known, and so must its charge."""
     been_here: set[str] = set()
     for i, visit in enumerate(visits):
         if visit.battery not in batteries:

@@ -1,4 +1,4 @@
-"""Where the policies, object maps and example stations that travel with the program are found."""
+"""Finds the policies, object maps, scenarios and example stations that ship with the program."""
 
 from functools import cache
 from pathlib import Path

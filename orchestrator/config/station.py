@@ -1,4 +1,4 @@
-"""A station file: what is wired where, and the hard limits that no policy can widen."""
+"""A station file: the wiring, and the hard limits that no policy can widen."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,14 +12,14 @@ from orchestrator.protocol.objects import ObjectMap
 
 
 class Rs485(StrEnum):
-    """How the line's direction is switched."""
+    """How the direction of the line is switched."""
 
-    OFF = "off"  #: RS-232, or an RS-485 adapter that switches by itself
+    OFF = "off"  #: RS-232, or an RS-485 adapter that switches automatically
     KERNEL = "kernel"  #: the serial driver switches RTS (TIOCSRS485)
 
 
 class Language(StrEnum):
-    """What people are told in."""
+    """The language of texts for people."""
 
     EN = "en"  #: English
     KO = "ko"  #: Korean
@@ -43,7 +43,7 @@ class ChargerConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatteryConfig:
-    """Where the bay's BMU is found and how it is read."""
+    """Where the bay's BMU is, and how to read it."""
 
     can: str = key("the name of one of the station's CAN buses")
     node_id: int = key("the BMU's CANopen node id: its board switch + 0x10", ge=1, le=127)
@@ -62,7 +62,7 @@ class BatteryConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Hard limits of the bay's hardware; the interlock reads these and nothing else."""
+    """Hard limits of the bay's hardware; the interlock uses no others."""
 
     voltage_v: float = key("no current above this voltage, at the charger or at the pack", unit="V", gt=0, le=120)
     current_a: float = key("no step above this current", unit="A", gt=0, le=100)
@@ -80,7 +80,7 @@ class ContactorConfig:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bay:
-    """One charging place: a charger, the battery that comes to it, their limits and a policy."""
+    """One charging place: a charger, its battery's BMU, their limits and a policy."""
 
     name: str = key("what people call it")
     charger: ChargerConfig = key("the charger")
@@ -93,7 +93,7 @@ class Bay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
-    """Where commands and questions come in."""
+    """Where requests and queries arrive."""
 
     socket: Path = key("the Unix socket for status and commands; only its owner can open it")
 

@@ -1,4 +1,4 @@
-"""The steps of the chargers that follow each policy, from a station file's tree, before that file is read."""
+"""The charger steps used with each policy, taken from a station file's tree before that file is read."""
 
 import os
 from collections.abc import Iterator
@@ -12,9 +12,9 @@ Steps = tuple[float, ...]
 
 
 def named_steps(node: Node, base: Path) -> dict[str, Steps]:
-    """By each policy's real path the steps, in A; where chargers differ, the lowest of each. What is wrong is left out.
+    """The steps in A, by each policy's real path; if chargers differ, the lowest of each. Invalid entries are skipped.
 
-    Whoever reads the station file says what is wrong there.
+    Reading the station file reports them.
     """
     found: dict[str, Steps] = {}
     for bay in _items(_get(node, "bays")):

@@ -1,4 +1,4 @@
-"""What to write today in place of the first edition's keys, which spoke of a charger's steps and not of amperes."""
+"""What to write in place of keys from the older policy format, which used a charger's steps instead of amperes."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -16,7 +16,7 @@ Values = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class Yesterday:
-    """The sentences for one policy file; `steps_a` are those of the station that is checked, if one is."""
+    """The messages for one policy file; `steps_a` come from the station being checked, if any."""
 
     tree: Node | None = None
     steps_a: Steps = ()
@@ -27,24 +27,24 @@ class Yesterday:
         object.__setattr__(self, "highest", max(found, default=None))
 
     def instead(self, record: type, name: str, node: Node) -> str:
-        """What to write in place of this key; "" if it never was one."""
+        """What to write in place of this key; "" if it never existed."""
         says = _RETIRED.get((record, name))
         return says(self, node) if says is not None else ""
 
     def missing(self, record: type, name: str, values: Values) -> str:
-        """What to write for a key that is missing, as far as it can be told; "" if it cannot."""
+        """What to write for a missing key; "" if that cannot be determined."""
         says = _NEW.get((record, name))
         return says(self, values) if says is not None else ""
 
     def amps(self, step: int) -> str:
-        """The amperes of a step, or where they stand."""
+        """The amperes of a step; "" if they are not known."""
         if step < len(self.steps_a):
             return f"{self.steps_a[step]:g}"
         return ""
 
 
 def _steps(node: Node) -> Iterator[str]:
-    """Every `step: n` of the file."""
+    """Every `step: n` in the file."""
     if isinstance(node, Items):
         for item in node.items:
             yield from _steps(item)
@@ -120,5 +120,5 @@ _NEW: Mapping[tuple[type, str], Callable[[Yesterday, Values], str]] = {
     (PrechargeRule, "max_a"): _precharge,
 }
 
-#: Where a list stood yesterday, and a group with `rows` stands today.
+#: For a table that was a list in the older format, and is now a group with `rows`.
 ROWS = "a table has its rows below `rows:` today: write {name}: {{rows: [{{from: …, to: …}}, …]}}"

@@ -1,1 +1,1 @@
-"""`orchestrator demo`: an emulated bay, the unchanged service on it, and a look at both until it ends by itself."""
+"""`orchestrator demo`: an emulated bay with the unchanged service, shown until it ends by itself."""

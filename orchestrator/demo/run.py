@@ -1,4 +1,4 @@
-"""Run one demo from beginning to end."""
+"""Runs one demo from beginning to end."""
 
 import shutil
 import sys
@@ -10,14 +10,14 @@ from orchestrator.demo.story import SHOWN_BY_A_STOP, Story
 from orchestrator.errors import OrchestratorError
 from orchestrator.sim.faults import FAULTS
 
-#: How often the picture changes.
+#: How often the picture is refreshed.
 LOOK_EVERY_S = 0.1
-#: Not faults that the service is to stop for.
+#: Entries for which the service does not stop.
 NO_FAULT = ("heal", "frozen_temperature", "soc_jump")
 
 
 def demo(fault: str | None, *, plain: bool) -> int:
-    """Charge an emulated battery, or see it stopped by `fault`; 0 when it ended as it should."""
+    """Charge an emulated battery, or stop because of `fault`; 0 if it ended as it should."""
     known = [name for name in FAULTS if name not in NO_FAULT]
     if fault == "list":
         for name in known:
@@ -52,7 +52,7 @@ def _screen(*, plain: bool) -> Screen:
 
 
 def _watch(stage: Stage, story: Story, screen: Screen) -> None:
-    """Look at the bay until the story is over."""
+    """Watch the bay until the story is over."""
     began_s = time.monotonic()
     while not story.over(t_s := time.monotonic() - began_s):
         bay = stage.bay()
@@ -68,7 +68,7 @@ def _watch(stage: Stage, story: Story, screen: Screen) -> None:
 
 
 def _sum_up(stage: Stage, story: Story) -> None:
-    """What happened, and what the emulated charger itself says at the end."""
+    """Print what happened, and what the emulated charger itself reports at the end."""
     truth = stage.plant.state()
     for session in story.sessions:
         print(

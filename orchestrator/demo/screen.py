@@ -1,4 +1,4 @@
-"""The demo on a terminal: a live picture with rich, or a line at a time where there is no terminal."""
+"""The demo on a terminal: a live picture with rich, or line by line if there is no terminal."""
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -10,9 +10,9 @@ from orchestrator.show import figure, step_of
 if TYPE_CHECKING:
     from rich.panel import Panel
 
-#: The events that the picture has room for.
+#: The number of events that fit in the picture.
 ROOM = 12
-#: Events in other colours than most: a state that has ended a charge, or that wants a person.
+#: Colours of special events: a state that ended a charge, or that needs a person.
 STYLES = {
     "STOPPING": "yellow",
     "HELD": "bold yellow",
@@ -20,22 +20,22 @@ STYLES = {
     "UNCONTROLLABLE": "bold red",
     "FULL": "bold green",
 }
-#: Without a terminal, a line of figures this often.
+#: Without a terminal, print a line of figures this often.
 LINE_EVERY_S = 2.0
 
 
 class Screen(Protocol):
-    """Something to show the demo on."""
+    """A display for the demo."""
 
     def live(self) -> AbstractContextManager[object]:
-        """While it is entered, `show` draws."""
+        """The context in which `show` draws."""
 
     def show(self, t_s: float, bay: Mapping[str, object], story: Story) -> None:
-        """Draw the present."""
+        """Draw the present state."""
 
 
 def figures(bay: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
-    """What one wants to see of a bay, name by name."""
+    """A bay's main figures, by name."""
     battery = cast("Mapping[str, object]", bay["battery"])
     charger = cast("Mapping[str, object]", bay["charger"])
     step = step_of(bay["step"], bay["step_current_a"])
@@ -50,7 +50,7 @@ def figures(bay: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
 
 
 class Lines:
-    """One line an event, and figures in between."""
+    """One line per event, and figures in between."""
 
     def __init__(self) -> None:
         self._told = 0
@@ -71,10 +71,10 @@ class Lines:
 
 
 class Picture:
-    """The whole demo at one glance, redrawn in place."""
+    """The whole demo at a glance, redrawn in place."""
 
     def __init__(self) -> None:
-        from rich.live import Live  # an extra: `Lines` does without
+        from rich.live import Live  # an extra; `Lines` works without it
 
         self._live = Live(auto_refresh=False)
 
@@ -88,7 +88,7 @@ class Picture:
 
 
 def picture(t_s: float, bay: Mapping[str, object], story: Story) -> "Panel":
-    """One moment of the demo: the figures, how full, why, and what has happened so far."""
+    """One moment of the demo: figures, charge, reason, and the events so far."""
     from rich.console import Group
     from rich.panel import Panel
     from rich.progress_bar import ProgressBar

@@ -1,4 +1,4 @@
-"""What the demo runs on: a directory, an emulated station in one process and the service in another."""
+"""The demo's environment: a directory, an emulated station in one process and the service in another."""
 
 import json
 import subprocess
@@ -26,14 +26,14 @@ bays:
 control: {{socket: run/orchestrator.sock}}
 journal: {{directory: run/journal}}
 """
-#: The service verifies every charger within this when it is told to end.
+#: The service verifies every charger within this after it is told to end.
 END_S = 8.0
 
 
 class Stage:
     """`with Stage() as stage`: both processes run; afterwards both have ended.
 
-    `plant` are further arguments of the emulated station, `orchestrator.sim.plant`.
+    `plant` are further arguments for the emulated station, `orchestrator.sim.plant`.
     """
 
     def __init__(self, *plant: str) -> None:
@@ -54,12 +54,12 @@ class Stage:
             )
 
     def restart(self) -> None:
-        """After the service has ended, as systemd would."""
+        """Start the service again after it has ended, as systemd would."""
         self.service.wait()
         self.service = self._start()
 
     def bay(self) -> dict[str, object] | None:
-        """The bay's status; None while the service is not there yet. OrchestratorError when it has ended."""
+        """The bay's status; None until the service is up. OrchestratorError if it has ended."""
         if self.service.poll() is not None:
             raise OrchestratorError(f"the service ended with status {self.service.returncode}:\n{self.log.read_text()}")
         try:
@@ -69,11 +69,11 @@ class Stage:
         return cast("list[dict[str, object]]", document["bays"])[0]
 
     def stop(self) -> None:
-        """What an operator's `orchestrator stop --all` does."""
+        """Do what `orchestrator stop --all` does."""
         ask(self.directory / "run" / "orchestrator.sock", {"verb": "stop", "bays": None})
 
     def end(self) -> int:
-        """Let the service end as an operator would; its exit status."""
+        """End the service as an operator would; returns its exit status."""
         if self.service.poll() is None:
             self.service.terminate()
         try:

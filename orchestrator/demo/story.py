@@ -1,4 +1,4 @@
-"""What happens in a demo: events in their order, when a fault is injected, and when it is over. Pure."""
+"""The course of a demo: its events in order, when to inject a fault, and when it is over. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,25 +6,25 @@ from typing import cast
 
 from orchestrator.show import step_of
 
-#: Where a fault is injected and what is needed for it; the others in mid-charge.
+#: The state in which a fault is injected; all others are injected in mid-charge.
 STAGES: Mapping[str, str] = {"precharge_no_rise": "PRECHARGE_PULSE", "rogue_run": "FULL"}
 #: Faults that show only when somebody stops the bay.
 SHOWN_BY_A_STOP = frozenset({"ignore_stop"})
-#: How long the stage has lasted when the fault comes.
+#: How long after entering that state the fault is injected.
 INJECT_AFTER_S = 4.0
-#: What the bay does after a fault is looked at for this long.
+#: How long the bay is watched after it has stopped.
 LOOK_S = 6.0
-#: A fault that has led to nothing by then leads to nothing.
+#: A fault without effect by then has none.
 NOTHING_S = 40.0
-#: A demo that has not ended by then is stuck.
+#: A demo still running by then is stuck.
 LIMIT_S = 150.0
-#: No current flows and no stop is awaited.
+#: States in which no current flows and no stop is pending.
 AT_REST = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED", "OFFLINE", "UNCONTROLLABLE"})
 
 
 @dataclass(slots=True)
 class Story:
-    """Follows the status from look to look; `t_s` counts from the demo's beginning."""
+    """Follows the bay's status; `t_s` counts from the beginning of the demo."""
 
     fault: str | None
     events: list[tuple[float, str, str]] = field(default_factory=list)  #: t_s, what, why
@@ -37,7 +37,7 @@ class Story:
     stopped_by: str = ""
 
     def look(self, t_s: float, bay: Mapping[str, object]) -> None:
-        """Take in one status of the bay."""
+        """Process one status of the bay."""
         state, step, reason = str(bay["state"]), bay["step"], str(bay["reason"])
         if state != self.state:
             self.events.append((t_s, state, reason))
@@ -55,7 +55,7 @@ class Story:
             self.settled_s = t_s
 
     def inject_now(self, t_s: float) -> bool:
-        """Whether it is the moment for the fault."""
+        """Whether to inject the fault now."""
         stage = STAGES.get(self.fault or "", "CHARGING")
         if self.fault is None or self.injected_s is not None or self.state != stage:
             return False
@@ -67,7 +67,7 @@ class Story:
         self.events.append((t_s, f"inject {self.fault}", about))
 
     def over(self, t_s: float) -> bool:
-        """Whether there is nothing more to see."""
+        """Whether the demo is over."""
         if t_s > LIMIT_S:
             return True
         if self.fault is None:

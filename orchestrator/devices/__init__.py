@@ -1,1 +1,1 @@
-"""One charger or one battery each: poll, command, read back, with deadlines; they turn frames into readings."""
+"""Device drivers, one charger or battery each: poll, command and read back, with deadlines; frames become readings."""

@@ -1,7 +1,7 @@
-"""One BMU on a CAN bus, without I/O: frames and the time come in, requests go out, `view` is what is known of it.
+"""One BMU on a CAN bus, without I/O: frames and the time go in, requests come out, `view` is the present knowledge.
 
-Fast objects are read every sweep, slow ones once a second; one request in flight (`sdo_client.py` keeps late answers
-out), the next as soon as the answer is there and the bus's budget allows. A silent node is asked twice a second.
+Fast objects are read every sweep, slow ones once a second; one request in flight (`sdo_client.py` rejects late
+answers), the next as soon as answer and bus budget allow. A silent node is queried twice a second.
 """
 
 from collections.abc import Callable
@@ -35,20 +35,20 @@ from orchestrator.protocol.sdo import (
 )
 from orchestrator.protocol.sdo_others import Ask
 
-ANSWER_LIMIT_S = 1.5  #: without a valid answer for so long the node is not online (DESIGN §6)
-TOGGLE = 0x80  #: bit of a node-guarding answer that alternates; a heartbeat has none
+ANSWER_LIMIT_S = 1.5  #: without a valid answer for this long the node is not online
+TOGGLE = 0x80  #: the alternating bit of a node-guarding answer; a heartbeat has none
 
 
 class BatteryNode:
     """A BMU. Everything but `view` belongs to the thread of its bus.
 
-    `view` is replaced as a whole; `on_change()` is called after each replacement with news in it (a heartbeat is none).
+    `view` is replaced as a whole; `on_change()` is called after each replacement with news (a heartbeat is not news).
     """
 
     def __init__(self, bus: str, config: BatteryConfig, budget: BusBudget, on_change: Callable[[], None]) -> None:
         self.node_id = config.node_id
         self.trouble: Cause | None = None  #: what is wrong with the bus, though it is open
-        self.next_due_s = -inf  #: when `turn()` has something to do, frames apart
+        self.next_due_s = -inf  #: when `turn()` next has something to do, apart from frames
         self._config = config
         self._bus = bus
         self._plan = ReadPlan(config, budget)
@@ -56,7 +56,7 @@ class BatteryNode:
         self._setup = BmuSetup(config)
         self._health = NodeHealth()
         self._others = OtherMasters()
-        self._answer_s = -inf  # when the newest valid answer came
+        self._answer_s = -inf  # when the newest valid answer arrived
         self._requester = Requester(
             self.node_id, budget, plan=self._plan, client=self._client, setup=self._setup, others=self._others
         )
@@ -77,31 +77,31 @@ class BatteryNode:
 
     @property
     def cob_ids(self) -> tuple[int, ...]:
-        """The frames that `on_frame` wants."""
+        """The COB-IDs of frames for `on_frame`."""
         return tuple(self._handlers)
 
     @property
     def view(self) -> tuple[BatteryReading, BatteryLink]:
-        """What is known now. From any thread."""
+        """The present reading and link. May be called from any thread."""
         return self._view.current
 
     # --- what the bus calls -------------------------------------------------------------------------------------------
 
     def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
-        """A frame with one of `cob_ids` came, which is none that we sent."""
+        """Handle a frame with one of `cob_ids`, not sent by us."""
         self._health.frame(now_s)
         self._handlers[cob_id](data, now_s)
         self._publish()
 
     def on_nmt(self, data: bytes, now_s: float) -> None:
-        """An NMT command came, which is none that we gave."""
+        """Handle an NMT command, not sent by us."""
         if len(data) == 2 and data[1] in (0, self.node_id):
             self._others.commanded(data[0], now_s, everybody=data[1] == 0)
             self._say_others()
             self._publish()
 
     def turn(self, now_s: float, send: Send) -> None:
-        """Do what is due: give up what took too long, notice silence, send the next request by `send(cob_id, data)`."""
+        """Do what is due: give up overdue requests, detect silence, send the next request by `send(cob_id, data)`."""
         self._watch(now_s)
         if self._client.pending is None:
             self.next_due_s = self._requester.ask(now_s, send, online=self._view.link.online)
@@ -112,7 +112,7 @@ class BatteryNode:
         self._publish()
 
     def fail(self, problem: Cause, now_s: float) -> None:
-        """The bus, or our own code, failed: what was asked is lost, and the reason is shown until an answer comes."""
+        """The bus, or our own code, failed: the request is lost, and the reason is shown until an answer arrives."""
         self.next_due_s = self._requester.fail(now_s)
         self._view.set(online=False, problem=problem)
         self._publish()
@@ -126,8 +126,8 @@ class BatteryNode:
             self._plan.unanswered(asked, now_s)
         link = self._view.link
         if link.online:
-            if now_s >= self._answer_s + ANSWER_LIMIT_S:  # the same sum as in `turn`: a difference is rounded otherwise
-                # The next one to answer may be another battery: what this one complained of is not its fault.
+            if now_s >= self._answer_s + ANSWER_LIMIT_S:  # the same sum as in `turn`: a difference rounds differently
+                # The next node to answer may be another battery, which did not send this emergency.
                 self._view.set(online=False, problem=self._why_silent(), emergency=None)
             elif link.heartbeat_s is not None and link.heartbeat_t_s is not None:
                 self._setup.watch(now_s, link.heartbeat_t_s)
@@ -141,10 +141,10 @@ class BatteryNode:
             return Cause.of("bmu_cut_off", node_id=self.node_id, bus=self._bus, why=self.trouble)
         return self._health.silence(self.node_id, self._bus, self._config.sdo_timeout_s)
 
-    # --- what frames say ----------------------------------------------------------------------------------------------
+    # --- frames -------------------------------------------------------------------------------------------------------
 
     def _on_request(self, data: bytes, now_s: float) -> None:
-        """Somebody else asks the node."""
+        """Handle another master's request to the node."""
         self._health.excuse()
         request = self._others.asked(data, now_s)
         if request is not None and request.ask in (Ask.WRITE, Ask.BLOCK_WRITE):
@@ -198,7 +198,7 @@ class BatteryNode:
         write = self._setup.answered(written=written)
         if write.key != HEARTBEAT:
             return
-        if not written:  # not every BMU allows it: then there is nothing to watch
+        if not written:  # not every BMU allows it: without a heartbeat there is nothing to watch
             self._view.set(heartbeat_s=None, heartbeat_t_s=None)
         elif self._view.link.heartbeat_s is None or self._setup.rearms():
             self._view.set(heartbeat_s=write.period_s, heartbeat_t_s=now_s)
@@ -212,7 +212,7 @@ class BatteryNode:
             state = data[0] & ~TOGGLE
             self._setup.heard(state)
             self._view.set(nmt_state=state)
-            if state == data[0]:  # else the answer to a master that guards the node, which is no heartbeat
+            if state == data[0]:  # else it answers another master's node guarding, and is not a heartbeat
                 if (before_s := self._view.link.heartbeat_t_s) is not None:
                     self._setup.interval(now_s - before_s, now_s)
                 self._view.set(heartbeat_t_s=now_s, news=False)
@@ -220,7 +220,7 @@ class BatteryNode:
                 self.next_due_s = now_s
 
     def _booted(self, now_s: float) -> None:
-        """Nothing holds any more that was known, asked or configured before."""
+        """Forget everything that was known, requested or configured before."""
         self._view.booted(now_s)
         self._client.clear()
         self._others.clear()

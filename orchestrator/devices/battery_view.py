@@ -1,4 +1,4 @@
-"""What is known of a BMU: replaced as a whole with every change, so that another thread can take it at any time."""
+"""The present knowledge about a BMU: replaced as a whole on every change, so any thread can read it at any time."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,21 +9,21 @@ from orchestrator.protocol.sdo import NmtState
 
 
 class BatteryView:
-    """A reading and a link that are being worked on, and the newest pair that was published."""
+    """A reading and a link under construction, and the newest published pair."""
 
     __slots__ = ("_news", "_on_change", "current", "link", "reading")
 
     def __init__(self, problem: Cause, on_change: Callable[[], None]) -> None:
         self.reading = BatteryReading()
         self.link = BatteryLink(problem=problem)
-        self.current = (self.reading, self.link)  #: what other threads may look at
+        self.current = (self.reading, self.link)  #: for other threads
         self._on_change = on_change
         self._news = False
 
     def measured(self, fields: Fields) -> None:
-        """Take the plausible values over; a value that is not keeps the one before it, with its age, and says why.
+        """Store plausible values; an implausible one leaves the previous value with its age, and is explained.
 
-        A value that has only been confirmed is no news: its new age is there for whoever looks next.
+        A confirmed value is not news: its new age is there for the next reader.
         """
         values: dict[str, Measurement | None] = {}
         implausible = {name: why for name, why in self.link.implausible.items() if name not in fields}
@@ -40,12 +40,12 @@ class BatteryView:
         self.set(implausible=implausible)
 
     def doubted(self, why: Mapping[str, Cause]) -> None:
-        """Values that were taken before are not to be believed any more, by field."""
+        """Mark values stored earlier as implausible, by field."""
         if why:
             self.set(implausible={**self.link.implausible, **why})
 
     def booted(self, now_s: float) -> None:
-        """Nothing holds any more of what was known before."""
+        """Forget everything known before the boot."""
         old = self.link
         self.reading = BatteryReading()
         self.link = BatteryLink(
@@ -55,7 +55,7 @@ class BatteryView:
             boot_t_s=now_s,
             nmt_state=int(NmtState.BOOT_UP),
             bad_frames=old.bad_frames,
-            other_master=old.other_master,  # who it was that restarted the node must not be forgotten with it
+            other_master=old.other_master,  # it may have restarted the node, so keep it
             other_master_t_s=old.other_master_t_s,
             heartbeat_set=old.heartbeat_set,
             heartbeat_set_t_s=old.heartbeat_set_t_s,
@@ -63,18 +63,18 @@ class BatteryView:
         self._news = True
 
     def dropped(self) -> None:
-        """A frame was thrown away."""
+        """Count a discarded frame."""
         self.set(bad_frames=self.link.bad_frames + 1, news=False)
 
     def set(self, *, news: bool = True, **changes: object) -> None:
-        """Change fields of the link; without `news` nobody is called for it."""
+        """Change fields of the link; without `news`, nobody is notified."""
         changed = {name: value for name, value in changes.items() if getattr(self.link, name) != value}
         if changed:
             self.link = replace(self.link, **changed)  # type: ignore[arg-type]  # one helper for fields of all types
             self._news |= news
 
     def publish(self) -> None:
-        """Let the others see it."""
+        """Publish the pair to other threads."""
         if self.reading is not self.current[0] or self.link is not self.current[1]:
             self.current = (self.reading, self.link)
         if self._news:

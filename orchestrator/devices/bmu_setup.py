@@ -1,6 +1,6 @@
-"""What is configured in a BMU: the periods of its heartbeat and its TPDOs, each a 16-bit timer (manual §2.5, §2.6).
+"""The configuration of a BMU: the periods of its heartbeat and its TPDOs, each a 16-bit timer (manual §2.5, §2.6).
 
-It forgets them with every boot. Nothing else is ever written to it (`link/can_gate.py` sees to that).
+The BMU forgets them with every boot. Nothing else is ever written to it (`link/can_gate.py` ensures that).
 """
 
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ HEARTBEAT: Key = (0x1017, 0)
 _TPDO_TIMER = 0x17FF  #: + the TPDO's number: 0x1800, 0x1801, 0x1802 (§2.5 has a misprint: 0x1082)
 _TPDO_TIMER_SUB = 5
 
-CHECK_PERIODS = 3  #: so many missed: read back which period it has now, well before it counts as lost (core: 4.5)
-ODD = (0.6, 1.5)  #: times its period, an interval between two heartbeats is as it should be …
-MOST_ODD = 3  #: … and after so many in a row that are not, the period is read back, too
+CHECK_PERIODS = 3  #: after this many missed heartbeats read back the period, well before it counts as lost (core: 4.5)
+ODD = (0.6, 1.5)  #: the normal interval between two heartbeats, in periods …
+MOST_ODD = 3  #: … after this many abnormal ones in a row, the period is also read back
 
-#: What TPDO 1 … 4 carry, when and as which frame; only the timer's value does not change what a frame means.
+#: The contents, timing and COB-IDs of TPDO 1 … 4; only the timer's value does not change the meaning of a frame.
 TPDO_SETTINGS = (*range(0x1800, 0x1804), *range(0x1A00, 0x1A04))
 
-RETRY_S = 1.0  #: a write that was not answered is tried again after this, and a period read back again
-LOST_PERIODS = 5  #: so many heartbeats missed by a node that still answers: it booted and we did not hear it
+RETRY_S = 1.0  #: after this, an unanswered write is repeated, and a period may be read back again
+LOST_PERIODS = 5  #: a node that still answers but missed this many heartbeats has booted without our noticing
 
 
 @dataclass(frozen=True, slots=True)
 class TimerWrite:
-    """One timer and the period that it shall have."""
+    """One timer and the period to write to it."""
 
     key: Key
     period_s: float
@@ -39,7 +39,7 @@ class TimerWrite:
 
 
 def timer_writes(config: BatteryConfig) -> tuple[TimerWrite, ...]:
-    """The timers that this bay's station file asks for, in the order of writing."""
+    """The timers requested by this bay's station file, in the order of writing."""
     writes = []
     if config.heartbeat_s is not None:
         writes.append(TimerWrite(HEARTBEAT, config.heartbeat_s))
@@ -50,7 +50,7 @@ def timer_writes(config: BatteryConfig) -> tuple[TimerWrite, ...]:
 
 
 class BmuSetup:
-    """What of it is still to be done."""
+    """The part of the configuration that is still to be written or checked."""
 
     __slots__ = (
         "_all", "_any_tpdo", "_check_s", "_heard", "_heartbeat_s", "_left", "_lost_s", "_odd", "_rearm", "_retry_s",
@@ -64,8 +64,8 @@ class BmuSetup:
         self.booted()
 
     def booted(self) -> None:
-        """The node booted, and has forgotten what others had set."""
-        #: Another master changed what the TPDOs carry, or where: they are not to be used until the node boots.
+        """The node booted, and has forgotten all settings."""
+        #: Another master changed the TPDOs' contents or COB-IDs: they must not be used until the node boots.
         self.tpdos_changed = False
         self.restart()
 
@@ -74,14 +74,14 @@ class BmuSetup:
         self._left = list(self._all)
         self._retry_s = -inf
         self._any_tpdo = False
-        self.start_due = False  #: an NMT start is to be sent, so that the TPDOs begin
-        self.check_due = False  #: the heartbeat's period is to be read back
+        self.start_due = False  #: an NMT start must be sent, so that the TPDOs begin
+        self.check_due = False  #: the heartbeat's period must be read back
         self._check_s = -inf  # when that may be done again
         self._odd = 0
         self._heard = self._rearm = False
 
     def next_write(self, now_s: float) -> TimerWrite | None:
-        """What to write next; None if nothing is left or it is too early to try again."""
+        """The next write; None if nothing is left or it is too early to try again."""
         return self._left[0] if self._left and now_s >= self._retry_s else None
 
     def sent(self, now_s: float) -> None:
@@ -89,7 +89,7 @@ class BmuSetup:
         self._retry_s = now_s + RETRY_S
 
     def answered(self, *, written: bool) -> TimerWrite:
-        """It was answered, and so is done; a refusal is an answer, too, and not asked for again."""
+        """The write was answered, and so is done; a refusal is also an answer, and not repeated."""
         self._retry_s = -inf
         write = self._left.pop(0)
         self._any_tpdo |= written and write.key != HEARTBEAT
@@ -97,12 +97,12 @@ class BmuSetup:
         return write
 
     def heard(self, nmt_state: int) -> None:
-        """A heartbeat came. A node that is to send TPDOs is started again: the first start, which nobody confirms, was
-        lost, or somebody else's NMT command has stopped it."""
+        """A heartbeat came. A node that should send TPDOs is started again: the first start, which is unconfirmed, was
+        lost, or another master's NMT command has stopped it."""
         self.start_due |= self._any_tpdo and not self._left and nmt_state != NmtState.OPERATIONAL
 
     def interval(self, seconds: float, now_s: float) -> None:
-        """A heartbeat came, so long after the one before it."""
+        """A heartbeat came this long after the previous one."""
         self._heard = True
         low, high = ODD
         self._odd = 0 if low <= seconds / self._heartbeat_s <= high else self._odd + 1
@@ -111,7 +111,7 @@ class BmuSetup:
             self._check(now_s)
 
     def watch(self, now_s: float, heartbeat_t_s: float) -> None:
-        """The node answers: if its heartbeats do not come, look which period it has, and at last write all again."""
+        """The node answers: if its heartbeats are missing, read back its period, and finally write everything again."""
         age_s = now_s - heartbeat_t_s
         if age_s >= CHECK_PERIODS * self._heartbeat_s:
             self._check(now_s)
@@ -120,7 +120,7 @@ class BmuSetup:
             self._retry_s = now_s + RETRY_S
 
     def touched(self, key: Key, period_ms: int | None, now_s: float) -> None:
-        """Somebody else writes an object, which may be a timer of ours or change what the TPDOs carry."""
+        """Another master writes an object, which may be one of our timers or a TPDO setting."""
         index, sub = key
         if index in TPDO_SETTINGS and sub != _TPDO_TIMER_SUB:
             self.tpdos_changed = True
@@ -135,13 +135,13 @@ class BmuSetup:
             self._retry_s = max(self._retry_s, now_s + RETRY_S)
 
     def checking(self, now_s: float) -> None:
-        """The heartbeat's period is asked for."""
+        """The heartbeat's period is being read back."""
         self.check_due, self._check_s = False, now_s + RETRY_S
 
     def checked(self, period_ms: int) -> Cause | None:
         """What it is. None if it is ours; else what was found, and ours will be written again.
 
-        None at all may also come from a restart that nobody heard: then everything is written again.
+        No heartbeat at all may also be due to an unnoticed restart: then everything is written again.
         """
         if period_ms == round(self._heartbeat_s * 1000):
             return None
@@ -156,10 +156,10 @@ class BmuSetup:
         return Cause.of("heartbeat_was", found_s=period_ms / 1000, period_s=self._heartbeat_s)
 
     def rearms(self) -> bool:
-        """Whether a heartbeat that was just written is waited for from now on, as from the first time.
+        """Whether to start waiting for the heartbeat afresh after it was written.
 
-        Only when another period was found, and once until a heartbeat comes: else asking again for one that is lost
-        would make it look alive.
+        Only if another period was found, and once until a heartbeat comes: otherwise, requesting a lost one again would
+        make it look alive.
         """
         rearm, self._rearm = self._rearm, False
         self._heard = self._heard and not rearm

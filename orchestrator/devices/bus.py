@@ -1,4 +1,4 @@
-"""The BMUs of one CAN bus and the thread that reads them; it opens the bus, and opens it anew when it fails."""
+"""The BMUs of one CAN bus and the thread that reads them; it opens the bus, and reopens it after a failure."""
 
 import logging
 import threading
@@ -11,29 +11,29 @@ from orchestrator.errors import LinkError
 from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NMT_COB_ID
 
-REOPEN_S = 1.0  #: pause before a bus that failed is opened again
-TICK_S = 0.1  #: longest wait for a frame: so soon `close()` is noticed
+REOPEN_S = 1.0  #: pause before a failed bus is reopened
+TICK_S = 0.1  #: longest wait for a frame, and so until `close()` is noticed
 CLOSE_S = 3.0  #: slcan sleeps 2 s when it opens
-STALL_S = 0.5  #: without a turn for so long the loop hangs; five ticks
+STALL_S = 0.5  #: without a turn for this long the loop hangs; five ticks
 
 
 class CanPort(Protocol):
-    """What of `link/can.py` is needed here."""
+    """The interface of `link/can.py` used here."""
 
     name: str
     trouble: Cause | None
 
     def subscribe(self, cob_id: int, callback: Callable[[int, bytes], None]) -> None:
-        """Have the frames with this id handed on, but those that we sent ourselves."""
+        """Receive the frames with this id, except our own."""
 
     def open(self) -> None:
-        """LinkError if it does not work."""
+        """LinkError if that fails."""
 
     def close(self) -> None:
         """Never raises."""
 
     def receive(self, timeout_s: float) -> None:
-        """Hand one frame on, if one comes in time; LinkError if the bus is broken."""
+        """Dispatch one frame, if one arrives in time; LinkError if the bus is broken."""
 
     def send(self, cob_id: int, data: bytes) -> None:
         """LinkError if the bus is broken, RefusedError for a frame that may not be sent."""
@@ -57,19 +57,19 @@ class BatteryBus:
         port.subscribe(NMT_COB_ID, self._on_nmt)
 
     def start(self) -> None:
-        """Begin to read. Failing to open the bus is shown in every node's link, not raised."""
+        """Begin to read. A failure to open the bus is shown in every node's link, not raised."""
         self._thread.start()
 
     def close(self) -> None:
         """End the thread and close the bus.
 
-        A driver that hangs (slcan opens a stalled adapter for ever) is left behind after CLOSE_S.
+        A hung driver (slcan opens a stalled adapter for ever) is abandoned after CLOSE_S.
         """
         self._closing.set()
         self._thread.join(CLOSE_S)
 
     def stalled(self, now_s: float) -> bool:
-        """True when the loop hangs or has ended. While the bus is closed, all nodes offline, it may take its time."""
+        """True if the loop hangs or has ended. While the bus is closed, with all nodes offline, it may take longer."""
         return not self._closing.is_set() and (
             not self._thread.is_alive() or (self._open and now_s - self._turn_s > STALL_S)
         )
@@ -83,7 +83,7 @@ class BatteryBus:
                     self._turn()
             except LinkError as error:
                 self._failed(error.cause)
-            except Exception as error:  # noqa: BLE001 - the thread must not die, and the reason be seen
+            except Exception as error:  # noqa: BLE001 - the thread must survive, and the reason be seen
                 self._failed(Cause.of("can_internal", bus=self._port.name, error=repr(error)))
             self._open = False
             self._port.close()
@@ -98,7 +98,7 @@ class BatteryBus:
                     node.turn(now_s, self._port.send)
                 except LinkError:
                     raise
-                except Exception as error:  # noqa: BLE001 - one node's fault must not take the others' bus
+                except Exception as error:  # noqa: BLE001 - one node's fault must not take down the others' bus
                     self._node_failed(node, error)
             if node.next_due_s < due_s:  # twice as fast as min(), and this is the innermost loop
                 due_s = node.next_due_s
@@ -131,5 +131,5 @@ class BatteryBus:
     def _show(self, node: BatteryNode, problem: Cause) -> None:
         try:
             node.fail(problem, self._clock())
-        except Exception:  # the view says it already; only who was to be told of it failed as well
+        except Exception:  # the view has it already; only notifying others has failed as well
             logging.getLogger(__name__).exception("%s", problem)

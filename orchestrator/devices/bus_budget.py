@@ -1,20 +1,21 @@
-"""How much of a CAN bus our SDO reads may take, and how that is shared.
+"""The share of a CAN bus that our SDO reads may take, and its distribution.
 
-An exchange is two frames of 8 bytes with an 11-bit id. Such a frame has 111 bits with the pause behind it, of which 98
-can be stuffed: at worst 24 bits more. Two of them are 270 bits, so that 30 % of 250 kbit/s are 277 exchanges a second.
+An exchange is two frames of 8 bytes with an 11-bit id. Such a frame has 111 bits including the pause after it, of which
+98 are subject to stuffing: at worst 24 bits more. Two frames are 270 bits, so 30 % of 250 kbit/s is 277 exchanges per
+second.
 """
 
 from dataclasses import dataclass
 
 FRAME_BITS = 111 + 24
 EXCHANGE_BITS = 2 * FRAME_BITS
-SHARE = 0.30  #: of the bus's bit rate, the most that SDO traffic may take
-PLANNED = 0.9  #: of that share, what the sweeps are planned for: without slack the queue would only grow
-BURST = 4  #: exchanges that may follow each other at once; below the 10 frames that SocketCAN's queue takes
+SHARE = 0.30  #: the maximum share of the bus's bit rate for SDO traffic
+PLANNED = 0.9  #: the part of that share planned for sweeps: without slack the queue would only grow
+BURST = 4  #: exchanges that may follow each other at once; below the 10 frames in SocketCAN's queue
 SLOW_S = 1.0  #: how often the slow objects are read
-#: On a bus that is too full, the slow objects yield to this first: their values may be 3 s old, the fast ones' 1.5 s.
+#: On an overloaded bus, the slow objects first yield to this: their values may be 3 s old, the fast ones' 1.5 s.
 YIELDING_SLOW_S = 2.0
-#: Three sweeps within the 1.5 s that a fast value may be old: what is slower makes the slow objects yield.
+#: Three sweeps within the 1.5 s allowed for a fast value: if a sweep takes longer, the slow objects yield.
 GOOD_SWEEP_S = 0.5
 
 
@@ -33,12 +34,12 @@ class BusBudget:
         self._shares: list[_Share] = []
         self._stretch = 1.0
         self._slow_s = SLOW_S
-        self._least_s = 0.0  # the period of every object, where even that is too much
+        self._least_s = 0.0  # the period of every object, if even that is too much
         self._spacing_s = 1.0 / self.capacity_hz
-        self._next_s = float("-inf")  # when all that is reserved has had its time
+        self._next_s = float("-inf")  # when all reservations are used up
 
     def join(self, fast: int, slow: int, sweep_s: float) -> None:
-        """A node with so many fast and slow objects, the former wanted every `sweep_s`. All sweeps may stretch."""
+        """Add a node with this many fast and slow objects, the fast ones every `sweep_s`. All sweeps may stretch."""
         self._shares.append(_Share(fast, slow, sweep_s))
         longest_s = max(share.sweep_s for share in self._shares)
         self._stretch = self._stretched(SLOW_S)
@@ -50,13 +51,13 @@ class BusBudget:
             self._least_s = objects / (PLANNED * self.capacity_hz)
 
     def _stretched(self, slow_s: float) -> float:
-        """The factor for the fast objects' sweeps when the slow ones are read every `slow_s`."""
+        """The factor for the fast objects' sweeps if the slow ones are read every `slow_s`."""
         fast_hz = sum(share.fast / share.sweep_s for share in self._shares)
         left_hz = PLANNED * self.capacity_hz - sum(share.slow for share in self._shares) / slow_s
         return max(1.0, fast_hz / left_hz) if left_hz > 0 else float("inf")
 
     def fast_s(self, sweep_s: float) -> float:
-        """How often a fast object may be read that is wanted every `sweep_s`."""
+        """How often a fast object with the period `sweep_s` may be read."""
         return self._least_s or sweep_s * self._stretch
 
     @property
@@ -65,9 +66,9 @@ class BusBudget:
         return max(self._slow_s, self._least_s)
 
     def reserve(self, now_s: float) -> float:
-        """Count one exchange, and return when it may begin: now, or after those that were reserved before it.
+        """Reserve one exchange, and return when it may begin: now, or after the earlier reservations.
 
-        Reservations are served in the order in which they were made, so that no node is ever passed over.
+        Reservations are served in order, so that no node is ever passed over.
         """
         begin_s = max(now_s, self._next_s - (BURST - 1) * self._spacing_s)
         self._next_s = max(now_s, self._next_s) + self._spacing_s

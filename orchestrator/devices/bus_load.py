@@ -1,4 +1,4 @@
-"""Which CAN buses are too slow for the BMUs that a station file puts on them."""
+"""Finds the CAN buses that are too slow for the BMUs that a station file puts on them."""
 
 from collections.abc import Iterator
 
@@ -7,12 +7,12 @@ from orchestrator.devices.battery import ANSWER_LIMIT_S
 from orchestrator.devices.bus_budget import SHARE, BusBudget
 from orchestrator.devices.read_plan import ReadPlan
 
-#: A value that comes this seldom is stale after one answer that is lost.
+#: A value read this rarely is stale after one lost answer.
 SLOW_S = ANSWER_LIMIT_S / 2
 
 
 def slow_buses(station: Station) -> Iterator[str]:
-    """A sentence for each bus on which volts, amps, status and temperature would come too seldom, with its line."""
+    """A warning, with its line, for each bus on which voltage, current, status and temperature are read too rarely."""
     for name, settings in station.can.items():
         bitrate = settings.get("bitrate")
         nodes = [bay.battery for bay in station.bays if bay.battery.can == name]

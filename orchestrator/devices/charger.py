@@ -1,10 +1,10 @@
-"""One charger behind its serial port: polls it, hands it the standing order, and above all stops it.
+"""One charger behind its serial port: polls it, sends it commands, and above all stops it.
 
-Theory of operation. One thread owns the port. The control loop leaves it a standing order and the evidence for it (a
-grant); the thread repeats the order until the control loop, seeing the read-back, leaves another. `Schedule` says whose
-turn it is, `Dialogue` what an answer is, the interlock what may go out. A stop wakes the thread at once. Whatever
-breaks, the thread lives on: it reopens the port, then once a second, and begins with a stop, without being told.
-What another program has set the port to is set right before a stop needs it.
+Theory of operation. One thread owns the port. The control loop gives it a command and a grant; the thread repeats the
+command until the control loop sees the read-back and gives another. `Schedule` decides whose turn it is, `Dialogue`
+what counts as an answer, the interlock what may go out. A stop wakes the thread at once. Whatever breaks, the thread
+survives: it reopens the port at once, then once a second, and begins with a stop on its own. If another program has
+changed the port's settings, they are corrected before a stop needs them.
 """
 
 from collections.abc import Callable
@@ -22,17 +22,17 @@ from orchestrator.interlock import Grant, permit
 from orchestrator.model import STOP, Cause, ChargerLink, ChargerReading, Command, ControlMode, Sent
 from orchestrator.protocol.charger import OPERATION_STOP_FRAME, STOP_FRAME, encode
 
-#: Without a turn for so long the loop hangs: a write may take 0.2 s, a poll 0.12 s.
+#: Without a turn for this long the loop hangs: a write may take 0.2 s, a poll 0.12 s.
 STALL_S = 0.5
 #: A port is opened at most this often …
 REOPEN_S = 1.0
-#: … and one that just failed after this pause: the guardian must let go of it first, and its charger is running.
+#: … and a port that just failed after this pause: the guardian must let go of it first, while its charger is running.
 LET_GO_S = 0.1
-#: Longer than a whole stop takes: operation 0 follows one slot behind rest 0.
+#: Longer than a complete stop takes: operation 0 follows one slot after rest 0.
 CLOSE_S = 1.0
-#: The line's settings and its lock are looked at this often, and besides before each stop and after each miss.
+#: How often the line's settings and lock are checked, in addition to before each stop and after each miss.
 LOOK_S = 1.0
-#: More reads than this find no end of old input: then somebody is sending without a pause.
+#: If old input does not end after this many reads, somebody is sending without a pause.
 MAX_STALE_READS = 16
 
 
@@ -40,7 +40,7 @@ class ChargerPort:
     """The thread of one serial port. All methods may be called from any thread.
 
     `open_line` opens the port (LinkError if it cannot); `clock` gives monotonic seconds; `on_change` is called, from
-    the port's thread, after each reading and each change of the link, and has to be quick.
+    the port's thread, after each reading and each change of the link, and must be quick.
     """
 
     def __init__(
@@ -75,13 +75,13 @@ class ChargerPort:
 
     @property
     def view(self) -> tuple[ChargerReading | None, ChargerLink]:
-        """The newest reading and how the line is doing: one consistent pair."""
+        """The newest reading and the state of the link: one consistent pair."""
         return self._view.current
 
     def order(self, command: Command | None, grant: Grant | None = None) -> None:
-        """Leave a standing order (None: only poll) and the evidence for it. A stop goes out at once.
+        """Give the command to repeat (None: only poll) and the grant for it. A stop goes out at once.
 
-        To be called with every decision, changed or not: an opened port has forgotten the last order and stops.
+        Call this with every decision, changed or not: a reopened port has forgotten the last command and stops.
         """
         with self._lock:
             self._grant = grant
@@ -90,13 +90,13 @@ class ChargerPort:
             self._wake.set()
 
     def stalled(self, now_s: float) -> bool:
-        """True when the loop hangs with an open port, or has ended without being told to."""
+        """True if the loop hangs with an open port, or has ended without being told to."""
         if self._close_by_s is not None:
             return False
         return not self._thread.is_alive() or (self._line is not None and now_s - self._turn_s > STALL_S)
 
     def close(self) -> None:
-        """End the thread and give the port back. A stop that is ordered is written whole first."""
+        """End the thread and release the port. A commanded stop is written completely first."""
         if self._close_by_s is None:
             self._close_by_s = self._clock() + CLOSE_S
         self._wake.set()
@@ -109,7 +109,7 @@ class ChargerPort:
         while not self._finished():
             try:
                 self._once()
-            except Exception as error:  # noqa: BLE001 - a thread that dies here is a charger that nobody stops
+            except Exception as error:  # noqa: BLE001 - if this thread died, nobody would stop the charger
                 self._broken(error)
         line, self._line = self._line, None
         self._let_go(line)
@@ -161,7 +161,7 @@ class ChargerPort:
         self._view.publish(sent=Sent(order, end_s), stop_sent_s=stop_sent_s, refused=None)
 
     def _restored(self, line: ChargerLine) -> Cause | None:
-        """What had to be set right. That this fails must not keep a stop from the line."""
+        """The settings that had to be corrected. A failure here must not prevent a stop."""
         with suppress(LinkError):
             return line.restore()
         return None
@@ -171,7 +171,7 @@ class ChargerPort:
             self._view.publish(taken_over=taken_over, taken_over_t_s=self._clock())
 
     def _look(self, line: ChargerLine) -> None:
-        """What others do to the port shows here, once a second."""
+        """Check once a second what others do to the port."""
         self._look_s = self._clock() + LOOK_S
         self._found(self._restored(line))
         self._view.publish(locked_by=line.locked_by())
@@ -209,7 +209,7 @@ class ChargerPort:
             self._schedule.restart(self._clock())
 
     def _broken(self, error: Exception) -> None:
-        """A port that failed is closed and opened again. After anything else the charger is stopped and polled on."""
+        """Close and reopen a port that failed. After any other error, stop the charger and keep polling."""
         line, locked_by = None, self._view.link.locked_by
         if isinstance(error, LinkError):
             problem, locked_by = error.cause, None
@@ -218,12 +218,12 @@ class ChargerPort:
             said = f"{type(error).__name__}: {error}"
             problem = Cause.of("charger_internal", port=self._config.port, error=said)
             self._restart()
-        with suppress(Exception):  # it may be `on_change` itself that fails
+        with suppress(Exception):  # `on_change` itself may be what fails
             self._view.publish(online=False, problem=problem, locked_by=locked_by)
-        self._let_go(line)  # last: a driver may take its time, and nobody must take the port for well meanwhile
+        self._let_go(line)  # last: a driver may be slow, and the port must not look healthy meanwhile
 
     def _let_go(self, line: ChargerLine | None) -> None:
         if line is not None:
             self._open_at_s = max(self._open_at_s, self._clock() + LET_GO_S)
-            with suppress(Exception):  # whatever its close has to say, the line is not used any more
+            with suppress(Exception):  # the line is not used any more, even if closing it fails
                 line.close()

@@ -1,4 +1,4 @@
-"""What the thread of a charger's port needs of the open port."""
+"""The interface of an open port, as used by the thread of a charger's port."""
 
 from typing import Protocol
 
@@ -6,13 +6,13 @@ from orchestrator.model import Cause
 
 
 class ChargerLine(Protocol):
-    """The open port, as `link.serial.SerialLine` is. Every method but `close` may raise LinkError."""
+    """An open port, such as `link.serial.SerialLine`. Every method except `close` may raise LinkError."""
 
     def write(self, data: bytes) -> None:
         """Hand over a frame."""
 
     def read(self, timeout_s: float, expected: int = 0) -> bytes:
-        """What came in, as soon as `expected` bytes had their time on the wire; b"" after the time-out."""
+        """Received bytes, once `expected` bytes have had their time on the wire; b"" after the time-out."""
 
     def restore(self) -> Cause | None:
         """Set the port up again if another program has changed it; what was found, None where all was well."""
@@ -21,4 +21,4 @@ class ChargerLine(Protocol):
         """Which program holds the port's lock instead of us, None where it is ours."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""

@@ -1,4 +1,4 @@
-"""What is known of one charger: its newest reading, and how its line is doing."""
+"""The present knowledge about one charger: its newest reading, and the state of its link."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,10 +7,10 @@ from orchestrator.devices.dialogue import SILENCE, Dialogue, Heard
 from orchestrator.devices.line_quality import LineQuality
 from orchestrator.model import Cause, ChargerLink, ChargerReading
 
-#: So many polls in a row without an answer are silence: with one frame in a hundred lost, three come every seven hours,
-#: five once in two years. Five take 1.12 s of the 2.0 s that a silent device may go on for (DESIGN §6).
+#: This many consecutive polls without an answer are silence: with one frame in a hundred lost, three misses in a row
+#: occur every seven hours, five once in two years. Five take 1.12 s of the 2.0 s allowed for noticing silence.
 MISSES_UNTIL_SILENT = 5
-#: Answers that come late are no accident: what is asked for repeats after three, and a late one would pass for fresh.
+#: Late answers are no accident: the requests repeat after three, and a late answer could then pass for a fresh one.
 LATE_UNTIL_SILENT = 3
 
 
@@ -22,7 +22,7 @@ class ChargerView:
     def __init__(self, port: str, on_change: Callable[[], None]) -> None:
         self._port, self._on_change = port, on_change
         self._quality = LineQuality()
-        #: What other threads may look at.
+        #: For other threads.
         self.current: tuple[ChargerReading | None, ChargerLink] = (
             None,
             ChargerLink(problem=Cause.of("port_not_opened", port=port)),
@@ -30,11 +30,11 @@ class ChargerView:
 
     @property
     def link(self) -> ChargerLink:
-        """How the line is doing."""
+        """The state of the link."""
         return self.current[1]
 
     def polled(self, reading: ChargerReading | None, dialogue: Dialogue, now_s: float, refused: Cause | None) -> None:
-        """A poll is over; `reading` is None where no answer came, `refused` why an order did not go out instead."""
+        """A poll is over; `reading` is None without an answer, `refused` says why a command was not sent instead."""
         link = self.link
         misses = 0 if reading else link.misses + 1
         problem = None if reading else link.problem
@@ -56,7 +56,7 @@ class ChargerView:
         )
 
     def publish(self, reading: ChargerReading | None = None, **changes: object) -> None:
-        """Let the others see what has changed."""
+        """Publish changes to other threads."""
         last_reading, last_link = self.current
         link = replace(last_link, **changes)  # type: ignore[arg-type]  # the callers name the fields of ChargerLink
         if reading is None and link == last_link:

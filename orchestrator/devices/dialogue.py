@@ -1,8 +1,8 @@
-"""What is asked of a charger and what counts as its answer. Without I/O: frames out, bytes in, readings out.
+"""Requests to a charger, and the replies that count as their answers. Without I/O: frames out, bytes in, readings out.
 
-A reply does not say which request it answers. So that a late one is not taken for the answer to the next request, the
-request after a missed answer asks for another number of values: the answer then has another length, and a late one with
-the old length is known for what it is. The values that come and go are the two temperatures, which nobody uses.
+A reply does not say which request it answers. To keep a late reply from being taken for the answer to the next request,
+the request after a missed answer asks for a different number of values: its answer has a different length, which
+exposes a late reply. The values that come and go are the two temperatures, which nobody uses.
 """
 
 from enum import IntEnum
@@ -32,7 +32,7 @@ _FRAMES = {kinds: status_request(*kinds) for kinds in REQUESTS}
 
 
 class Heard(IntEnum):
-    """The most telling thing that came in since the last good answer."""
+    """The most significant input since the last good answer."""
 
     NOTHING = 0
     NOISE = 1
@@ -50,27 +50,27 @@ SILENCE = {
 
 
 class Dialogue:
-    """One charger's side of the talk since its port was opened."""
+    """The dialogue with one charger since its port was opened."""
 
     __slots__ = ("_asked_s", "_decoder", "_kinds", "_skipped", "error_bits", "error_t_s", "heard", "missing")
 
     def __init__(self) -> None:
         self._decoder = FrameDecoder()
         self._kinds = REQUESTS[0]
-        self._asked_s: float | None = None  # None: nothing is asked
-        self.missing = 0  #: bytes of the answer that have not come
-        self._skipped = 0  # of the decoder's bytes, up to the last good answer
+        self._asked_s: float | None = None  # None: no request is pending
+        self.missing = 0  #: outstanding bytes of the answer
+        self._skipped = 0  # bytes skipped by the decoder up to the last good answer
         self.heard = Heard.NOTHING
         self.error_bits = 0  #: of the newest 0x1F frame
-        self.error_t_s: float | None = None  #: when it came
+        self.error_t_s: float | None = None  #: when it arrived
 
     @property
     def bad_frames(self) -> int:
-        """Frames that were dropped: checksum, length, end."""
+        """Dropped frames: checksum, length, end."""
         return self._decoder.bad_frames
 
     def ask(self, now_s: float) -> bytes:
-        """The request to send at `now_s`. What came before it answers nothing any more."""
+        """The request to send at `now_s`. Earlier input answers nothing any more."""
         self._take(self._decoder.flush(), now_s)
         self._asked_s = now_s
         self.missing = reply_bytes(*self._kinds)
@@ -82,7 +82,7 @@ class Dialogue:
         return self._take(self._decoder.feed(data), now_s)
 
     def give_up(self, now_s: float) -> ChargerReading | None:
-        """Time is up: the answer, if it hid behind a false start; else the next request will be another one."""
+        """Time is up: the answer, if it was hidden behind a false start; otherwise the next request will differ."""
         reading = self._take(self._decoder.flush(), now_s)
         if reading is None:
             self._asked_s = None
@@ -98,7 +98,7 @@ class Dialogue:
                 reading = self._reading(frame) or reading
             elif frame.command == Code.ERROR:
                 self._complaint(frame, now_s)
-            # Anything else is an echo of our own frame or an acknowledgement that the document does not have.
+            # Anything else is an echo of our own frame, or an acknowledgement that the document does not mention.
         return reading
 
     def _reading(self, frame: Frame) -> ChargerReading | None:
@@ -118,6 +118,6 @@ class Dialogue:
         try:
             self.error_bits = int(parse_error(frame).bits)
         except ProtocolError:
-            return  # not the form of §3.3.5, so it says nothing
+            return  # not in the form of §3.3.5, so it means nothing
         self.error_t_s = now_s
         self.heard = max(self.heard, Heard.ERROR_FRAME)

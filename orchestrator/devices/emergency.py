@@ -19,7 +19,7 @@ _CLASSES = (  # code, mask, meaning; the narrower ones first
 
 
 def emergency_cob_id(node_id: int) -> int:
-    """EMCY frames of this node."""
+    """The COB-ID of EMCY frames from this node."""
     return 0x080 + node_id
 
 

@@ -1,4 +1,4 @@
-"""How many of a line's exchanges went wrong in the last minute."""
+"""The share of a line's exchanges that failed in the last minute."""
 
 from collections import deque
 
@@ -8,12 +8,12 @@ LEAST = 50
 
 
 class LineQuality:
-    """Counts each poll once: it was answered well, or it was not."""
+    """Counts each poll once, as good or bad."""
 
     __slots__ = ("_bad", "_exchanges")
 
     def __init__(self) -> None:
-        self._exchanges: deque[tuple[float, bool]] = deque()  # (when, went wrong)
+        self._exchanges: deque[tuple[float, bool]] = deque()  # (when, failed)
         self._bad = 0
 
     def count(self, now_s: float, *, bad: bool) -> None:
@@ -25,6 +25,6 @@ class LineQuality:
 
     @property
     def bad_pct(self) -> float:
-        """The share that went wrong; 0 while there are too few."""
+        """The share that failed; 0 while there are too few exchanges."""
         count = len(self._exchanges)
         return round(100 * self._bad / count, 1) if count >= LEAST else 0.0

@@ -1,20 +1,20 @@
-"""Whether the frames of one node id look like those of one healthy node."""
+"""Judges whether the frames with one node id look like those of a single healthy node."""
 
 from orchestrator.devices.sdo_client import Verdict
 from orchestrator.model import Cause
 
-BABBLE_HZ = 500  #: frames a second; a node that is read as fast as allowed sends a tenth of that
-#: Second answers are added up, answers as they should be taken off: with a second node on the id every exchange has
-#: one too many, and the sum climbs; one frame that the bus repeated falls off again.
+BABBLE_HZ = 500  #: frames per second; a node that is read as fast as allowed sends a tenth of that
+#: Second answers add to a sum, proper answers subtract: with a second node on the id every exchange has one too many,
+#: and the sum climbs; a single frame repeated by the bus fades again.
 _STRAY, _CLEAN, _DOUBLED, _MOST = 2, 1, 6, 8
 
 
-#: Answers that another master explains.
+#: Answers explained by another master.
 NOT_OURS = (Verdict.THEIRS, Verdict.FRAGMENT, Verdict.UNCLEAR)
 
 
 class NodeHealth:
-    """Counts what is odd about a node."""
+    """Counts a node's irregularities."""
 
     __slots__ = ("_babbling", "_doubled", "_frames", "_last", "_strays", "_why", "_window_s")
 
@@ -36,7 +36,7 @@ class NodeHealth:
             self._frames, self._window_s = 0, now_s
 
     def excuse(self) -> None:
-        """That frame was another master's, or an answer to it: as many as that one likes are no babble."""
+        """That frame was another master's, or an answer to one: those are not babble, however many there are."""
         self._frames -= 1
 
     def answer(self, verdict: Verdict, why: Cause | None = None) -> None:
@@ -60,7 +60,7 @@ class NodeHealth:
         return None
 
     def silence(self, node_id: int, bus: str, timeout_s: float) -> Cause:
-        """The best guess why no answer was accepted for some time."""
+        """The most likely reason that no answer was accepted for some time."""
         if self._last is Verdict.LATE:
             return Cause.of("bmu_late", node_id=node_id, bus=bus, timeout_s=timeout_s)
         if self._last is Verdict.MALFORMED:

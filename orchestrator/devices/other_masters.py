@@ -1,8 +1,8 @@
-"""What other CANopen masters ask one node, so that the answers to it are not taken for something wrong.
+"""Tracks other CANopen masters' requests to one node, so that the answers to them are not mistaken for errors.
 
-The bus is shared: a service tool, a vehicle's controller or a second gateway may read and write the same BMU. Whatever
-they ask is heard on the bus before its answer is. Each of their requests explains one answer; a transfer of many frames
-explains them all. A node answers in the order of the requests, so an answer also ends what was asked before it.
+The bus is shared: a service tool, a vehicle's controller or a second gateway may read and write the same BMU. Each of
+their requests is seen on the bus before its answer, and explains one answer; a transfer of many frames explains them
+all. A node answers in the order of the requests, so an answer also closes the requests before it.
 """
 
 from collections import deque
@@ -15,17 +15,17 @@ from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NmtCommand, SdoAbort, SdoMalformed, SdoReply, SdoWritten
 from orchestrator.protocol.sdo_others import Ask, Part, SdoRequest, parse_part, parse_request, segment_number
 
-FORGET_S = 2.0  #: what was not answered for so long is not answered any more
-#: Between two masters the order of requests is only known to this: ours may have waited in a queue when theirs came.
+FORGET_S = 2.0  #: a request unanswered for this long stays unanswered
+#: The uncertainty of the request order between two masters: ours may have been queued when theirs arrived.
 ORDER_S = 0.05
-TRANSFER_S = 0.2  #: a longer transfer that stood still for so long has ended
-#: How long a request of ours lets a request, or a longer transfer, of others go first. Many nodes have room for one.
+TRANSFER_S = 0.2  #: a longer transfer that stalls for this long has ended
+#: How long our request lets others' requests, or a longer transfer, go first. Many nodes handle only one at a time.
 POLITE_S, POLITE_TRANSFER_S = 0.05, 0.2
-SAY_S = 1.0  #: how often something new is said of them, unless it weighs more
-MOST_OPEN = 256  #: requests that are remembered
-_READS, _WRITES, _COMMANDS = range(3)  # how much what they do weighs
-_OUT_OF_STEP = (0x0503, 0x0504)  #: upper half of an abort code: the protocol was not kept, whatever the object is
-_AHEAD = 4  #: segments of a block that may be lost to us alone
+SAY_S = 1.0  #: how often their newest activity is reported, unless it weighs more
+MOST_OPEN = 256  #: remembered requests
+_READS, _WRITES, _COMMANDS = range(3)  # the weight of their activities
+_OUT_OF_STEP = (0x0503, 0x0504)  #: upper half of an abort code: a protocol violation, whatever the object is
+_AHEAD = 4  #: segments of a block that only we may have missed
 
 _DEEDS = {
     Ask.READ: "master_reads", Ask.BLOCK_READ: "master_reads",
@@ -42,21 +42,21 @@ _NMT_DEEDS: Mapping[int, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Open:
-    """A request of theirs that is not answered yet."""
+    """Another master's unanswered request."""
 
     key: Key
     writes: bool
     t_s: float
 
     def fits(self, reply: SdoReply) -> bool:
-        """Whether this may be its answer."""
+        """Whether this may be the answer."""
         if isinstance(reply, SdoMalformed) or (reply.index, reply.sub) != self.key:
             return False
         return isinstance(reply, SdoAbort) or isinstance(reply, SdoWritten) == self.writes
 
 
 class OtherMasters:
-    """What they asked one node, and what they were last seen to do."""
+    """Other masters' requests to one node, and their latest activity."""
 
     __slots__ = (
         "_going",
@@ -77,22 +77,22 @@ class OtherMasters:
         self.said_s = -inf  #: when
         self._weight = _READS
         self._open: deque[Open] = deque(maxlen=MOST_OPEN)
-        self._transfer: Key | None = None  # of their longer transfer
-        self._transfer_s = -inf  # when its newest frame came
-        self._going = False  # they asked for the next frame of a transfer; a node that knows of none aborts, each time
+        self._transfer: Key | None = None  # the object of their longer transfer
+        self._transfer_s = -inf  # when its newest frame arrived
+        self._going = False  # they asked for the next frame of a transfer; a node without one aborts, each time
         self._going_s = -inf
-        self._segment = 0  # the number of the next segment of a block that streams; 0: none does
+        self._segment = 0  # the number of the next segment of a streaming block; 0: none is streaming
         self._writing = False  # a block is being written: their frames are data
-        self._polite_s: float | None = None  # since when a request of ours waits for theirs
+        self._polite_s: float | None = None  # since when our request has been waiting for theirs
 
     @property
     def going(self) -> bool:
-        """Whether they have asked for a frame of a longer transfer lately."""
+        """Whether they have recently asked for a frame of a longer transfer."""
         return self._going
 
     @property
     def transferring(self) -> bool:
-        """Whether a longer transfer of theirs goes on."""
+        """Whether a longer transfer of theirs is in progress."""
         return self._transfer is not None
 
     @property
@@ -101,19 +101,19 @@ class OtherMasters:
         return bool(self._open) or self._going or self._transfer is not None
 
     def clear(self) -> None:
-        """The node booted: nothing is answered any more."""
+        """The node booted: nothing will be answered any more."""
         self._open.clear()
         self._forget_transfer()
 
     def _forget_transfer(self) -> None:
-        """Nothing of a longer transfer comes any more."""
+        """Their longer transfer is over."""
         self._going = False
         self._end()
 
     # --- what they ask --------------------------------------------------------------------------------------------
 
     def asked(self, data: bytes, now_s: float) -> SdoRequest | None:
-        """A request that is not ours came; what it wants, if that can be told."""
+        """Handle another master's request; returns it decoded, if possible."""
         self._age(now_s)
         request = parse_request(data)
         if self._writing and (request is None or request.ask is not Ask.ABORT):
@@ -138,36 +138,36 @@ class OtherMasters:
         return request
 
     def commanded(self, command: int, now_s: float, *, everybody: bool) -> None:
-        """An NMT command that is not ours, to this node or to all."""
+        """Handle another master's NMT command, to this node or to all."""
         deed = _NMT_DEEDS.get(command)
         if deed:
             self._say(Cause.of(deed, whom="all_nodes" if everybody else "this_node"), now_s, _COMMANDS)
 
     def _say(self, said: Cause, now_s: float, weight: int) -> None:
-        """What weighs more is said at once, all else when what was said has stood for SAY_S."""
+        """Report weightier activity at once, and other activity once the last report is SAY_S old."""
         if weight > self._weight or now_s >= self.said_s + SAY_S:
             self.said, self.said_s, self._weight = said, now_s, weight
 
     # --- what is answered -----------------------------------------------------------------------------------------
 
     def owner(self, reply: SdoReply) -> Open | None:
-        """Their oldest request that this may be the answer to."""
+        """Their oldest request that this may answer."""
         return next((one for one in self._open if one.fits(reply)), None)
 
     def close(self, one: Open) -> None:
-        """That one is answered, and what was asked before it is not answered any more."""
+        """That one is answered, and requests before it will not be answered any more."""
         while self._open and self._open.popleft() is not one:
             pass
         self._end()  # a node has one transfer at a time
 
     def ours_answered(self, asked_s: float) -> None:
-        """An answer to a request of ours came: what they asked well before it is over, and so is their transfer."""
+        """Our request was answered: requests of theirs well before it are over, and so is their transfer."""
         self._end()
         while self._open and self._open[0].t_s < asked_s - ORDER_S:
             self._open.popleft()
 
     def in_transfer(self, data: bytes, now_s: float) -> bool:
-        """Whether this reply is a frame of a longer transfer of theirs; then that goes on, or ends."""
+        """Whether this reply is a frame of their longer transfer, which then continues or ends."""
         self._age(now_s)
         if self._streams(data, now_s):
             return True
@@ -184,14 +184,14 @@ class OtherMasters:
         return True
 
     def breaks_off(self, reply: SdoReply) -> bool:
-        """Whether this abort ends their longer transfer; a node that we asked meanwhile may do that."""
+        """Whether this abort ends their longer transfer; our own request may cause a node to do that."""
         if not isinstance(reply, SdoAbort) or (reply.index, reply.sub) != self._transfer:
             return False
         self._end()
         return True
 
     def out_of_step(self, reply: SdoReply) -> bool:
-        """Whether this abort is for a frame that should have continued a longer transfer; any object may be named."""
+        """Whether this abort answers a frame that should have continued a longer transfer; it may name any object."""
         return self._going and isinstance(reply, SdoAbort) and reply.code >> 16 in _OUT_OF_STEP
 
     def _streams(self, data: bytes, now_s: float) -> bool:
@@ -213,7 +213,7 @@ class OtherMasters:
     # --- whose turn it is -----------------------------------------------------------------------------------------
 
     def wait_until_s(self, now_s: float) -> float:
-        """When a request of ours may go out at last: now, or somewhat later if one of theirs is being answered."""
+        """When our request may go out: now, or somewhat later if one of theirs is being answered."""
         if not self.active:
             self._polite_s = None
             return now_s

@@ -1,4 +1,4 @@
-"""One question to a charger, and what comes back in time."""
+"""One status request to a charger, and the reply, if it comes in time."""
 
 from collections.abc import Callable
 
@@ -6,12 +6,12 @@ from orchestrator.devices.charger_line import ChargerLine
 from orchestrator.devices.dialogue import Dialogue
 from orchestrator.model import ChargerReading
 
-#: The wire takes 20 ms, an FTDI adapter holds the last bytes back for 16 ms; the rest is the charger's.
+#: The wire takes 20 ms, an FTDI adapter holds back the last bytes for 16 ms; the rest is for the charger.
 REPLY_DEADLINE_S = 0.12
 
 
 def poll(line: ChargerLine, dialogue: Dialogue, clock: Callable[[], float]) -> tuple[ChargerReading | None, bytes]:
-    """Ask for the status. The reading, None where none came; and all bytes that went to and fro."""
+    """Request the status. Returns the reading, None if none came, and all bytes exchanged."""
     asked_s = now_s = clock()
     request = exchange = dialogue.ask(asked_s)
     line.write(request)

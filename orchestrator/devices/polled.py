@@ -1,4 +1,4 @@
-"""One object of a BMU that is read again and again, and what came of it last."""
+"""One object of a BMU that is read periodically, and its latest value."""
 
 from collections.abc import Mapping
 from math import inf
@@ -14,9 +14,9 @@ Fields = Mapping[str, Decoded]
 
 #: SDO and TPDO are two samples of one quantity, up to a second apart: they may differ by this share of its range …
 TOLERANCE = 0.05
-#: … and have to differ more in so many SDO reads, a second apart, before neither is believed …
+#: … and must differ by more in this many SDO reads, a second apart, before neither is believed …
 CONFLICTS = 2
-#: … of which each that agrees takes this much away: a sender that lies every other time is found out as well.
+#: … while each agreement subtracts this much: a sender that lies every other time is also detected.
 AGREED = 0.25
 
 
@@ -31,23 +31,23 @@ class Polled:
         self.forget(due_s=-inf)
 
     def forget(self, due_s: float) -> None:
-        """The node booted: what it said before counts no more."""
-        self.due_s = due_s  #: when it is to be read next
-        self.abort: SdoAbort | None = None  #: set while the node refuses to have it read
-        self.tpdo_t_s = -inf  #: when a TPDO brought it last
-        self.conflict: dict[str, Decoded] = {}  #: fields of which SDO and TPDO tell different stories
+        """The node booted: its earlier values no longer count."""
+        self.due_s = due_s  #: when to read it next
+        self.abort: SdoAbort | None = None  #: set while the node refuses reads of it
+        self.tpdo_t_s = -inf  #: when a TPDO last carried it
+        self.conflict: dict[str, Decoded] = {}  #: fields in which SDO and TPDO disagree
         self.answers = TwoAnswers(self.entry)
         self._tpdo_fields: Fields = {}
         self._differed = 0.0
 
     def from_tpdo(self, word: int, now_s: float) -> Fields:
-        """The fields, from the object's word in a TPDO that came at `now_s`."""
+        """The fields, from the object's word in a TPDO received at `now_s`."""
         fields = decode_word(self.entry, word, self.entry.size, now_s)
         self.tpdo_t_s, self._tpdo_fields = now_s, fields
         return self._doubted(fields, now_s)
 
     def from_sdo(self, reply: SdoValue, asked_s: float) -> Fields:
-        """The fields, from an SDO answer to the request of `asked_s`. Where TPDOs bring them, too, both must agree."""
+        """The fields, from an SDO answer to the request of `asked_s`. If TPDOs carry them as well, both must agree."""
         self.abort = None
         self.answers.took(reply, asked_s)
         fields = decode_word(self.entry, reply.value, reply.size, asked_s)
@@ -59,7 +59,7 @@ class Polled:
         return self._doubted(fields, asked_s)
 
     def _doubted(self, fields: Fields, now_s: float) -> Fields:
-        """The fields, with the reasons not to believe some of them."""
+        """The fields, with implausible ones replaced by the reasons."""
         doubts = self.answers.doubts(now_s)
         return {**fields, **self.conflict, **doubts} if self.conflict or doubts else fields
 

@@ -1,4 +1,4 @@
-"""Which request goes to a BMU next, and when: one at a time, as the bus's budget and other masters allow."""
+"""Decides which request goes to a BMU next, and when: one at a time, as the bus's budget and other masters allow."""
 
 from collections.abc import Callable
 from math import inf
@@ -13,11 +13,11 @@ from orchestrator.protocol.sdo import NMT_COB_ID, NmtCommand, nmt_frame, read_re
 
 Send = Callable[[int, bytes], None]
 
-SILENT_S = 0.5  #: pause between requests to a node that is not online: it shall not cost the others' time
+SILENT_S = 0.5  #: pause between requests to a node that is not online, so that it does not take the others' time
 
 
 class Requester:
-    """Asks one BMU for its objects, sets its timers and starts it. Belongs to the thread of its bus."""
+    """Reads one BMU's objects, sets its timers and starts it. Belongs to the thread of its bus."""
 
     __slots__ = ("_budget", "_client", "_node_id", "_not_before_s", "_others", "_plan", "_setup", "_slot_s")
 
@@ -33,22 +33,22 @@ class Requester:
     ) -> None:
         self._node_id, self._budget = node_id, budget
         self._plan, self._client, self._setup, self._others = plan, client, setup, others
-        self._not_before_s = -inf  # when a silent node may be asked again
-        self._slot_s: float | None = None  # when the bus's budget lets the next request go out, if that is reserved
+        self._not_before_s = -inf  # when a silent node may be queried again
+        self._slot_s: float | None = None  # when the bus's budget lets the next request go out, if reserved
 
     def hurry(self) -> None:
-        """The node answers, or has just booted: it is not kept waiting."""
+        """The node answers, or has just booted: do not wait any longer."""
         self._not_before_s = -inf
 
     def fail(self, now_s: float) -> float:
-        """What was asked is lost; when the node may be asked again."""
+        """The request is lost; returns when the node may be queried again."""
         self._client.drop()
         self._slot_s = None
         self._not_before_s = now_s + SILENT_S
         return self._not_before_s
 
     def ask(self, now_s: float, send: Send, *, online: bool) -> float:
-        """Send the next request if one is due, and return when to come here again."""
+        """Send the next request if one is due, and return when to call this again."""
         if now_s < self._not_before_s:
             return self._not_before_s
         if self._setup.start_due:

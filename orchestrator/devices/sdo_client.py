@@ -1,10 +1,10 @@
-"""One node's SDO exchanges, so that no answer is ever taken for one to another request.
+"""One node's SDO exchanges: ensures that no answer is taken for the answer to another request.
 
-SDO answers carry no number: a late one to an earlier read of the same object looks like a fresh one. What helps is that
-a node answers in the order of the requests. So an object that was asked for stays *suspect*, whatever came of it, until
-an answer to a request made after it shows that nothing of it can come any more; a suspect object is not asked again. In
-a round of several objects this costs nothing. A node that answers nothing makes all its objects suspect; then QUIET_S
-without a request clears them, which is right for any node that answers within its time-out plus QUIET_S, or never.
+SDO answers carry no sequence number: a late answer to an earlier read of the same object looks like a fresh one.
+However, a node answers in the order of the requests. So a requested object stays *suspect* until a reply to a later
+request proves that its own reply can no longer arrive; a suspect object is not requested again. In a round of several
+objects this costs nothing. A node that answers nothing makes all its objects suspect; then QUIET_S without a request
+clears them, which is correct for any node that answers within its time-out plus QUIET_S, or never.
 """
 
 from enum import Enum, auto
@@ -13,44 +13,44 @@ from orchestrator.protocol.sdo import SdoAbort, SdoMalformed, SdoReply, SdoWritt
 
 Key = tuple[int, int]  #: index and sub-index
 
-#: Reasons to refuse that only a write can have (CiA 301, table 22).
+#: Abort codes that only a write can cause (CiA 301, table 22).
 WRITE_ABORTS = frozenset({0x06010002, 0x06070010, 0x06070012, 0x06070013, 0x06090030, 0x06090031, 0x06090032})
 
-HURRY_S = 0.05  #: what a node needs for an answer once nothing else is to be answered
-QUIET_S = 1.0  #: far longer than a node that means to answer at all takes
+HURRY_S = 0.05  #: how long a node takes to answer once nothing else is pending
+QUIET_S = 1.0  #: far longer than any node takes that answers at all
 
 
 class Verdict(Enum):
-    """What an answer is worth."""
+    """The classification of an answer."""
 
-    ACCEPTED = auto()  #: it belongs to the request in flight, which is over
-    LATE = auto()  #: to an earlier one, which had timed out
-    SECOND = auto()  #: one more answer to a request that has one (`first`): a second node with this id, or a forger
-    STRAY = auto()  #: to no request of ours, or not of its kind: as above
-    THEIRS = auto()  #: to another master
-    FRAGMENT = auto()  #: a frame of a longer transfer of another master, whatever it looks like
-    UNCLEAR = auto()  #: to us or to another master: nobody can tell, and ours is given up
-    MALFORMED = auto()  #: not an answer that we understand
+    ACCEPTED = auto()  #: it answers the request in flight, which is then over
+    LATE = auto()  #: it answers an earlier request, which had timed out
+    SECOND = auto()  #: another answer to an answered request (`first`): a second node with this id, or a forger
+    STRAY = auto()  #: it answers no request of ours, or is of the wrong kind: as above
+    THEIRS = auto()  #: it answers another master
+    FRAGMENT = auto()  #: a frame of another master's longer transfer, whatever it looks like
+    UNCLEAR = auto()  #: it may be for us or for another master: ours is given up
+    MALFORMED = auto()  #: an answer that we do not understand
 
 
 class SdoClient:
-    """At most one request in flight; the frames themselves are the caller's."""
+    """At most one request in flight; the caller handles the frames themselves."""
 
     __slots__ = ("_answers", "_timeout_s", "asked_s", "deadline_s", "first", "pending", "quiet_s", "writing")
 
     def __init__(self, timeout_s: float) -> None:
         self._timeout_s = timeout_s
-        # The suspect objects in the order of their requests, and the first answer that came to each.
+        # The suspect objects in the order of their requests, and the first answer to each.
         self._answers: dict[Key, SdoReply | None] = {}
-        self.first: SdoReply | None = None  #: what had been answered before, when `take()` says SECOND
+        self.first: SdoReply | None = None  #: the earlier answer, if `take()` returns SECOND
         self.pending: Key | None = None
         self.writing = False  #: whether the newest request is a write
         self.asked_s = 0.0  #: when the newest request was made
-        self.deadline_s = 0.0  #: when it is given up
-        self.quiet_s = 0.0  #: when the suspects may be cleared if nothing is asked or answered until then
+        self.deadline_s = 0.0  #: when it will be given up
+        self.quiet_s = 0.0  #: when the suspects may be cleared, if nothing is requested or answered until then
 
     def may_ask(self, key: Key) -> bool:
-        """Nothing in flight, and no answer to an earlier request for this object can come."""
+        """Nothing is in flight, and no answer to an earlier request for this object can arrive."""
         return self.pending is None and key not in self._answers
 
     def ask(self, key: Key, now_s: float, *, write: bool = False) -> None:
@@ -62,27 +62,27 @@ class SdoClient:
         self.quiet_s = self.deadline_s + QUIET_S
 
     def expire(self, now_s: float) -> bool:
-        """Give the request in flight up if its time is over; True if that happened."""
+        """Give up the request in flight if its time is over; True if that happened."""
         if self.pending is None or now_s < self.deadline_s:
             return False
         self.pending = None
         return True
 
     def hurry(self, now_s: float) -> None:
-        """Give the request in flight up soon: the node was busy with another master's transfer and may have lost it."""
+        """Give up the request in flight soon: the node was busy with another master's transfer and may have lost it."""
         self.deadline_s = min(self.deadline_s, now_s + HURRY_S)
 
     def drop(self) -> None:
-        """Give the request in flight up: the bus broke. Its answer may still come."""
+        """Give up the request in flight: the bus broke. Its answer may still arrive."""
         self.pending = None
 
     def clear(self) -> None:
-        """Nothing of any earlier request can come: the node booted, or was quiet until `quiet_s`."""
+        """No answer to an earlier request can arrive: the node booted, or was quiet until `quiet_s`."""
         self.pending = None
         self._answers.clear()
 
     def take(self, reply: SdoReply, now_s: float) -> Verdict:
-        """What this answer is worth. Afterwards nothing that was asked before its request is suspect any more."""
+        """Classify this answer. Afterwards no object requested before it is suspect any more."""
         self.quiet_s = max(self.quiet_s, now_s + QUIET_S)
         if isinstance(reply, SdoMalformed):
             return Verdict.MALFORMED
@@ -111,8 +111,8 @@ class SdoClient:
         return not self._is_other_kind(self.pending, reply)
 
     def _is_other_kind(self, key: Key, reply: SdoReply) -> bool:
-        """A value where the object is being written, or the other way round: somebody else's. So is a refusal to have
-        it written where it is read."""
+        """Whether it is a value although the object is being written, or the reverse: then it is somebody else's. So is
+        the refusal of a write while we are reading."""
         if key != self.pending:
             return False
         if isinstance(reply, SdoAbort):

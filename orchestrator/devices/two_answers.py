@@ -1,8 +1,8 @@
-"""Two answers to one request: when they differ, none of them is believed (FAULTS B26).
+"""Two answers to one request: if they differ, neither is believed (FAULTS B26).
 
-A BMU answers once. A second answer comes from a second node with its id, or from something that forges answers, and
-nothing on the wire says which of the two is the BMU's, whichever came first. Answers to other masters are no matter of
-this module: they are compared only where they differ by more than any battery changes within the time between.
+A BMU answers once. A second answer comes from a second node with the same id, or from a forger, and nothing on the wire
+shows which of the two is the BMU's, whichever came first. Answers to other masters are legitimate: they count only if
+they differ by more than any battery changes in the time between.
 """
 
 from math import inf
@@ -13,21 +13,21 @@ from orchestrator.protocol.objects import FieldMap, ObjectEntry
 from orchestrator.protocol.sdo import SdoReply, SdoValue
 from orchestrator.protocol.words import Decoded, decode_word
 
-#: Answers to one request are the same, or measured milliseconds apart where a request of another master was lost to
-#: us: they may differ by this share of a field's range.
+#: Answers to one request are the same, or measured milliseconds apart if we missed another master's request: they may
+#: differ by this share of a field's range.
 ONE_REQUEST = 0.002
-#: One that nobody asked for is held against the newest that we asked for, up to this old, and may differ by this share.
+#: An unrequested answer is compared with our newest one, up to this old, and may differ by this share.
 UNASKED, UNASKED_S = 0.02, 2.0
-#: The same for one that another master asked for.
+#: The same for an answer requested by another master.
 OTHERS, OTHERS_S = 0.05, 0.3
-#: These do not change by so much within that time. Amperes, status bits and minutes may.
+#: These do not change by that much in that time. Amperes, status bits and minutes may.
 STEADY = frozenset({"voltage_v", "temperature_c", "soc_pct", "soh_pct", "remaining_ah", "available_wh"})
-#: Nothing that is read is believed for this long after two answers that differ.
+#: After two differing answers, no value of the object is believed for this long.
 DOUBT_S = 10.0
 
 
 class TwoAnswers:
-    """The newest answer to a request for one object, and the doubts that others have left."""
+    """The newest answer to a request for one object, and the doubts raised by others."""
 
     __slots__ = ("_doubts", "_doubts_s", "_entry", "_newest", "_newest_s")
 
@@ -39,7 +39,7 @@ class TwoAnswers:
         self._doubts_s = -inf
 
     def took(self, reply: SdoValue, asked_s: float) -> None:
-        """This one was taken for the answer to a request of `asked_s`."""
+        """This one was accepted as the answer to a request of `asked_s`."""
         self._newest, self._newest_s = reply, asked_s
 
     def doubts(self, now_s: float) -> dict[str, Cause]:
@@ -49,7 +49,7 @@ class TwoAnswers:
         return self._doubts
 
     def second(self, first: SdoReply, second: SdoReply, now_s: float, share: float = ONE_REQUEST) -> dict[str, Cause]:
-        """Two answers to one request came; the doubts of which they are the reason."""
+        """Compare two answers to one request; returns the resulting doubts."""
         words = _fields(self._entry, first), _fields(self._entry, second)
         fields = [field for field in self._entry.fields if share == ONE_REQUEST or field.name in STEADY]
         apart = [field.name for field in fields if _apart(field, *words, share)]
@@ -65,7 +65,7 @@ class TwoAnswers:
         return self._doubts
 
     def other(self, verdict: Verdict, first: SdoReply | None, reply: SdoReply, now_s: float) -> dict[str, Cause]:
-        """An answer came that was not taken; the doubts that it leaves. `first`: the one before, if it is a second."""
+        """Handle a rejected answer; returns the resulting doubts. `first`: the earlier answer, if this is a second."""
         if verdict is Verdict.SECOND and first is not None:
             return self.second(first, reply, now_s)
         if verdict is Verdict.STRAY:

@@ -1,4 +1,4 @@
-"""Whose an SDO answer is: ours, another master's, nobody's, or one of which that cannot be told (FAULTS B27)."""
+"""Decides whose an SDO answer is: ours, another master's, nobody's, or unclear (FAULTS B27)."""
 
 from orchestrator.devices.other_masters import OtherMasters
 from orchestrator.devices.sdo_client import SdoClient, Verdict
@@ -6,11 +6,11 @@ from orchestrator.protocol.sdo import SdoMalformed, SdoReply, SdoValue
 
 
 def whose_answer(reply: SdoReply, data: bytes, client: SdoClient, others: OtherMasters, now_s: float) -> Verdict:
-    """The verdict on the reply that `data` holds. Where it cannot be told, our request is given up.
+    """The verdict on the reply in `data`. If it is unclear, our request is given up.
 
-    A value is the node's own word, whoever asked for it: it is taken, and is as old as the older of both requests. A
-    refusal or a confirmation means something else for whom it is not meant for, and a node that breaks off a longer
-    transfer of another master because of our request does not answer ours.
+    A value is the node's own, whoever asked for it: it is accepted, and as old as the older of both requests. A refusal
+    or a confirmation would mislead anybody but its addressee, and a node that aborts another master's longer transfer
+    because of our request does not answer ours.
     """
     if not others.active:
         return client.take(reply, now_s)

@@ -1,1 +1,1 @@
-"""What stops a charger when all else has failed: the guardian and `estop`. Standard library and one frame."""
+"""Stops chargers when all else has failed: the guardian and `estop`. Standard library and one frame."""

@@ -1,4 +1,4 @@
-"""One question to a running service, over its control socket: one JSON object a line, out and in."""
+"""One request to a running service over its control socket: one JSON object per line, out and in."""
 
 import json
 import pwd
@@ -10,14 +10,14 @@ from time import monotonic
 
 from orchestrator.errors import NoServiceError, ServiceError
 
-#: More than any service says.
+#: More than any service sends.
 MAX_ANSWER = 32 * 1024 * 1024
 
 
 def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> dict[str, object]:
     """Send one request to a running service and return its answer, all within `timeout_s`.
 
-    Raises NoServiceError where no service answers, ServiceError where the answer is no.
+    Raises NoServiceError if no service answers, ServiceError if the answer is no.
     """
     end_s = monotonic() + timeout_s
     try:
@@ -38,7 +38,7 @@ def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> di
 
 
 def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object:
-    """The answer of whoever listens there. A client that a busy machine kept waiting is hung up on: it asks again."""
+    """The answer of whoever listens there. On a busy machine the service may hang up on a waiting client: ask again."""
     while True:
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
@@ -51,7 +51,7 @@ def _exchange(path: Path, request: Mapping[str, object], end_s: float) -> object
 
 
 def _connect(client: socket.socket, path: Path, timeout_s: float) -> None:
-    """Connect; where too many clients wait already, wait in the kernel's own queue, where nobody is passed over."""
+    """Connect; if too many clients are waiting already, queue in the kernel, which serves them in order."""
     whole_s, part_s = divmod(timeout_s, 1.0)
     client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, struct.pack("ll", int(whole_s), max(int(part_s * 1e6), 1)))
     try:
@@ -61,7 +61,7 @@ def _connect(client: socket.socket, path: Path, timeout_s: float) -> None:
 
 
 def _read_line(client: socket.socket, end_s: float) -> bytes:
-    """One line; its time is up for the whole of it, also against one who answers byte for byte."""
+    """One line; the deadline covers all of it, even if the answer drips in byte by byte."""
     data = bytearray()
     while not data.endswith(b"\n"):
         client.settimeout(max(end_s - monotonic(), 0.001))
@@ -73,7 +73,7 @@ def _read_line(client: socket.socket, end_s: float) -> bytes:
 
 
 def _owner(path: Path) -> str:
-    """Whose socket this is, for people; the folder may not even let us look."""
+    """The socket's owner, for people; the directory may not even let us look."""
     try:
         return f"its owner, {pwd.getpwuid(path.stat().st_uid).pw_name},"
     except (OSError, KeyError):

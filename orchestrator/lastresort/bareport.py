@@ -1,4 +1,4 @@
-"""A charger's port on a bare file descriptor: opened for a stop, written to without waiting. Standard library only."""
+"""A charger's port on a bare file descriptor: opened for a stop, written without blocking. Standard library only."""
 
 import fcntl
 import os
@@ -12,14 +12,14 @@ HELD = "left alone: a service holds this port"
 
 
 def open_port(name: str, *, leave_held: bool) -> int:
-    """Open a charger's port for stopping: without waiting, and with its settings; the descriptor.
+    """Open a charger's port for stopping, without blocking and with the right settings; returns the descriptor.
 
-    `leave_held`: only if no orchestrator holds it, by the lock that one puts on it; then it is held. Anybody else's
-    lock keeps no stop away. OSError says why not.
+    `leave_held`: only if no orchestrator has locked it; it is then locked for us. Anybody else's lock blocks no stop.
+    OSError says why the port could not be opened.
     """
     try:
         fd = os.open(name, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    except ValueError:  # a 0, or half a character: a dying controller may say anything
+    except ValueError:  # a NUL, or a lone surrogate: a dying controller may send anything
         raise OSError("not the name of a port") from None
     try:
         line_settings.take_back(fd)  # with another line discipline a serial port may not look like one
@@ -29,7 +29,7 @@ def open_port(name: str, *, leave_held: bool) -> int:
             _lock(fd, name)
         line_settings.restore(fd)
     except termios.error:
-        return fd  # its settings may be right all the same
+        return fd  # its settings may still be right
     except OSError:
         os.close(fd)
         raise
@@ -40,19 +40,19 @@ def _lock(fd: int, name: str) -> None:
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        if holder(name, (os.getpid(),)).ours:  # we have it open ourselves, and hold nothing
+        if holder(name, (os.getpid(),)).ours:  # our own process has it open, but does not hold the lock
             raise OSError(HELD) from None
 
 
 def drop_port(fd: int) -> None:
-    """Close a port that is given up. What it has not sent is dropped: close() would wait for a line that is stalled."""
+    """Close a port that is given up. Unsent output is dropped: close() would wait for a stalled line."""
     flush(fd, termios.TCOFLUSH)
     with suppress(OSError):
         os.close(fd)
 
 
 def takes(fd: int, frame: bytes) -> bool:
-    """Whether a line has taken the whole frame."""
+    """Write a frame; whether the line took all of it."""
     try:
         return os.write(fd, frame) == len(frame)
     except BlockingIOError:
@@ -60,6 +60,6 @@ def takes(fd: int, frame: bytes) -> bool:
 
 
 def flush(fd: int, queue: int) -> None:
-    """Drop what is in one of its queues."""
-    with suppress(termios.error):  # gone; the next use of it will tell
+    """Drop the content of one of its queues."""
+    with suppress(termios.error):  # gone; its next use will show that
         termios.tcflush(fd, queue)

@@ -1,16 +1,16 @@
-"""Where fewer files may be open than there are ports, these take turns. Standard library only."""
+"""If fewer files may be open than there are ports, the ports take turns. Standard library only."""
 
 import os
 import threading
 
-#: Left for everything but ports: libraries, sockets, the kernel's lists.
+#: Descriptors reserved for everything but ports: libraries, sockets, the kernel's lists.
 RESERVE = 7
-#: With so many there are enough for any station.
+#: This many are enough for any station.
 PLENTY = 512
 
 
 def room() -> int:
-    """How many ports can be open at once, after what may be raised of the limit was raised."""
+    """How many ports can be open at once, after raising the limit as far as permitted."""
     limit = os.sysconf("SC_OPEN_MAX")
     if limit < PLENTY:
         limit = raised(limit)
@@ -20,8 +20,8 @@ def room() -> int:
 
 
 def raised(limit: int) -> int:
-    """The limit once it was raised as far as may be."""
-    import resource  # noqa: PLC0415 - a library of its own, for the rare case
+    """The limit, raised as far as permitted."""
+    import resource  # noqa: PLC0415 - needed only in this rare case
 
     hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     try:
@@ -49,5 +49,5 @@ class Turns:
 
     @property
     def crowded(self) -> bool:
-        """Whether some have to wait: then each is stopped first, and verified when its turn comes again."""
+        """Whether some ports must wait: then every charger is stopped first, and verified at its port's next turn."""
         return self.ports > self.at_once

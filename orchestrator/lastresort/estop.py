@@ -1,7 +1,7 @@
-"""`orchestrator estop`: stop chargers with no service, with one that hangs and with one that runs.
+"""`orchestrator estop`: stops chargers without a service, or beside one that hangs or runs.
 
-Ports are opened without the lock that a service holds on them, each by a thread of its own, and the first stops go out
-before anything else is looked at. Standard library only, and PyYAML where a station file has to be read.
+Each port is opened by its own thread, ignoring the lock that a service holds, and the first stops go out before
+anything else happens. Standard library only, plus PyYAML if a station file has to be read.
 """
 
 import os
@@ -18,23 +18,23 @@ from orchestrator.lastresort.estop_options import USAGE, Options
 from orchestrator.lastresort.laststop import LastStop
 
 Contactor = tuple[str, int, bool]  #: chip, line, active low
-#: A contactor's driver that has not answered by the end, and a moment more, hangs.
+#: A contactor's driver that has not answered this long after the end hangs.
 OPEN_S = 0.5
 UNTOLD = "a service that holds a port could not be told: it may start its chargers again"
 HURRIED = "interrupted: every charger was sent its stop, but not each was given the time to prove it: run this again"
 LOST = "every charger that was found is told of here, but it may have named more, and those may run"
-#: How long the proof of standby is waited for, and a service's answer.
+#: How long to wait for the proof of standby, and for a service's answer.
 VERIFY_S = 3.0
-#: A charger that stands by is watched for this long: one that runs again was not stopped.
+#: How long a charger in standby is watched: one that runs again was not stopped.
 WATCH_S = 1.0
-#: Who reads what is told may keep it waiting for this long.
+#: How long a slow reader of our output may delay us.
 READER_S = 2.0
-#: What the service has written down is waited for no longer than this: its disk may hang.
+#: How long to wait for the service's files: their disk may hang.
 READ_S = 1.0
 
 
 def main(words: list[str], catch: Callable[[Callable[[], None]], None] = lambda _: None) -> int:
-    """Stop, verify, tell; the exit status. `catch` is given what whoever wants this to end is to call."""
+    """Stop, verify and report; returns the exit status. `catch` receives the function that asks this to end early."""
     if "-h" in words or "--help" in words:
         _say(1, USAGE.rstrip())
         return 0
@@ -51,21 +51,21 @@ def main(words: list[str], catch: Callable[[Callable[[], None]], None] = lambda 
 
 
 class EmergencyStop:
-    """One emergency stop, from the first port to the last word."""
+    """One emergency stop, from the first port to the report."""
 
     def __init__(self, options: Options) -> None:
         self._options, self._socket = options, options.socket
         self._began_s = time.monotonic()
         self._stopping = LastStop(leave_held=options.leave_held, watch_s=WATCH_S, turns=Turns(room()))
-        self._bays: dict[str, str] = {}  # of each port's bay the name, where it has one
-        self._real: dict[str, str] = {}  # a port's real name → the one that it is called by
+        self._bays: dict[str, str] = {}  # by port: the bay's name, if any
+        self._real: dict[str, str] = {}  # a port's real path → the name given for it
         self._contactors: tuple[Contactor, ...] = ()
         self._opened = Contactors()
         self._notes: list[str] = []
-        self._doubts: list[str] = []  # why it is not all, although every charger that is known stands by
+        self._doubts: list[str] = []  # why this may be incomplete, although every known charger is in standby
 
     def stop(self, bays: Mapping[str, str]) -> None:
-        """Stop the chargers on these ports; one that has two names once."""
+        """Stop the chargers on these ports; a port with two names is stopped once."""
         new = {}
         for port, bay in bays.items():
             real = os.path.realpath(port)
@@ -78,11 +78,11 @@ class EmergencyStop:
         self._stopping.stop(dict.fromkeys(new))
 
     def hurry(self) -> None:
-        """Somebody wants this to end: it does once every charger has had its stop, and it tells what it knows."""
+        """End early: as soon as every charger has been sent its stop, with a report of what is known."""
         self._stopping.hurried = True
 
     def by_station(self) -> None:
-        """Stop what a station file names, and what is in hand besides."""
+        """Stop the ports that a station file names, and other ports in hand."""
         journals = self._take_any() if not self._options.stations else [self._take(self._options.stations[0])]
         readings = [threading.Thread(target=self._take_in_hand, args=(name,), daemon=True) for name in journals if name]
         end_s = time.monotonic() + READ_S
@@ -94,7 +94,7 @@ class EmergencyStop:
             self._notes.append("the journal cannot be read in time: ports that it may name besides were not stopped")
 
     def _take_any(self) -> list[str]:
-        """The station file that is meant where none is named; of several that run, all of them."""
+        """Find the station file if none is named; if several services run, take all of theirs."""
         from orchestrator.lastresort.inhand import stations  # noqa: PLC0415 - only where it is needed
 
         for together in stations():
@@ -109,7 +109,7 @@ class EmergencyStop:
         return []
 
     def _take(self, station: str) -> str:
-        """Stop what this file names; the journal's directory. A file with mistakes gives what it can."""
+        """Stop the ports that this file names, as far as it can be read; returns the journal's directory."""
         from pathlib import Path  # noqa: PLC0415 - only where it is needed
 
         from orchestrator.config.ports import wiring  # noqa: PLC0415 - PyYAML
@@ -132,7 +132,7 @@ class EmergencyStop:
         self.stop(ports_in_hand(journal))
 
     def finish(self) -> int:
-        """Verify all of them, with whatever help there is, and tell what became of each; the exit status."""
+        """Verify all of them, with whatever help is available, and report each result; returns the exit status."""
         if not self._bays:
             return self._without_ports()
         if self._options.leave_held:
@@ -145,7 +145,7 @@ class EmergencyStop:
         return self._tell(whys)
 
     def _without_ports(self) -> int:
-        """A service that runs may know what the station file does not say any more: it is to stop all it has."""
+        """Have a running service stop all its bays: it may know ports that the station file no longer names."""
         if self._socket and not self._options.leave_held:
             self._with_services()
         for note in self._notes + self._doubts:
@@ -154,7 +154,7 @@ class EmergencyStop:
         return 1
 
     def _with_services(self) -> dict[str, str]:
-        """Tell the services, and verify with what they see."""
+        """Notify the services, and verify with their readings."""
         try:
             from orchestrator.lastresort.running_service import Services  # noqa: PLC0415 - the first stops are out now
         except OSError as error:
@@ -172,12 +172,12 @@ class EmergencyStop:
         return whys
 
     def _isolate(self) -> None:
-        """Open the contactors, each in its own time."""
+        """Open the contactors, independently of each other."""
         for contactor in self._contactors:
             self._opened.open(contactor, partial(_open, contactor))
 
     def _tell(self, whys: Mapping[str, str]) -> int:
-        """First what to do."""
+        """Report the results, what to do first; returns the exit status."""
         names = {port: f"{bay} ({port})" if (bay := self._bays[port]) else port for port in whys}
         running = [names[port] for port, why in whys.items() if why not in ("", HELD)]
         lines = [f"CUT THE MAINS of {', '.join(running)}: nothing proves that they stand by"] if running else []
@@ -201,7 +201,7 @@ def _open(contactor: Contactor) -> str:
 
 
 def _say(fd: int, text: str) -> None:
-    """A terminal that cannot show a character, stands still or is gone must not change how this ends."""
+    """Print; a terminal that lacks a character, is stopped or gone must not change the outcome."""
     from orchestrator.lastresort.notify import put  # noqa: PLC0415 - the first stops are out now
 
     stream = sys.stdout if fd == 1 else sys.stderr

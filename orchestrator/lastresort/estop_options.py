@@ -1,30 +1,30 @@
-"""The words behind `orchestrator estop`."""
+"""The options of `orchestrator estop`."""
 
 import os
 
 USAGE = """\
 usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held]
 
-Stop the charger on every port of the station file, and on the given ports, and verify it. Without arguments the file is
-station.yaml in this folder, else that of the installed service, else that of a service that runs. Ports whose chargers
-may be running by what the service has written down are stopped, too, whether the file still names them or not.
-Needs no running service. Each one that holds one of these ports is told to hold its bays until an operator starts them.
-Then the station file's contactors are opened. Those that a service holds are left to it: it opens them by itself
-where a charger does not obey.
+Stop the charger on every port of the station file, and on the given ports, and verify the stops. Without arguments the
+file is station.yaml in this directory, else the installed service's, else that of a running service. Ports whose
+chargers may be running according to the service's persisted state are stopped as well, even if the file no longer names
+them. Needs no running service. A service that holds one of these ports is told to hold its bays until an operator
+starts them. Then the station file's contactors are opened. Those held by a service are left to it: it opens them by
+itself if a charger does not obey.
 
-  --port PATH ...  these ports: without a station file, or besides those of the one that is named
-  --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or what the station file says)
-  --leave-held     leave ports alone that a running service holds, and tell it nothing
+  --port PATH ...  these ports: without a station file, or in addition to those of the named one
+  --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or the station file's)
+  --leave-held     leave alone ports that a running service holds, and tell it nothing
 
-Exit status 0: every charger was verified to stand by; 1: not every one, or there may be more; 2: used wrongly.
+Exit status 0: every charger was verified in standby; 1: not every one, or there may be more; 2: usage error.
 """
-#: What systemd says to ExecStopPost= (systemd.exec, $SERVICE_RESULT) when its watchdog has killed the guardian: who
-#: still holds the ports is its controller, frozen as well, and is killed only afterwards.
+#: systemd's $SERVICE_RESULT for ExecStopPost= (systemd.exec) if its watchdog has killed the guardian: the ports are
+#: then still held by the controller, which is frozen as well, and is killed only afterwards.
 FROZEN = "watchdog"
 
 
 class Options:
-    """The command line, taken apart by hand: argparse alone would cost half of the time there is."""
+    """The command line, parsed by hand: argparse alone would take half of the time budget."""
 
     def __init__(self, words: list[str]) -> None:
         self.ports: list[str] = []

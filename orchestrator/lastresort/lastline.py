@@ -1,13 +1,13 @@
-"""One charger's line in the hands of a process of last resort: stopped, asked and watched by a thread of its own.
+"""One charger's line in a last-resort process: stopped, queried and watched by its own thread.
 
 Theory of operation. In rounds of half a second the charger is sent the stop twice, then operation 0, then a question.
-Twice, because a controller that died in mid-frame may have left half a frame in a charger's decoder, which then
-swallows the first stop. The first byte goes out before anything is asked of the port; were its settings somebody
-else's, they are set right and the stop is written again. Two answers in a row that show standby are the proof; then the
-charger is only asked, and if it runs again it is stopped again. A port that fails is closed, and opened by its name.
+Twice, because a controller that died in mid-frame may have left half a frame in the charger's decoder, which then
+swallows the first stop. The first byte goes out before the port is queried in any way; if its settings are wrong, they
+are corrected and the stop is written again. Two consecutive answers that show standby are the proof; from then on the
+charger is only queried, and stopped again if it runs again. A port that fails is closed and reopened by name.
 
-Whatever the port's driver is asked for may take for ever. Then it is this thread that hangs, and nobody waits for it.
-Standard library only, few imports.
+Any call to the port's driver may block for ever. Then only this thread hangs, and nobody waits for it. Standard library
+only, few imports.
 """
 
 import threading
@@ -19,19 +19,19 @@ from orchestrator.lastresort.descriptors import Turns
 from orchestrator.lastresort.lastport import GATHER_S, LastPort
 from orchestrator.protocol.standby import OPERATION_STOP_FRAME, STOP_FRAME
 
-#: What is written when, in seconds from a round's beginning; each frame has left the wire when the next one comes.
+#: The frames of a round, by seconds from its beginning; each frame is off the wire before the next one.
 STOPS: tuple[tuple[float, bytes], ...] = ((0.0, STOP_FRAME), (0.02, STOP_FRAME), (0.04, OPERATION_STOP_FRAME))
-#: Then the charger gets time to obey, and is asked.
+#: By then the charger has had time to obey, and is queried.
 ASK_S = 0.25
 ROUND_S = 0.5
-#: A charger that has shown standby is asked again this often: "200 ms or more is recommended" (protocol 2/2, §2.2.2).
+#: How often a charger in standby is queried again: "200 ms or more is recommended" (protocol 2/2, §2.2.2).
 AGAIN_S = 0.21
-#: So many answers in a row that show standby are a proof: one answer in two may be wrong.
+#: This many consecutive answers that show standby are a proof: a single one may be wrong.
 PROOFS = 2
-#: Where ports take turns, one that has had its own waits for this long before it asks for another.
+#: If ports take turns, a port that has had one waits this long before it asks for another.
 LET_IN_S = 0.02
-#: (name of a port, since when) → (which sample, "" if it shows standby, else why not) of another process that looks
-#: after it; None: nobody does, and the charger has to be asked. Answers at once.
+#: (name of a port, since when) → (which sample, "" if it shows standby, else why not) from another process in charge of
+#: the port; None: there is none, and the charger must be queried. Answers at once.
 Witness = Callable[[str, float], tuple[float, str] | None]
 
 SILENT = "no proof of standby: the charger does not answer"
@@ -41,23 +41,23 @@ HANGS = "the port's driver hangs"
 
 
 class LastLine:
-    """One charger's line and what has become of it; `why` is "" once standby is verified."""
+    """One charger's line and its state; `why` is "" once standby is verified."""
 
     def __init__(
         self, name: str, fd: int | None, witness: Witness, *, leave_held: bool, turns: Turns | None = None
     ) -> None:
         self.name, self.why = name, SILENT
         self.tried = threading.Event()  #: the first stop is out, or could not be written
-        self.shown_s: float | None = None  #: since when every answer has shown standby
+        self.shown_s: float | None = None  #: the time since which every answer has shown standby
         self._port, self._witness, self._turns = LastPort(name, fd, leave_held=leave_held), witness, turns
-        self._stopped_s = 0.0  # when the first stop had been written
+        self._stopped_s = 0.0  # when the first stop was written
         self._begun = False  # the thread has had its first round
         self._proofs, self._sample = 0, 0.0
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
 
     def start(self) -> bool:
-        """Begin; False where there is no thread to be had."""
+        """Start the thread; False if that is impossible."""
         thread = threading.Thread(target=self._run, name=f"stop {self.name}", daemon=True)
         try:
             thread.start()
@@ -67,18 +67,18 @@ class LastLine:
         return True
 
     def first(self) -> None:
-        """Write the first stop, before anything else is asked of the port."""
+        """Write the first stop, before any other use of the port."""
         self._port.never_wait()
         self.write(STOP_FRAME)
         self._stopped_s = time.monotonic()
         self.tried.set()
 
     def end(self) -> None:
-        """Let the thread close the port and end."""
+        """Tell the thread to close the port and end."""
         self._over.set()
 
     def join(self, within_s: float) -> None:
-        """Wait for that; a port whose driver hangs is told."""
+        """Wait for the thread; if it does not end, report that the port's driver hangs."""
         if self._thread is not None:
             self._thread.join(within_s)
             if self._thread.is_alive() and self.why:
@@ -105,11 +105,11 @@ class LastLine:
 
     @property
     def _finished(self) -> bool:
-        """Where ports take turns, one whose charger stands by leaves its place to others."""
+        """Whether to end: if ports take turns, a port whose charger is in standby makes room for others."""
         return self._over.is_set() or self.why == HELD or (self._crowded and not self.why)
 
     def _take_turn(self) -> None:
-        """With the port open for as short as can be: in the first turn only to stop, so that all are stopped soon."""
+        """Keep the port open as briefly as possible: the first turn only stops, so that all chargers stop soon."""
         try:
             first = not self.tried.is_set()
             self._stop()
@@ -117,7 +117,7 @@ class LastLine:
                 self._pause_until(self._stopped_s + at_s)
                 self.write(frame)
             if first:
-                self._pause_until(self._stopped_s + STOPS[-1][0] + GATHER_S)  # what is not sent yet goes with the port
+                self._pause_until(self._stopped_s + STOPS[-1][0] + GATHER_S)  # closing the port drops unsent bytes
                 return
             self._pause_until(time.monotonic() + GATHER_S)
             while not self._finished:
@@ -129,14 +129,14 @@ class LastLine:
             self._fail(f"internal: {error!r}")
 
     def _watch(self) -> None:
-        """Stop it, ask it, and stop it again if it runs again, until that is over, or others need its place."""
+        """Stop it, query it, and stop it again if it runs again, until told to end, or others need the descriptor."""
         while not self._finished and not self._crowded:
             began_s, stood_by = time.monotonic(), bool(self._proofs)
             try:
                 self._round(began_s)
-            except Exception as error:  # noqa: BLE001 - a thread that dies here is a charger that nobody stops
+            except Exception as error:  # noqa: BLE001 - if this thread died, nobody would stop the charger
                 self._fail(f"internal: {error!r}")
-            if self._proofs or not stood_by:  # one that runs again is stopped at once
+            if self._proofs or not stood_by:  # a charger that runs again is stopped at once
                 self._pause_until(began_s + (AGAIN_S if self._proofs else ROUND_S))
 
     def _round(self, began_s: float) -> None:
@@ -163,7 +163,7 @@ class LastLine:
             self._over.wait(left_s)
 
     def _look(self) -> None:
-        """Take another sample of what the charger does."""
+        """Take another sample of the charger's state."""
         seen = self._witness(self.name, self._stopped_s)
         if seen is None:
             standby = self._port.ask()
@@ -177,7 +177,7 @@ class LastLine:
             self._judge("")
 
     def _judge(self, why: str | None) -> None:
-        """Count a sample: "" shows standby, None is silence, which takes no proof away."""
+        """Count a sample: "" shows standby, None is silence, which does not invalidate a proof."""
         if why == "":
             self._proofs += 1
             self.shown_s = self.shown_s or time.monotonic()
@@ -187,7 +187,7 @@ class LastLine:
             self.why = why or self.why
 
     def write(self, frame: bytes) -> None:
-        """Write what the line takes now, on a port that is opened for it if need be."""
+        """Write without blocking, opening the port first if necessary."""
         if not self._port.is_open and self._port.open():
             self.why = SILENT
         if not self._port.write(frame):

@@ -1,4 +1,4 @@
-"""A charger's port in a process of last resort: opened when it is needed, written to without waiting, asked, closed.
+"""A charger's port in a last-resort process: opened on demand, written without blocking, queried, closed.
 
 Standard library only, few imports.
 """
@@ -15,12 +15,12 @@ from orchestrator.lastresort.bareport import drop_port, flush, open_port, takes
 from orchestrator.lastresort.port_owner import holder
 from orchestrator.protocol.standby import ANSWER_BYTES, QUESTION, stands_by
 
-#: An answer takes as long as anywhere else (120 ms), and a bit.
+#: The reply deadline used elsewhere (120 ms), plus a margin.
 ANSWER_S = 0.2
-#: From an answer's first byte to its last, with an adapter's latency: who reads earlier gets pieces, or leaves some to
-#: another process that reads this port.
+#: From an answer's first byte to its last, with an adapter's latency: reading earlier yields fragments, or leaves some
+#: to another process that reads this port.
 GATHER_S = 0.01 + ANSWER_BYTES * 10 / 19200
-#: Of what came in, kept up to this; far more than one answer.
+#: How many received bytes are kept; far more than one answer.
 KEEP = 256
 
 STALLED = "the line takes nothing"
@@ -28,25 +28,25 @@ GONE = "the line is gone"
 
 
 class LastPort:
-    """One port by its name; `trouble` is what went wrong in the last use of it. Never raises for what a port does."""
+    """One port by name; `trouble` says what went wrong in its last use. A failing port never raises."""
 
     def __init__(self, name: str, fd: int | None, *, leave_held: bool) -> None:
         self.name, self.trouble = name, ""
         self._fd, self._leave_held = fd, leave_held
-        self._stalled = False  # since then nothing has come in
+        self._stalled = False  # it took nothing, and no byte has arrived since
 
     @property
     def is_open(self) -> bool:
-        """There is a descriptor."""
+        """Whether there is a descriptor."""
         return self._fd is not None
 
     def never_wait(self) -> None:
-        """For a descriptor of somebody else's, which may be one that waits."""
+        """Make an inherited descriptor non-blocking."""
         if self._fd is not None:
             os.set_blocking(self._fd, False)
 
     def open(self) -> bool:
-        """Open it by its name."""
+        """Open it by name."""
         self.trouble = ""
         try:
             self._fd = open_port(self.name, leave_held=self._leave_held)
@@ -55,7 +55,7 @@ class LastPort:
         return self.is_open
 
     def write(self, frame: bytes) -> bool:
-        """Write what the line takes now. What a full line still holds is dropped: an old order must not come out."""
+        """Write without blocking. If the line is full, its old output is dropped: an old command must not go out."""
         if self._fd is None:
             return False
         self.trouble = ""
@@ -69,13 +69,13 @@ class LastPort:
         return not self.trouble
 
     def restored(self) -> bool:
-        """Whether the port's settings had to be set right."""
-        with suppress(OSError, termios.error):  # gone, or no tty: the next use of it will tell
+        """Whether the port's settings had to be corrected."""
+        with suppress(OSError, termios.error):  # gone, or not a tty: its next use will show that
             return self._fd is not None and bool(line_settings.restore(self._fd))
         return False
 
     def ask(self) -> bool | None:
-        """Whether the charger says that it stands by; None for silence. What came in before it proves nothing."""
+        """Whether the charger reports standby; None for silence. Bytes received before the question prove nothing."""
         heard, end_s = b"", time.monotonic() + ANSWER_S
         if self._fd is not None:
             flush(self._fd, termios.TCIFLUSH)
@@ -114,11 +114,11 @@ class LastPort:
         self.close()
 
     def close(self) -> None:
-        """Close the port. What a stalled line has not taken is dropped, since close() would wait for it."""
+        """Close the port. A stalled line's output is dropped, since close() would wait for it."""
         if self._fd is not None:
             fd, self._fd = self._fd, None
             if self._stalled:
                 drop_port(fd)
                 return
-            with suppress(OSError):  # it is closed, whatever its driver says to that
+            with suppress(OSError):  # it is closed anyway
                 os.close(fd)

@@ -1,9 +1,9 @@
-"""Stop chargers on bare file descriptors and verify it: for the guardian and `estop`, when nothing else works any more.
+"""Stops chargers on bare file descriptors and verifies the stops: for the guardian and `estop`, as a last resort.
 
-Every line has a thread (`lastline.py`), since whatever is asked of a port's driver may take for ever: so no port ever
-waits for another one. This module only starts the threads, looks how they are doing, and leaves behind those that hang.
-On ports that are open the first stops are written before, one after the other by one thread, which takes a tenth of the
-time; where that gets stuck again and again, each line's own thread does it. Standard library only, few imports.
+Every line has its own thread (`lastline.py`), because any driver call may block for ever: so no port waits for another.
+This module only starts the threads, monitors them, and abandons those that hang. On open ports, a single thread writes
+the first stops beforehand, one after another, which takes a tenth of the time; if that keeps getting stuck, each line's
+own thread does it. Standard library only, few imports.
 """
 
 import threading
@@ -17,43 +17,42 @@ from orchestrator.lastresort.descriptors import Turns
 from orchestrator.lastresort.lastline import ASK_S, ROUND_S, STOPS, LastLine, Witness
 from orchestrator.lastresort.lastport import ANSWER_S
 
-#: The first stops are waited for no longer than this before anything else is done: what else there is would compete
-#: with them for the processor.
+#: The longest wait for the first stops before doing anything else, which would compete with them for the CPU.
 FIRST_S = 0.05
-#: A stop that has not been written by then hangs in the port's driver.
+#: A stop not written within this hangs in the port's driver.
 STUCK_S = 0.005
-#: So many are gone round; where more hang it is quicker to start a thread for each line.
+#: This many stuck ports are bypassed; if more hang, starting a thread for each line is faster.
 SWEEPS = 3
-#: How often it is looked at what has become of the lines.
+#: How often the lines are checked.
 LOOK_S = 0.01
-#: Ports are closed within this, all together, or are left to the kernel.
+#: All ports together are closed within this, or left to the kernel.
 CLOSE_S = 0.5
 
 
 def nobody(_name: str, _since_s: float) -> None:
-    """No other process looks after any port."""
+    """The witness if no other process is in charge of any port."""
 
 
 class LastStop:
-    """Stops the chargers on the ports that it is given, from the first `stop` to `finish`.
+    """Stops the chargers on the given ports, from the first `stop` to `finish`.
 
-    Ports are opened by name, but not if another orchestrator holds them and `leave_held` is set. A charger whose port
-    `witness` knows about is not asked here; it may be set later. Never raises for what a port does.
+    Ports are opened by name, unless another orchestrator holds them and `leave_held` is set. If `witness`, which may be
+    set later, knows about a port, its charger is not queried here. A failing port never raises.
     """
 
     def __init__(self, *, leave_held: bool = True, watch_s: float = 0.0, turns: Turns | None = None) -> None:
         self.witness: Witness = nobody
-        self.hurried = False  #: it is to end as soon as every charger has had its stop
+        self.hurried = False  #: end as soon as every charger has been sent its stop
         self._turns = turns
         self._leave_held, self._watch_s = leave_held, watch_s
         self._lines: dict[str, LastLine] = {}
-        self._waiting: list[LastLine] = []  # for a thread
+        self._waiting: list[LastLine] = []  # lines that have no thread yet
         self._began_s = time.monotonic()
 
     def stop(self, ports: Mapping[str, int | None]) -> None:
-        """Have the first stop written on each of these ports; those whose drivers take their time are not waited for.
+        """Write the first stop on each of these ports, without waiting for slow drivers.
 
-        `ports` maps names to open descriptors, which are taken over, or to None.
+        `ports` maps names to open descriptors, of which this takes ownership, or to None.
         """
         end_s = time.monotonic() + FIRST_S
         if self._turns is not None:
@@ -65,7 +64,7 @@ class LastStop:
         _sweep(deque(line for line in lines if ports[line.name] is not None))
         self._waiting += lines
         self._start()
-        for line in self._waiting:  # no thread to be had: one after the other is better than not at all
+        for line in self._waiting:  # no threads available: one after another is better than not at all
             line.first()
         for line in lines:
             line.tried.wait(max(0.0, end_s - time.monotonic()))
@@ -77,10 +76,10 @@ class LastStop:
         on_stop: Callable[[], None] = lambda: None,
         on_round: Callable[[], None] = lambda: None,
     ) -> dict[str, str]:
-        """Wait until each charger has shown standby for `watch_s`, at the longest until `within_s` after the beginning.
+        """Wait until each charger has shown standby for `watch_s`, but at most `within_s` from the beginning.
 
-        `on_stop` is called after each round's stops, `on_round` when its chargers have had time to obey and answer.
-        Returns for each name "" where standby was verified, else why not.
+        `on_stop` is called after each round's stops, `on_round` once the chargers have had time to obey and answer.
+        Returns, by name, "" if standby was verified, else why not.
         """
         end_s, round_s = self._began_s + within_s * self._shifts, self._began_s
         while True:
@@ -97,7 +96,7 @@ class LastStop:
 
     @property
     def _shifts(self) -> int:
-        """How many times as long it takes where ports take turns."""
+        """The factor by which taking turns prolongs everything."""
         return 1 if self._turns is None else -(-self._turns.ports // self._turns.at_once)
 
     def _seen(self, name: str, since_s: float) -> tuple[float, str] | None:
@@ -107,7 +106,7 @@ class LastStop:
         self._waiting = [line for line in self._waiting if not line.start()]
 
     def _pause_until(self, at_s: float) -> None:
-        """At most until then: less, if there is nothing left to do."""
+        """Wait until then, or until there is nothing left to do."""
         while time.monotonic() < at_s and not self._settled():
             time.sleep(LOOK_S)
 
@@ -121,7 +120,7 @@ class LastStop:
         )
 
     def _end(self) -> dict[str, str]:
-        lines = self._lines  # it may be replaced by one that has more
+        lines = self._lines  # another thread may replace it by a larger one
         for line in lines.values():
             line.end()
         close_s = time.monotonic() + CLOSE_S
@@ -139,14 +138,14 @@ def stop_all(
     on_stop: Callable[[], None] = lambda: None,
     on_round: Callable[[], None] = lambda: None,
 ) -> dict[str, str]:
-    """Stop the charger on every port; all of `LastStop` at once."""
+    """Stop the charger on every port: all of `LastStop` in one call."""
     stopping = LastStop(leave_held=leave_held, watch_s=watch_s)
     stopping.stop(ports)
     return stopping.finish(within_s, on_stop=on_stop, on_round=on_round)
 
 
 def _sweep(lines: deque[LastLine]) -> None:
-    """Write the first stop on each of these lines; past one that gets stuck another thread goes on."""
+    """Write the first stop on each of these lines; if one gets stuck, another thread continues past it."""
 
     def write() -> None:
         with suppress(IndexError):
@@ -155,7 +154,7 @@ def _sweep(lines: deque[LastLine]) -> None:
 
     for _ in range(SWEEPS):
         sweeper = threading.Thread(target=write, daemon=True)
-        with suppress(RuntimeError):  # no thread to be had
+        with suppress(RuntimeError):  # no thread available
             sweeper.start()
             left = -1
             while sweeper.is_alive() and len(lines) != left:

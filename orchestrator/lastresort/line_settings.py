@@ -1,8 +1,9 @@
-"""What a charger's port must be set to, and what to do when somebody else has set it to something else.
+"""The settings that a charger's port needs, and how to restore them after another program has changed them.
 
-A tty has one group of settings for everybody who has it open: after `stty -F PORT 115200` (or a getty, a modem manager,
-a terminal program) every stop goes out at that speed, and nobody hears it. So they are looked at before each stop;
-that costs some microseconds, and only what differs is set. Standard library only: the guardian and `estop` use it, too.
+A tty has one set of settings for all processes that have it open: after `stty -F PORT 115200` (or a getty, a modem
+manager, a terminal program) every stop goes out at that speed, and the charger does not understand it. So they are
+checked before each stop; that takes a few microseconds, and only differences are set. Standard library only: the
+guardian and `estop` use it as well.
 """
 
 import errno
@@ -11,7 +12,7 @@ import sys
 import termios
 from collections.abc import Sequence
 
-#: 19200 8N1, no flow control, bytes as they are (protocol 2/2, §2.2.2); a read returns what there is.
+#: 19200 8N1, no flow control, raw bytes (protocol 2/2, §2.2.2); a read returns whatever is available.
 _INPUT = (
     termios.IGNBRK | termios.BRKINT | termios.PARMRK | termios.INPCK | termios.ISTRIP
     | termios.INLCR | termios.IGNCR | termios.ICRNL
@@ -19,7 +20,7 @@ _INPUT = (
 _SOFTWARE = termios.IXON | termios.IXOFF | termios.IXANY
 _FORMAT = termios.CSIZE | termios.CSTOPB | termios.PARENB | termios.CREAD | termios.CLOCAL | termios.CRTSCTS
 _LOCAL = termios.ICANON | termios.ISIG | termios.IEXTEN | termios.ECHO | termios.ECHONL
-#: Bits that are ours, by tcgetattr's index: (which, what they must be).
+#: The bits that we control, by tcgetattr's index: (mask, required value).
 _OURS: tuple[tuple[int, int], ...] = (
     (_INPUT | _SOFTWARE, 0),
     (termios.OPOST, 0),
@@ -27,7 +28,7 @@ _OURS: tuple[tuple[int, int], ...] = (
     (_LOCAL, 0),
 )
 _SPEED = termios.B19200
-#: (index, bits, their value, words for it); None: any value but the one that they must have.
+#: (index, bits, value, description); None: any value but the required one.
 _WORDS: tuple[tuple[int, int, int | None, str], ...] = (
     (2, termios.CSIZE, termios.CS5, "5 data bits"),
     (2, termios.CSIZE, termios.CS6, "6 data bits"),
@@ -48,16 +49,16 @@ _WORDS: tuple[tuple[int, int, int | None, str], ...] = (
 _BAUDS = {
     getattr(termios, name): name[1:] for name in dir(termios) if name.startswith("B") and name[1:].isdecimal()
 }  # fmt: skip
-_N_TTY = 0  #: the line discipline for bytes as they are; others make packets of them (`ldattach`, `slattach`, `pppd`)
+_N_TTY = 0  #: the line discipline for raw bytes; others turn them into packets (`ldattach`, `slattach`, `pppd`)
 _TIOCGEXCL = 0x80045440  #: asm-generic/ioctls.h
 _UNKNOWN = (errno.ENOTTY, errno.EINVAL)
 
 
 def restore(fd: int, tolerated: str = "") -> str:
-    """Set the port up again where somebody has changed it; what was found, "" where all was well.
+    """Set the port up again if somebody has changed it; returns what was found, "" if all was well.
 
-    `tolerated`: what it differs by because its driver takes no better. Output that was suspended goes on.
-    Raises OSError or termios.error for a port that is gone.
+    `tolerated`: the differences due to the driver's limitations. Suspended output resumes. Raises OSError or
+    termios.error for a port that is gone.
     """
     found = [words] if (words := take_back(fd)) else []
     *flags, characters = termios.tcgetattr(fd)
@@ -65,16 +66,16 @@ def restore(fd: int, tolerated: str = "") -> str:
     if words and words != tolerated:
         set_up(fd)
         found.append(words)
-    # Nobody can ask whether it is suspended (TCOOFF, or an XOFF that came in); going on is harmless.
+    # There is no way to query whether output is suspended (TCOOFF, or a received XOFF); resuming is harmless.
     termios.tcflow(fd, termios.TCOON)
     return ", ".join(found)
 
 
 def take_back(fd: int) -> str:
-    """Set the line discipline for bytes as they are; which other one was found, "" where all was well.
+    """Set the raw line discipline; returns which other one was found, "" if all was well.
 
-    With some others (N_NULL) a tty does not even answer that it is one, and takes no byte: so this comes before
-    anything else is asked. What is no tty has none, and stays as it is. OSError for a port that is gone.
+    With some others (N_NULL) a tty does not even identify itself as one, and accepts no bytes: so this comes before
+    anything else. A file that is not a tty has none, and stays unchanged. OSError for a port that is gone.
     """
     discipline = _number(fd, termios.TIOCGETD)
     if discipline == _N_TTY:
@@ -84,7 +85,7 @@ def take_back(fd: int) -> str:
 
 
 def set_up(fd: int) -> None:
-    """Set the line to 19200 8N1; what is none of ours stays. OSError or termios.error for a port that is gone."""
+    """Set the line to 19200 8N1; other bits stay. OSError or termios.error for a port that is gone."""
     attributes = termios.tcgetattr(fd)
     for at, (bits, value) in enumerate(_OURS):
         attributes[at] = attributes[at] & ~bits | value
@@ -94,7 +95,7 @@ def set_up(fd: int) -> None:
 
 
 def share(fd: int) -> str:
-    """Allow others to open the port again, should somebody have forbidden it: a stop tool must; what was found."""
+    """Let others, stop tools above all, open the port again if somebody has forbidden it; returns what was found."""
     if not _number(fd, _TIOCGEXCL):
         return ""
     fcntl.ioctl(fd, termios.TIOCNXCL)
@@ -102,9 +103,9 @@ def share(fd: int) -> str:
 
 
 def differences(flags: Sequence[int], characters: Sequence[bytes | int]) -> str:
-    """What of these settings is not as a charger needs it, for people: "115200 baud, echo on"; "" if all is well.
+    """The settings that do not suit a charger, for people: "115200 baud, echo on"; "" if all is well.
 
-    `flags` and `characters` are the first six and the last of what termios.tcgetattr gives.
+    `flags` and `characters` are the first six items and the last item from termios.tcgetattr.
     """
     speeds = sorted({flags[4], flags[5]} - {_SPEED})
     found = [f"{_BAUDS.get(speed, 'an odd number of')} baud" for speed in speeds]
@@ -112,14 +113,14 @@ def differences(flags: Sequence[int], characters: Sequence[bytes | int]) -> str:
         has, must = flags[at] & bits, _OURS[at][1] & bits
         if (has != must) if value is None else (has == value):
             found.append(words)
-    # They are characters, and mean something else, where lines are edited; that is told above.
+    # In line-editing mode these are characters with another meaning; that mode is reported above.
     if any(isinstance(count, int) and count for count in (characters[termios.VMIN], characters[termios.VTIME])):
         found.append("reads that wait for more")
     return ", ".join(found)
 
 
 def _number(fd: int, question: int) -> int:
-    """What the kernel answers to a question for an int; 0 where the driver does not know it."""
+    """The kernel's answer to an ioctl that returns an int; 0 if the driver does not know it."""
     answer = bytearray(4)
     try:
         fcntl.ioctl(fd, question, answer)

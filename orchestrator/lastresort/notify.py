@@ -1,31 +1,31 @@
-"""What a process says to people and to systemd without ever waiting for them. Standard library only."""
+"""Messages to people and to systemd, without ever waiting for them. Standard library only."""
 
 import os
 import select
 import socket
 
-#: A pipe that has room for anything has room for this at once (PIPE_BUF).
+#: A writable pipe takes this much at once (PIPE_BUF).
 _PIECE = 4096
 
 
 def say(text: str) -> None:
-    """A line on standard error. One that nobody takes now is lost: it must not keep a stop from being sent."""
+    """Print a line on standard error. If nobody takes it now, it is lost: it must not delay a stop."""
     put(2, f"{text}\n".encode(errors="backslashreplace"))
 
 
 def put(fd: int, data: bytes, patience_s: float = 0.0) -> None:
-    """Write to whoever reads there. What is not taken within `patience_s` is lost: a terminal may stand still."""
+    """Write to a descriptor. Whatever is not taken within `patience_s` is lost: a terminal may be stopped."""
     try:
         taker = select.poll()
         taker.register(fd, select.POLLOUT)
         while data and any(event & select.POLLOUT for _, event in taker.poll(patience_s * 1000)):
             data = data[os.write(fd, data[:_PIECE]) :]
     except OSError:
-        return  # it is gone
+        return  # the reader is gone
 
 
 class Systemd:
-    """The service manager, if one has asked to be notified (sd_notify)."""
+    """The service manager, if it has asked to be notified (sd_notify)."""
 
     def __init__(self) -> None:
         path = os.environ.get("NOTIFY_SOCKET", "")
@@ -35,7 +35,7 @@ class Systemd:
             self._address = f"\0{path[1:]}" if path.startswith("@") else path
 
     def tell(self, text: str) -> None:
-        """One notification, as "WATCHDOG=1"; lost when it cannot be taken now."""
+        """Send one notification, such as "WATCHDOG=1"; lost if it cannot be taken now."""
         if self._socket is not None:
             try:
                 self._socket.sendto(text.encode(), socket.MSG_DONTWAIT, self._address)

@@ -1,9 +1,9 @@
-"""Who else holds a serial port, by the kernel's lists: an orchestrator, or a stranger who must not keep a stop away.
+"""Finds out who else holds a serial port: an orchestrator, or a foreign program, which must not block a stop.
 
-A port that is in use is locked (flock): /proc/locks names the process that did it. Where that list cannot be read, or
-the one who locked it has gone and left the open file to another, the open files of all processes are looked through.
-Only processes that we may look at are found: who is to be told apart must be of the same user, or we must be root.
-Standard library only, and nothing here asks a device or a file system, which might hang.
+A port in use is locked (flock): /proc/locks names the locking process. If that list cannot be read, or the locker has
+gone and left the open file to another process, the open files of all processes are searched. Only processes visible to
+us are found: they must belong to the same user, or we must be root. Standard library only, and nothing here accesses a
+device or a file system that might hang.
 """
 
 import os
@@ -11,14 +11,14 @@ import stat
 from collections.abc import Iterable, Iterator
 
 LISTENS = "00010000"  #: __SO_ACCEPTCON among the flags in /proc/net/unix
-#: How the words of our own processes begin: the program itself, or a module of it.
+#: The command lines of our own processes contain this: the program itself, or one of its modules.
 PROGRAM = "orchestrator"
-#: The one of them that orders chargers to run; the others that have ports open only stop them, or ask.
+#: The only one that commands chargers to run; our other processes with open ports only stop or query them.
 CONTROLLER = "orchestrator.service.controller"
 
 
 class Holder:
-    """A process that has a port; `ours` if it is an orchestrator, which looks after the charger itself."""
+    """A process that holds a port; `ours` if it is an orchestrator, which takes care of the charger itself."""
 
     def __init__(self, pid: int, name: str, *, ours: bool) -> None:
         self.pid, self.name, self.ours = pid, name, ours
@@ -31,7 +31,7 @@ UNKNOWN = Holder(0, "an unknown program", ours=False)
 
 
 def holder(port: str, but: Iterable[int] = ()) -> Holder:
-    """Who has locked this port, or else has it open, other than these processes. Who cannot be told is a stranger."""
+    """Who has locked this port, or else has it open, other than these processes. If unknown, a foreign program."""
     besides = set(but)
     lockers = [found for pid in _lockers(port) if pid not in besides and (found := _process(pid))]
     if lockers:
@@ -45,7 +45,7 @@ def control_sockets(ports: Iterable[str]) -> list[str]:
 
 
 def services(ports: Iterable[str]) -> tuple[list[str], list[int]]:
-    """The same, and the processes of those controllers whose sockets are not to be seen: in another container, say."""
+    """The same, plus the controllers whose sockets are not visible: in another container, say."""
     devices = {os.path.realpath(port) for port in ports if _may_be_tty(port)}
     found = {pid: words for pid, words in orchestrators() if not devices.isdisjoint(_files(pid))}
     sockets = {pid: _listens_on(pid) for pid in found}
@@ -54,11 +54,11 @@ def services(ports: Iterable[str]) -> tuple[list[str], list[int]]:
 
 
 def _may_be_tty(port: str) -> bool:
-    """Whether this may be a serial port, by the kernel's list: /dev/null, say, everybody has open."""
+    """Whether this may be a serial port, by the kernel's list; every process has /dev/null open, for example."""
     try:
         at = os.stat(port)
     except OSError:
-        return True  # it was unplugged: who still has it open is meant
+        return True  # unplugged: find who still has it open
     except ValueError:
         return False
     drivers = [line.split() for line in _read("/proc/tty/drivers").splitlines()]
@@ -68,7 +68,7 @@ def _may_be_tty(port: str) -> bool:
 
 
 def orchestrators() -> Iterator[tuple[int, list[str]]]:
-    """Every running service of this program that we may look at, with its command line: guardians and controllers."""
+    """Every visible process of this program, with its command line: guardians and controllers."""
     for pid in _pids():
         words = _words(pid)
         if is_orchestrator(words):
@@ -76,7 +76,7 @@ def orchestrators() -> Iterator[tuple[int, list[str]]]:
 
 
 def is_orchestrator(words: list[str]) -> bool:
-    """Whether a command line is one of ours: `orchestrator …`, `python orchestrator …`, `python -m orchestrator…`."""
+    """Whether a command line is ours: `orchestrator …`, `python orchestrator …`, `python -m orchestrator…`."""
     if any(word.rpartition("/")[2] == PROGRAM for word in words[:2]):
         return True
     module = words[words.index("-m") + 1 : words.index("-m") + 2] if "-m" in words[:4] else []
@@ -88,7 +88,7 @@ def _best(found: list[Holder]) -> Holder:
 
 
 def _process(pid: int) -> Holder | None:
-    """None for one that has ended."""
+    """The holder for a process; None if it has ended."""
     words = _words(pid)
     if pid == os.getpid():
         return Holder(pid, "this program", ours=True)
@@ -116,7 +116,7 @@ def _openers(port: str) -> list[int]:
 
 
 def _listens_on(pid: int) -> str:
-    """The Unix socket on which a process listens, "" if on none."""
+    """The Unix socket on which a process listens, "" if none."""
     files = set(_files(pid))
     for line in _read("/proc/net/unix").splitlines():
         words = line.split(None, 7)  # Num RefCount Protocol Flags Type St Inode Path
@@ -126,12 +126,12 @@ def _listens_on(pid: int) -> str:
 
 
 def directory(pid: int) -> str:
-    """Where a process is; "" where we may not know."""
+    """A process's working directory; "" if it is not visible to us."""
     return _link(f"/proc/{pid}/cwd")
 
 
 def _files(pid: int) -> list[str]:
-    """What a process has open, as the kernel names it."""
+    """A process's open files, as named by the kernel."""
     try:
         return [_link(f"/proc/{pid}/fd/{fd}") for fd in os.listdir(f"/proc/{pid}/fd")]
     except OSError:

@@ -1,8 +1,8 @@
-"""The service that may be running beside an `estop`: told to hold what was stopped, and asked what it sees.
+"""The service that may be running beside an `estop`: told to hold the stopped bays, and queried for its readings.
 
-While it runs it reads the ports, and would get the answers to anybody else's questions; so its readings are the proof.
-They must be newer than the stop, as everywhere else, and they are two witnesses: a charger that shows 0 A while the
-BMU sees current runs. All of this is a thread of its own: no stop waits for a service that hangs or drips.
+A running service reads the ports, and would receive the answers to anybody else's questions; so its readings are the
+proof. As everywhere else, they must be newer than the stop, and there are two witnesses: a charger that shows 0 A while
+the BMU sees current is running. All of this has its own thread: no stop waits for a hung or slow service.
 """
 
 import os
@@ -16,22 +16,22 @@ from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.lastresort.port_owner import services
 
-#: A service that has not answered by then is asked again.
+#: After this long without an answer, the service is asked again.
 ANSWER_S = 0.5
-#: How often it is asked what it sees, and how old that may be.
+#: How often its readings are queried, and how old they may be.
 LOOK_S, FRESH_S = 0.1, 1.5
-#: Standby may show so much, at the charger and at the BMU, as everywhere else.
+#: The most current that standby may show, at the charger and at the BMU, as everywhere else.
 STANDBY_A, BMU_STANDBY_A = 0.5, 1.0
 NOBODY = "no service is running"
 UNTOLD = "the service has not answered in time: nobody holds its bays"
 
-Bay = Mapping[str, Any]  #: of the status document
+Bay = Mapping[str, Any]  #: a bay in the status document
 
 
 class Services:
-    """Every service that holds one of these ports, else the one behind `socket`, if one is named.
+    """Every service that holds one of these ports, else the one behind `socket`, if given.
 
-    `every_bay`: they are to hold all their bays, not only those of these ports.
+    `every_bay`: they must hold all their bays, not only those of these ports.
     """
 
     def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool) -> None:
@@ -40,35 +40,35 @@ class Services:
         self._looked = threading.Event()
 
     def start(self) -> None:
-        """Look for them, tell them, and go on asking them."""
+        """Find them, notify them, and keep querying them."""
         threading.Thread(target=self._look, name="services", daemon=True).start()
 
     def wait(self, end_s: float) -> None:
-        """Until all have answered, at the longest until then."""
+        """Wait until all have answered, but not beyond `end_s`."""
         self._looked.wait(max(0.0, end_s - time.monotonic()))
         for service in self._found:
             service.told.wait(max(0.0, end_s - time.monotonic()))
 
     def sees(self, name: str, since_s: float) -> tuple[float, str] | None:
-        """What the one that is in touch with this port's charger last saw of it (see `Service.sees`)."""
+        """The latest reading from the service in touch with this port's charger (see `Service.sees`)."""
         return next((seen for one in self._found if (seen := one.sees(name, since_s)) is not None), None)
 
     @property
     def said(self) -> list[str]:
-        """What became of each, for people; which one is told where there are several."""
+        """Each service's result, for people; with its path if there are several."""
         if not self._found:
             return [UNTOLD]
         return [f"{one.path}: {one.said}" if len(self._found) > 1 else one.said for one in self._found]
 
     @property
     def untold(self) -> bool:
-        """Whether one that holds a port may start its charger again: it has not taken the stop."""
+        """Whether a service that holds a port may start its charger again, because it has not accepted the stop."""
         return not self._looked.is_set() or any(one.holds and not one.took for one in self._found)
 
     def _look(self) -> None:
         paths, mute = services(self._names)
         found = [Service(self._names, path, every_bay=self._every_bay, holds=True) for path in paths]
-        if not paths or mute:  # the one that is named may be one of those that cannot be seen
+        if not paths or mute:  # the given socket may belong to one of the invisible services
             found.append(Service(self._names, self._named, every_bay=self._every_bay, mute=mute))
         self._found = found
         self._looked.set()
@@ -77,17 +77,17 @@ class Services:
 
 
 class Service:
-    """The service behind this socket, if there is one; `holds` if it has one of these ports open.
+    """The service behind this socket, if any; `holds` if it has one of these ports open.
 
-    `mute`: the processes that have one open, too, and may be behind this socket; nobody has seen which is theirs.
+    `mute`: processes that also have one open and may be behind this socket; their own sockets are not visible.
     """
 
     def __init__(
         self, names: Iterable[str], socket: str, *, every_bay: bool, holds: bool = False, mute: Sequence[int] = ()
     ) -> None:
-        self.said = UNTOLD  #: what became of it, for people
-        self.told = threading.Event()  #: that it has answered, or that there is none
-        self.took = False  #: it holds its bays, or there is nobody who could start them
+        self.said = UNTOLD  #: the result, for people
+        self.told = threading.Event()  #: it has answered, or there is none
+        self.took = False  #: it holds its bays, or nobody could start them
         self.path, self.holds, self._mute = Path(socket), holds or bool(mute), mute
         self._ports = {os.path.realpath(name) for name in names}
         self._named, self._every_bay = socket, every_bay
@@ -95,17 +95,17 @@ class Service:
         self._thread = threading.Thread(target=self._run, name="service", daemon=True)
 
     def start(self) -> None:
-        """Tell it, and go on asking it."""
+        """Notify it, and keep querying it."""
         self._thread.start()
 
     def sees(self, name: str, since_s: float) -> tuple[float, str] | None:
-        """What it last saw of this port's charger: which sample, and "" for standby. None: they are not in touch."""
+        """Its latest sample of this port's charger, with "" for standby. None: it is not in touch with the charger."""
         seen_s, bays = self._seen
         bay = bays.get(os.path.realpath(name)) if time.monotonic() - seen_s <= FRESH_S else None
         try:
             return _sample(bay, since_s) if bay else None
         except (LookupError, TypeError):
-            return None  # it is of another version
+            return None  # another version of the service
 
     def _run(self) -> None:
         while True:
@@ -121,11 +121,11 @@ class Service:
             time.sleep(LOOK_S)
 
     def _hold(self) -> bool:
-        """Tell it to hold its bays until an operator starts them. False where there is no service."""
+        """Tell it to hold its bays until an operator starts them. False if there is no service."""
         if not _listens(self._named):
             self.said = self._unseen if self._mute else NOBODY
             self.took = not self._mute
-            self.told.set()  # one that starts now stops its chargers first, and asks nobody
+            self.told.set()  # a service that starts now stops its chargers first anyway
             return False
         bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
         results = ask(self.path, {"verb": "stop", "bays": bays}, ANSWER_S)["results"]
@@ -148,14 +148,14 @@ class Service:
         return f"a service that holds a port (pid {pids}) was not told: its control socket is not to be found"
 
     def _bays(self) -> list[tuple[str, Bay]]:
-        """Each bay with its port's real name."""
+        """Each bay with its port's real path."""
         bays: Any = ask(self.path, {"verb": "status"}, ANSWER_S)["bays"]
         return [(os.path.realpath(bay["port"]), bay) for bay in bays]
 
 
 def _listens(path: str) -> bool:
-    """Whether there may be a service behind this name: one that is too busy to be connected to is one."""
-    import socket  # noqa: PLC0415 - control.py has it anyway
+    """Whether there may be a service behind this name, even one too busy to accept a connection."""
+    import socket  # noqa: PLC0415 - asking.py imports it anyway
 
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         probe.settimeout(ANSWER_S)

@@ -1,12 +1,12 @@
 """A CAN bus by python-can and canopen: the only module that uses them.
 
-Both are prescribed. python-can opens every kind of adapter and takes and hands over single frames. canopen's `Network`
-hands frames on by their COB-ID and gives NMT commands; SDO is ours (`devices/sdo_client.py`), since canopen would take
-a late answer for one to the next request.
+Both are prescribed. python-can opens every kind of adapter, and sends and receives single frames. canopen's `Network`
+dispatches frames by COB-ID and sends NMT commands; SDO is ours (`devices/sdo_client.py`), because canopen would take a
+late answer for the answer to the next request.
 
-There is no Notifier: it dies of the first exception. One thread of ours calls `receive()` and `send()`. Whatever the
-libraries raise becomes a LinkError; then the bus is closed and, after a pause, a new one is opened: a Network that has
-seen its interface go down stays deaf.
+There is no Notifier, because the first exception kills it. One thread of ours calls `receive()` and `send()`. Whatever
+the libraries raise becomes a LinkError; then the bus is closed and, after a pause, a new one is opened: a Network that
+has seen its interface go down stays deaf.
 """
 
 import errno
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
 
 FrameCallback = Callable[[int, bytes], None]
 
-#: A bus without a wire (`virtual`, `udp_multicast`) may have no bit rate in its settings: CANopen's highest, then.
+#: For a bus without a wire (`virtual`, `udp_multicast`) and without a bit rate in its settings: CANopen's highest.
 DEFAULT_BITRATE = 1_000_000
-#: Longer than any driver needs to take one frame; a line that is stalled must not stall the thread.
+#: Longer than any driver needs to take one frame; a stalled line must not stall the thread.
 SEND_TIMEOUT_S = 0.02
-#: So many unreadable frames in a row are no noise any more: build the bus anew.
+#: After this many unreadable frames in a row, treat it as a failure and reopen the bus.
 MAX_GARBAGE = 16
-#: What we add where the station file is silent, by interface.
+#: Settings that we add unless the station file has them, by interface.
 PROTECTIVE: Mapping[str, Mapping[str, object]] = {
-    # python-can's own 1 ms is a busy loop (5 % of a core when idle); a read may come this much late.
+    # python-can's default of 1 ms is a busy loop (5 % of a core when idle); this delays a read by at most as much.
     "slcan": {"timeout": 0.01},
     # Nothing leaves this machine.
     "udp_multicast": {"hop_limit": 0},
@@ -48,9 +48,9 @@ PROTECTIVE: Mapping[str, Mapping[str, object]] = {
 class CanBus:
     """One bus of the station file. It belongs to the thread that called `open()`.
 
-    `settings` go to python-can as they are, nothing is taken from the environment or from python-can's own
-    configuration files. `nodes` are the node ids that may be written to at all (`link/can_gate.py`); `pages`: their
-    older protocol may be asked, too. `filtered`: the kernel keeps back what is not subscribed to.
+    `settings` are passed to python-can unchanged; nothing comes from the environment or from python-can's own
+    configuration files. `nodes` are the only node ids that may be written to (`link/can_gate.py`); `pages`: their older
+    protocol may be used as well. `filtered`: the kernel drops frames without a subscriber.
     """
 
     def __init__(
@@ -76,16 +76,16 @@ class CanBus:
 
     @property
     def bitrate(self) -> int:
-        """The wire's bit/s, for the budget of its use; DEFAULT_BITRATE where the settings do not say it."""
+        """The wire's bit/s, for the load budget; DEFAULT_BITRATE if the settings do not have it."""
         bitrate = self._settings.get("bitrate")
         return bitrate if isinstance(bitrate, int) else DEFAULT_BITRATE
 
     def subscribe(self, cob_id: int, callback: FrameCallback) -> None:
-        """Call `callback(cob_id, data)` for each data frame with this id; it holds for every later bus, too."""
+        """Call `callback(cob_id, data)` for each data frame with this id, now and after every reopening."""
         self._callbacks[cob_id] = callback
 
     def open(self) -> None:
-        """Open the bus and wrap it in a canopen Network; LinkError if that does not work. May take seconds (slcan)."""
+        """Open the bus and wrap it in a canopen Network; LinkError if that fails. May take seconds (slcan)."""
         try:
             self._bus = _open_bus(self._settings)
             self._network = _new_network(self._bus, self.send)
@@ -100,7 +100,7 @@ class CanBus:
         self._echo.forget()
 
     def close(self) -> None:
-        """Shut the bus down. Never raises: a bus that broke cannot be closed in any better way."""
+        """Shut the bus down. Never raises: there is no better way to close a broken bus."""
         bus, self._bus, self._network = self._bus, None, None
         if bus is not None:
             with suppress(Exception):
@@ -116,9 +116,9 @@ class CanBus:
         master.send_command(command)
 
     def send(self, cob_id: int, data: bytes) -> None:
-        """Write one frame; RefusedError if it is none of those that may be written, LinkError if the bus is broken.
+        """Write one frame; RefusedError if it must not be written, LinkError if the bus is broken.
 
-        A full transmit queue is no broken bus but a BMU that is not there: the frame is lost and `trouble` says so.
+        A full transmit queue means a missing BMU, not a broken bus: the frame is lost and `trouble` says so.
         """
         if reason := refusal(cob_id, data, self._nodes, pages=self._pages):
             raise RefusedError(f"CAN bus {self.name}: not sent: {reason}")
@@ -133,7 +133,7 @@ class CanBus:
             self.trouble = can_text.QUEUE_FULL
 
     def receive(self, timeout_s: float) -> None:
-        """Wait for one frame and hand it on. What a callback raises comes out here."""
+        """Wait for one frame and dispatch it. Exceptions from callbacks propagate."""
         if self._bus is None or self._network is None:
             raise self._closed()
         try:
@@ -151,7 +151,7 @@ class CanBus:
             return
         self.trouble = None
         if message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES:
-            return  # none of CANopen's
+            return  # not a CANopen frame
         if message.arbitration_id in self._callbacks and not self._echo.is_own(message):
             network.notify(message.arbitration_id, message.data, message.timestamp)
 
@@ -164,12 +164,12 @@ class CanBus:
             raise LinkError(self.trouble.with_(where=can_text.place(self.name, self._settings)))
 
     def _unreadable(self, error: Exception) -> None:
-        """A frame that the driver chokes on is noise, whatever it raises; an errno, or many in a row, is a failure."""
+        """A single frame that the driver cannot read is noise; an errno, or many in a row, is a failure."""
         self._garbage_run += 1
         if can_text.errno_of(error) is not None or self._garbage_run >= MAX_GARBAGE:
             raise self._failed(error) from error
         flush = getattr(self._bus, "flush", None)
-        if flush is not None:  # slcan keeps what it could not decode, and would choke on it again
+        if flush is not None:  # slcan keeps what it could not decode, and would fail on it again
             try:
                 flush()
             except Exception as broken:
@@ -182,11 +182,11 @@ class CanBus:
         return LinkError(can_text.failure(self.name, self._settings, error))
 
 
-# --- the libraries; imported here because that takes 0.2 s, which the chargers' first poll must not wait for ----------
+# --- the libraries; imported late because that takes 0.2 s, which the chargers' first poll must not wait for ----------
 
 
 def load() -> None:
-    """Import the libraries now: a quarter of a second on a fast machine, which nothing that is watched should take."""
+    """Import the libraries now: a quarter of a second on a fast machine, too long for any monitored loop."""
     import can  # noqa: F401, PLC0415 - only here and below, so that other verbs do not wait for it
     import canopen  # noqa: F401, PLC0415 - as above
 
@@ -194,7 +194,7 @@ def load() -> None:
 def _open_bus(settings: Mapping[str, Any]) -> "can.BusABC":
     import can  # noqa: PLC0415 - see above
 
-    # What they would log, we say in a LinkError, once.
+    # A LinkError reports once what they would log.
     logging.getLogger("can").setLevel(logging.CRITICAL)
     timing = settings.get("timing")
     if isinstance(timing, Mapping):
@@ -209,7 +209,7 @@ def _new_network(bus: "can.BusABC", send: FrameCallback) -> "canopen.Network":
     logging.getLogger("canopen").setLevel(logging.CRITICAL)
 
     class Network(canopen.Network):
-        """Everything that canopen sends by itself goes through our own `send`, hence through the gate."""
+        """Sends everything that canopen sends by itself through our own `send`, and so through the gate."""
 
         def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:  # noqa: FBT001, FBT002 - its own
             if remote:
@@ -217,7 +217,7 @@ def _new_network(bus: "can.BusABC", send: FrameCallback) -> "canopen.Network":
             send(can_id, bytes(data))
 
     network = Network(bus)
-    # Nobody here speaks LSS, and canopen would keep every frame with its COB-ID for ever.
+    # LSS is not used here, and canopen would keep every frame with its COB-ID for ever.
     network.unsubscribe(network.lss.LSS_RX_COBID)
     return network
 
@@ -229,12 +229,12 @@ def _new_message(cob_id: int, data: bytes) -> "can.Message":
 
 
 def _without_time(callback: FrameCallback) -> Callable[[int, bytearray, float], None]:
-    """The frame's own time stamp is the wall clock's; ours is monotonic and taken by who reads the frame."""
+    """Drop the frame's own time stamp, which is wall-clock time; the reader of the frame takes a monotonic one."""
     return lambda cob_id, data, _timestamp: callback(cob_id, bytes(data))
 
 
 def _close_files(bus: "can.BusABC") -> None:
-    """What a driver left open because its own shutdown failed: an adapter's name is not free again before."""
+    """Close what a driver left open when its own shutdown failed: until then an adapter's name is not free again."""
     for part in vars(bus).values():
         if isinstance(part, IOBase | socket):
             with suppress(OSError):

@@ -1,17 +1,17 @@
-"""Our own frames that an interface brings back: nobody else has sent them."""
+"""Recognises our own frames that an interface echoes back."""
 
 from collections import deque
 from collections.abc import Mapping
 from typing import Protocol
 
-#: So many may still be on their way back.
+#: At most this many may still be on their way back.
 MAX_ECHO = 256
-#: Interfaces that always bring back what we send ourselves, and do not mark it; others do where they are told to.
+#: Interfaces that always echo our own frames, unmarked; others do so on request.
 ECHOING = frozenset({"udp_multicast"})
 
 
 class Message(Protocol):
-    """What of `can.Message` is looked at here."""
+    """The attributes of `can.Message` used here."""
 
     arbitration_id: int
     data: bytearray
@@ -19,7 +19,7 @@ class Message(Protocol):
 
 
 class CanEcho:
-    """What was sent on a bus with these settings and has not come back yet."""
+    """The frames sent on a bus with these settings that have not come back yet."""
 
     __slots__ = ("_comes", "_sent")
 
@@ -28,18 +28,18 @@ class CanEcho:
         self._sent: deque[tuple[int, bytes]] = deque(maxlen=MAX_ECHO)
 
     def sent(self, cob_id: int, data: bytes) -> None:
-        """A frame has gone out."""
+        """Record a frame that has gone out."""
         if self._comes:
             self._sent.append((cob_id, data))
 
     def forget(self) -> None:
-        """The bus was opened anew: nothing comes back any more."""
+        """The bus was reopened: nothing comes back any more."""
         self._sent.clear()
 
     def is_own(self, message: Message) -> bool:
-        """Our own frame has come back. Echoes come in the order of sending: those before it are lost.
+        """Whether this is our own frame. Echoes arrive in the order of sending: those before it are lost.
 
-        A frame just like it by somebody else is told from it by their number only, unless the driver marks echoes.
+        Unless the driver marks echoes, only their number distinguishes them from identical frames by somebody else.
         """
         if not message.is_rx:
             self._comes = False

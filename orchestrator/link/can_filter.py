@@ -1,20 +1,21 @@
-"""Which frames the kernel lets through to us: exactly those that somebody here subscribed to.
+"""The frames that the kernel passes to us: exactly those with a subscriber.
 
-On a shared bus everything else is thrown away where it costs least. Only SocketCAN is told: there error frames have a
-filter of their own, while python-can would drop them with the rest where it filters by itself, and slower than we do.
+On a shared bus everything else is dropped where it costs least. This is for SocketCAN only, which has a separate filter
+for error frames; on other interfaces python-can filters by itself, drops error frames with the rest, and is slower than
+we are.
 """
 
 from collections.abc import Iterable
 from typing import NotRequired, TypedDict
 
 _STANDARD_ID = 0x7FF
-_REMOTE = 0x4000_0000  #: CAN_RTR_FLAG: in the mask and not in the id, it keeps remote frames out
-_FUNCTION_CODE = 0x780  #: the upper four bits of a COB-ID, the lower seven are the node's id
+_REMOTE = 0x4000_0000  #: CAN_RTR_FLAG: set in the mask but not in the id, it excludes remote frames
+_FUNCTION_CODE = 0x780  #: the upper four bits of a COB-ID; the lower seven are the node id
 MOST = 512  #: linux/can.h: CAN_RAW_FILTER_MAX
 
 
 class Filter(TypedDict):
-    """As python-can has it."""
+    """A filter as in python-can."""
 
     can_id: int
     can_mask: int
@@ -22,7 +23,7 @@ class Filter(TypedDict):
 
 
 def filters(cob_ids: Iterable[int]) -> list[Filter]:
-    """For `can.BusABC.set_filters()`: one for each COB-ID, or one for each function code where that is too many."""
+    """For `can.BusABC.set_filters()`: one per COB-ID, or one per function code if those are too many."""
     wanted = sorted(set(cob_ids))
     mask = _STANDARD_ID
     if len(wanted) > MOST:

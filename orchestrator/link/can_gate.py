@@ -1,8 +1,8 @@
-"""What may be written to a CAN bus: this and nothing else. The last check before the wire, for every frame.
+"""The only frames that may be written to a CAN bus: the last check before the wire, for every frame.
 
-Reads of objects, the two kinds of timers that the CANopen manual offers (§2.5, §2.6) and NMT commands (§3.7), each to a
-node that the station file names. The limits are declared here once more, apart from those of the station file: a timer
-of a millisecond would fill the bus. The request of the older protocol (`protocol/pages.py`) only where it is asked for.
+Allowed are reads of objects, the two kinds of timers in the CANopen manual (§2.5, §2.6) and NMT commands (§3.7), each
+to a node named in the station file. The limits are declared here again, independently of the station file: a timer of a
+millisecond would fill the bus. The older protocol's request (`protocol/pages.py`) is allowed only on demand.
 """
 
 from collections.abc import Collection, Mapping
@@ -16,7 +16,7 @@ _READ = 0x40
 _WRITE_U16 = 0x2B
 _RESERVED = 0x2150  #: used inside CANopenNode, "leave it alone" (§1.4): not even read
 
-#: The objects that may be written, all of them 16-bit timers: (index, sub) → least and most milliseconds.
+#: The writable objects, all of them 16-bit timers: (index, sub) → minimum and maximum in milliseconds.
 WRITABLE: Mapping[tuple[int, int], tuple[int, int]] = {
     (0x1017, 0): (100, 2000),  # heartbeat
     (0x1800, 5): (50, 1000),  # event timers of TPDO 1, 2 and 3
@@ -28,7 +28,7 @@ WRITABLE: Mapping[tuple[int, int], tuple[int, int]] = {
 def refusal(cob_id: int, data: bytes, nodes: Collection[int], *, pages: bool = False) -> str:
     """Why this frame must not be sent; "" if it may.
 
-    `nodes` are the node ids that belong to the station. `pages`: their older protocol may be asked, too.
+    `nodes` are the station's node ids. `pages`: their older protocol may be used as well.
     """
     if cob_id == NMT_COB_ID:
         return _nmt_refusal(data, nodes)

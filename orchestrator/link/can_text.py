@@ -40,7 +40,7 @@ QUEUE_FULL = Cause("can_queue_full")
 
 
 def place(name: str, settings: Settings) -> Cause:
-    """Which bus it is: its name in the station file, and what that stands for."""
+    """The bus: its name in the station file, with interface and channel."""
     wire = f"{settings.get('interface', '–')} {settings.get('channel', '')}".rstrip()
     return Cause.of("can_bus", bus=name, wire=wire)
 
@@ -56,7 +56,7 @@ def _command(settings: Settings) -> str:
 
 
 def chain(error: BaseException) -> Iterator[BaseException]:
-    """An exception and all that it was raised from, the outermost first."""
+    """An exception and the chain of its causes, the outermost first."""
     seen: BaseException | None = error
     while seen is not None:
         yield seen
@@ -64,10 +64,10 @@ def chain(error: BaseException) -> Iterator[BaseException]:
 
 
 def errno_of(error: BaseException) -> int | None:
-    """The operating system's number of what went wrong, wherever in the chain it is; None if there is none."""
+    """The operating system's error number, wherever it is in the chain; None if there is none."""
     for link in chain(error):
         number = _number(link)
-        if isinstance(number, int) and number > 0:  # a name that cannot be resolved has a negative one of its own
+        if isinstance(number, int) and number > 0:  # name resolution errors have negative numbers
             return number
     return None
 

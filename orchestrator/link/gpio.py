@@ -1,6 +1,6 @@
-"""A GPIO line that drives a contactor: the only user of gpiod. Whatever goes wrong here becomes one LinkError.
+"""A GPIO line that drives a contactor: the only user of gpiod. Every failure here becomes a LinkError.
 
-gpiod is an extra, and imported when a station names a contactor. The kernel gives a line to one owner at a time, and an
+gpiod is an extra, imported only if a station names a contactor. The kernel gives a line to one owner at a time, and an
 owner is an open file: it can be shared with another process (where `lastresort/lastopen.py` drives it without a
 library).
 """
@@ -33,7 +33,7 @@ _CAUSES = {
 
 
 def need_gpiod() -> None:
-    """LinkError where the library is not installed."""
+    """LinkError if the library is not installed."""
     try:
         import gpiod  # noqa: F401, PLC0415 - only where a station has a contactor
     except ImportError:
@@ -41,7 +41,7 @@ def need_gpiod() -> None:
 
 
 class OutputLine:
-    """One GPIO line as an output, ours until it is closed. Every method but `close` raises LinkError once it fails."""
+    """One GPIO line as an output, ours until closed. Every method except `close` raises LinkError once it fails."""
 
     def __init__(self, request: "gpiod.LineRequest", chip: str, line: int, values: "tuple[Value, Value]") -> None:
         self._request, self._chip, self._line = request, chip, line
@@ -70,16 +70,16 @@ class OutputLine:
             raise _failed(error, self._chip, self._line) from error
 
     def fileno(self) -> int:
-        """The open file, for whom it is to be shared with."""
+        """The open file, for sharing with another process."""
         return self._request.fd
 
     def close(self) -> None:
-        """Give the line back, in whatever state it is. May be called again."""
+        """Release the line in its present state. May be called repeatedly."""
         self._request.release()
 
 
 def describe(chip: str, line: int) -> str:
-    """What the kernel says of a line, without taking it: its name, its direction, and who uses it."""
+    """The kernel's description of a line, without taking it: its name, its direction, and its user."""
     need_gpiod()
     import gpiod  # noqa: PLC0415 - as above
 

@@ -1,10 +1,10 @@
-"""The serial port to a charger: the only user of pyserial. Whatever goes wrong here becomes one LinkError.
+"""The serial port to a charger: the only user of pyserial. Every failure here becomes a LinkError.
 
-pyserial is used for what it does well: opening, locking and setting up the port. Around it stand the answers to its
-traps: waiting is done with poll(), since its own write spins on a full line and its timeouts reconfigure the port.
+pyserial does what it is good at: opening, locking and setting up the port. The rest avoids its traps: we wait with
+poll(), because pyserial's write spins on a full line and its timeouts reconfigure the port.
 
-The port is not ours alone. Whoever has it open may set it to something else (`line_settings.py`), or have locked it
-before us: a lock of another orchestrator is respected, any other one must not keep a stop from the charger.
+The port is not ours alone. Any process that has it open may change its settings (`line_settings.py`), or may have
+locked it before us: another orchestrator's lock is respected; any other lock must not block a stop.
 """
 
 import errno
@@ -29,15 +29,15 @@ BAUD = 19200  #: 8 data bits, no parity, 1 stop bit, no flow control (protocol 2
 BYTE_S = 10 / BAUD  #: start bit, 8 data bits, stop bit: 0.52 ms
 WRITE_TIMEOUT_S = 0.2  #: one slot; an idle line takes a frame at once, since the kernel buffers it
 
-_READ_SIZE = 4096  #: more than a line can bring in several slots
-#: What pyserial 3.5 raises when a port is unplugged, closed, odd or not there (SerialException is an OSError).
+_READ_SIZE = 4096  #: more than a line can deliver in several slots
+#: The exceptions of pyserial 3.5 for a port that is unplugged, closed, odd or missing (SerialException is an OSError).
 _FAILURES = (OSError, termios.error, TypeError, ValueError)
 
-_ESSENTIAL = ("baud", "data bits", "parity")  #: else no charger understands a word
+_ESSENTIAL = ("baud", "data bits", "parity")  #: without these no charger understands anything
 
 
 class SerialLine:
-    """One open serial port, used by one thread. Every method but `close` raises LinkError once the port fails."""
+    """One open serial port, used by one thread. Every method except `close` raises LinkError once the port fails."""
 
     def __init__(self, port: serial.Serial, *, locked: bool = True) -> None:
         self._port, self._path = port, str(port.port)
@@ -56,10 +56,10 @@ class SerialLine:
 
     @classmethod
     def open(cls, path: str, *, kernel_rs485: bool = False) -> Self:
-        """Open `path` for us alone, and forget what came in before.
+        """Open `path` exclusively, and discard earlier input.
 
-        Where a stranger has locked it, it is opened all the same: `locked_by` says so. `kernel_rs485`: let the serial
-        driver switch the line's direction (RTS high while sending). Not needed for adapters that switch by themselves.
+        A port locked by a foreign program is opened anyway: `locked_by` says so. `kernel_rs485`: let the serial driver
+        switch the line's direction (RTS high while sending). Adapters that switch automatically do not need it.
         LinkError says what is wrong and what to do.
         """
         locked = True
@@ -108,7 +108,7 @@ class SerialLine:
     def write(self, data: bytes) -> None:
         """Hand `data` to the port; it is on the wire `BYTE_S` a byte later. LinkError if the line takes nothing."""
         try:
-            # Not by pyserial: on a full line its write burns the processor until the time-out, and always costs twice.
+            # Not by pyserial: on a full line its write spins until the time-out, and it always costs twice as much.
             room = self._writable.poll(WRITE_TIMEOUT_S * 1000)
             if not room or os.write(self._port.fileno(), data) < len(data):
                 raise serial.SerialTimeoutException
@@ -119,10 +119,10 @@ class SerialLine:
             raise self._failed(error) from error
 
     def read(self, timeout_s: float, expected: int = 0) -> bytes:
-        """Whatever has come in, at the latest after `timeout_s`; b"" if nothing has.
+        """Whatever has arrived, after `timeout_s` at the latest; b"" if nothing has.
 
-        `expected`: so many bytes are still to cross the wire, ours and theirs. Sleeping over their time, rather than
-        waking for every few of them, costs a third of the processor time.
+        `expected`: the number of bytes still to cross the wire, ours and theirs. Sleeping for that time, instead of
+        waking for every few bytes, takes a third of the CPU time.
         """
         pause_s = min(timeout_s, expected * BYTE_S)
         if pause_s > 0:
@@ -138,35 +138,35 @@ class SerialLine:
         return data
 
     def fileno(self) -> int:
-        """The open file, for whom it is to be shared with. LinkError once closed."""
+        """The open file, for sharing with another process. LinkError once closed."""
         try:
             return self._port.fileno()
         except _FAILURES as error:
             raise self._failed(error) from error
 
     def close(self) -> None:
-        """Give the port back; what was written is still sent. May be called again, and after any failure."""
+        """Release the port; written bytes are still sent. May be called repeatedly, and after any failure."""
         try:
             self._port.close()
         except _FAILURES:
-            # The port is gone already, and pyserial has forgotten it.
+            # The port is already gone.
             self._port.is_open = False
 
     def _forget_output(self) -> None:
-        """Drop what a stalled line has not sent: an old command must not come out minutes later."""
+        """Drop a stalled line's unsent output: an old command must not go out minutes later."""
         try:
             self._port.reset_output_buffer()
         except _FAILURES:
-            return  # then there is no port left that could send it
+            return  # the port is gone, so nothing can be sent
 
     def _failed(self, error: Exception) -> LinkError:
         return LinkError(port_cause(error, self._path, otherwise=GONE))
 
 
 def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
-    """`exclusive`: with a flock, taken before anything else: it keeps a second service out, yet not a stop tool.
+    """`exclusive`: with a flock, taken before anything else: it excludes a second service, but not a stop tool.
 
-    TIOCEXCL would, so it is not set. None: without a lock.
+    TIOCEXCL would exclude stop tools too, so it is not set. None: without a lock.
     """
     port = serial.Serial(None, baudrate=BAUD, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=exclusive)
     port.port = path
@@ -183,7 +183,7 @@ def _open(path: str, *, exclusive: bool | None) -> serial.Serial:
 
 
 def _taken_back(path: str) -> bool:
-    """Whether the port had another line discipline, which is set right now: with N_NULL pyserial cannot open it."""
+    """Whether the port had another line discipline, now corrected: with N_NULL, pyserial cannot open it."""
     try:
         fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     except (OSError, ValueError):

@@ -1,7 +1,7 @@
-"""The nouns that travel through the system, all frozen: readings in, a decision out.
+"""The records that travel through the system, all frozen: readings in, a decision out.
 
-Units are in the names. Times called `t_s` are monotonic seconds and say when the value was *asked for*, so that an age
-computed from them is never too young. Unknown is `None`, never a number.
+Units are in the names. `t_s` is the monotonic time, in seconds, at which a value was *requested*, so that an age
+computed from it is never too young. Unknown is `None`, never a number.
 """
 
 from orchestrator.model.battery import BatteryLink, BatteryReading, BatteryStatus, Measurement

@@ -1,4 +1,4 @@
-"""The battery, as its BMU tells of it."""
+"""The battery as reported by its BMU."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from orchestrator.model.cause import Cause
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """A decoded value, in range, and when it was asked for."""
+    """A decoded value, in range, and when it was requested."""
 
     value: float
     t_s: float
@@ -29,7 +29,7 @@ class BatteryStatus(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class BatteryReading:
-    """The newest valid value of each field; None until one came. Field names are those an object map may use."""
+    """The newest valid value of each field; None until one arrives. An object map may use these field names."""
 
     voltage_v: Measurement | None = None
     current_a: Measurement | None = None  #: positive while charging
@@ -45,20 +45,20 @@ class BatteryReading:
 
 @dataclass(frozen=True, slots=True)
 class BatteryLink:
-    """How the line to a BMU is doing. Silence and refusal are two different faults."""
+    """The state of the link to a BMU. Silence and refusal are two different faults."""
 
     online: bool = False  #: it answered within the stale limit
     problem: Cause | None = None  #: why not
     boots: int = 0  #: boot-up frames seen
-    boot_t_s: float | None = None  #: when the newest came
-    heartbeat_s: float | None = None  #: period that the BMU accepted, None while there is none
+    boot_t_s: float | None = None  #: when the newest arrived
+    heartbeat_s: float | None = None  #: period accepted by the BMU, None while there is none
     heartbeat_t_s: float | None = None  #: newest heartbeat, or when it was armed
     nmt_state: int | None = None
     abort: Cause | None = None  #: a read that the BMU refuses: object, code and meaning; None once it answers again
     abort_code: int = 0
     implausible: Mapping[str, Cause] = field(default_factory=dict)  #: field → why its newest value was thrown away
     emergency: Cause | None = None  #: newest EMCY that is not "error reset"
-    bad_frames: int = 0  #: frames of this node thrown away: wrong length, not understood, late or second answers
+    bad_frames: int = 0  #: frames of this node discarded: wrong length, not understood, late or second answers
     other_master: Cause | None = None  #: what another CANopen master was last seen to do with this node
     other_master_t_s: float | None = None  #: when that was
     heartbeat_set: Cause | None = None  #: what somebody else had set this node's heartbeat to when that was last found

@@ -1,53 +1,54 @@
-"""Why something is as it is, as data: what a program compares and what a sentence in any language is made from."""
+"""Reasons as data: programs compare them, and sentences in any language are made from them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-#: A cause within a cause within a cause … is nothing that was ever said.
+#: The deepest nesting of causes; no real cause comes near it.
 DEPTH = 10
 #: Several causes at once, in `whats`.
 SEVERAL = "several"
 #: A mere sentence, in `text`.
 SAID = "said"
-#: The parts of a cause in JSON.
+#: The members of a cause in JSON.
 PARTS = frozenset({"id", "params", "key", "place", "advice", "text"})
 
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One cause. Two are the same if `id` and `key` are: figures change all the time, and texts with the language.
+    """One cause. Two are the same if `id` and `key` match: figures change constantly, and texts with the language.
 
-    `params` are (name, value) pairs, units in the names: numbers, words of a fixed list, other causes, tuples of these.
+    `params` are (name, value) pairs with units in the names: numbers, words of a fixed list, other causes, tuples of
+    these.
     """
 
     id: str
     params: tuple[tuple[str, Any], ...] = ()
-    key: str = ""  #: the path of the key in policy or station file that sets the limit: "pack.temperature_c"
-    place: str = ""  #: where that stands: FILE:LINE
-    advice: str = ""  #: the id of what to do about it
+    key: str = ""  #: path of the policy or station key that sets the limit: "pack.temperature_c"
+    place: str = ""  #: where that key is: FILE:LINE
+    advice: str = ""  #: the id of the advice
 
     @classmethod
     def of(cls, id_: str, /, *, key: str = "", place: str = "", advice: str = "", **params: Any) -> "Cause":  # noqa: ANN401 - as `params`
-        """One with its parameters as keywords."""
+        """Make a cause from keyword parameters."""
         return cls(id_, tuple(params.items()), key, place, advice)
 
     def same_as(self, other: "Cause | None") -> bool:
-        """Whether both are the same cause, whatever the figures are by now."""
+        """Whether both are the same cause, whatever their figures."""
         return other is not None and self.id == other.id and self.key == other.key
 
     def param(self, name: str) -> Any:  # noqa: ANN401 - as `params`
-        """The parameter of this name; None if there is none."""
+        """The parameter with this name; None if there is none."""
         return next((value for known, value in self.params if known == name), None)
 
     def with_(self, advice: str = "", **params: Any) -> "Cause":  # noqa: ANN401 - as `params`
-        """The same with more parameters, and with this advice."""
+        """The same cause with more parameters, and with this advice."""
         return Cause(self.id, (*self.params, *params.items()), self.key, self.place, advice or self.advice)
 
 
 def together(causes: Sequence[Cause]) -> Cause:
-    """One cause for all of them: itself where there is only one."""
+    """One cause for all of them; a single cause is returned as is."""
     return causes[0] if len(causes) == 1 else Cause.of(SEVERAL, whats=tuple(causes))
 
 
@@ -57,7 +58,7 @@ def said(text: str) -> Cause:
 
 
 def plain(cause: Cause) -> dict[str, object]:
-    """As JSON has it; `from_plain` makes it a cause again."""
+    """The cause as a JSON value; `from_plain` is the inverse."""
     return {
         "id": cause.id,
         "params": {name: _plain(value) for name, value in cause.params},
@@ -74,9 +75,9 @@ def _plain(value: Any) -> object:  # noqa: ANN401 - as `params`
 
 
 def from_plain(value: object, depth: int = DEPTH) -> Cause:
-    """The cause in a JSON value, ValueError for anything else. A `text` beside it is left out: it is made anew.
+    """The cause in a JSON value; ValueError for anything else. A `text` beside it is ignored: texts are generated.
 
-    Parameters may be an object, or a list of pairs as `dataclasses.asdict` has them.
+    Parameters may be an object, or a list of pairs as produced by `dataclasses.asdict`.
     """
     if not depth or not isinstance(value, Mapping) or not value.keys() <= PARTS or not value.get("id"):
         raise ValueError(f"{value!r:.80} is no cause")
@@ -102,7 +103,7 @@ def _value(value: object, depth: int) -> object:
     if isinstance(value, list | tuple) and depth:
         return tuple(_value(one, depth - 1) for one in value)
     if isinstance(value, str):
-        value.encode()  # half a character can be neither shown nor written again
+        value.encode()  # a lone surrogate can be neither shown nor written
     if not isinstance(value, str | int | float | None) or (isinstance(value, float) and not isfinite(value)):
         raise ValueError(f"{value!r:.80} is no parameter of a cause")
     return value

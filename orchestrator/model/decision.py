@@ -1,4 +1,4 @@
-"""What the core is given and what it says: a snapshot in, a decision out."""
+"""The core's input and output: a snapshot in, a decision out."""
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
@@ -10,7 +10,7 @@ from orchestrator.model.charger import ChargeMode, ChargerLink, ChargerReading, 
 
 
 class Request(StrEnum):
-    """What an operator can ask of a bay."""
+    """What an operator can request of a bay."""
 
     START = "start"
     PAUSE = "pause"
@@ -20,25 +20,25 @@ class Request(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """All that is known of one bay at one moment; together with the memory, all that a decision may depend on."""
+    """Everything known about one bay at one moment; a decision depends only on this and the memory."""
 
     charger: ChargerReading | None = None
     charger_link: ChargerLink = ChargerLink()
     battery: BatteryReading = BatteryReading()
     battery_link: BatteryLink = BatteryLink()
     request: Request | None = None
-    internal: str = ""  #: an exception of our own code, caught at the boundary, in words
-    late_s: float = 0.0  #: how much later than planned this step comes
-    slept_s: float = 0.0  #: how long the whole machine was suspended since the step before
+    internal: str = ""  #: an exception in our own code, caught at the boundary, as text
+    late_s: float = 0.0  #: how much later than planned this decision is made
+    slept_s: float = 0.0  #: how long the whole machine was suspended since the previous decision
     unkept: Cause | None = None  #: why faults that latch now would be forgotten by a restart; None while they would not
     ending: Cause | None = None  #: why the service is about to end; None while it is not
-    connected: bool = True  #: nothing is between charger and battery, or a contactor that was closed for this reading
+    connected: bool = True  #: no contactor between charger and battery, or one that was closed for this reading
     contactor_problem: Cause | None = None  #: why the contactor cannot be driven
     waits: Cause | None = (
-        None  #: why no charge may begin here right now, though nothing is wrong: another bay begins one
+        None  #: why no charge may begin here right now, although nothing is wrong: another bay is beginning one
     )
-    moves: str = ""  #: the bay whose BMU has seen the first amperes of this bay's charger, if it is another one
-    running_kept: bool = True  #: it is on disk that this bay's charger may be running
+    moves: str = ""  #: the other bay whose BMU saw the first amperes of this bay's charger, if that happened
+    running_kept: bool = True  #: the disk records that this bay's charger may be running
 
 
 class State(StrEnum):
@@ -60,27 +60,27 @@ class State(StrEnum):
 
 
 class Effect(IntEnum):
-    """What a fault does, mildest first; of all that are active the highest wins."""
+    """What a fault does, mildest first; the highest of all active ones wins."""
 
-    WARN = 1  #: said, nothing else
+    WARN = 1  #: reported, nothing else
     LIMIT = 2  #: charge on the lowest step only
-    NO_START = 3  #: a charge that runs goes on, none begins
-    PAUSE = 4  #: stop, go on by itself once clear
-    STOP = 5  #: stop; may go on after a backoff or when an operator starts
+    NO_START = 3  #: a running charge continues, none begins
+    PAUSE = 4  #: stop, resume by itself once clear
+    STOP = 5  #: stop; may resume after a backoff or an operator's start
     TRIP = 6  #: stop and latch until a person resets
 
 
 class Alarm(IntEnum):
-    """How urgently people must look at a bay; of many bays the highest counts."""
+    """How urgently people must look at a bay; of several bays the highest counts."""
 
-    NONE = 0  #: nobody need look: it works, rests, or stands by because an operator wanted it so
-    ATTENTION = 1  #: its charger stands by, verified, and a fault waits for a person
+    NONE = 0  #: nobody needs to look: it works, rests, or is in standby at an operator's request
+    ATTENTION = 1  #: its charger is in verified standby, and a fault waits for a person
     DANGER = 2  #: its charger is, or may be, out of control
 
 
 @dataclass(frozen=True, slots=True)
 class ActiveFault:
-    """One fault as status and journal show it."""
+    """One active fault as shown in status and journal."""
 
     id: str
     effect: Effect
@@ -100,7 +100,7 @@ class ActiveFault:
 
 @dataclass(frozen=True, slots=True)
 class Setpoint:
-    """What the charger shall be doing; None where this is left to it (automatic mode, standby)."""
+    """What the charger should be doing; None where the charger decides (automatic mode, standby)."""
 
     run: bool = False
     current_limit: int | None = None
@@ -113,25 +113,25 @@ STANDBY = Setpoint()
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The current step in force, and the rule that bound it."""
+    """The current step in force, and the rule that limits it."""
 
-    index: int  #: as the charger's protocol counts them: 0 (lowest) … 4
+    index: int  #: as in the charger's protocol: 0 (lowest) … 4
     current_a: float
-    rule: Cause  #: what limits it, with the line that says so
+    rule: Cause  #: what limits it, with the line that sets the limit
 
     @property
     def key(self) -> str:
-        """What bound it, the same however it is worded: "current.temperature_c.rows[0]"; "": nothing did."""
+        """The limiting key, independent of wording: "current.temperature_c.rows[0]"; "" if nothing limits it."""
         return self.rule.key
 
     @property
     def place(self) -> str:
-        """Where that stands, FILE:LINE."""
+        """Where that key is: FILE:LINE."""
         return self.rule.place
 
     @property
     def number(self) -> int:
-        """As people count them, on the charger's display too: 1 (lowest) … 5."""
+        """As people and the charger's display count: 1 (lowest) … 5."""
         return self.index + 1
 
     @property
@@ -146,7 +146,7 @@ class Session:
 
     started_s: float
     elapsed_s: float = 0.0
-    energised_s: float = 0.0  #: the part of it with the charger commanded to run
+    energised_s: float = 0.0  #: time during which the charger was commanded to run
     charged_ah: float = 0.0  #: integral of the charger's current
     charged_wh: float = 0.0
     soc_start_pct: float | None = None
@@ -154,26 +154,26 @@ class Session:
     step_changes: int = 0
     pulse_s: float = 0.0  #: spent in pulse precharge …
     continuous_s: float = 0.0  #: … and in continuous precharge, pauses not counted
-    rise_s: float = 0.0  #: spent in precharge since the pack's rise was last counted from the beginning …
+    rise_s: float = 0.0  #: spent in precharge since the current rise window began …
     rise_v: float | None = None  #: … at this pack voltage; None: precharge has not begun
-    full: Cause | None = None  #: by what the pack was found full; None while it is not …
-    full_pct: float | None = None  #: … at which SOC …
-    held_s: float = 0.0  #: … and for how long it has stayed on since
-    unseen_s: float = 0.0  #: for so long it may have gone on before a kill, uncounted: the limits count it as charged
-    result: Cause | None = None  #: why it ended; None while it goes on
+    full: Cause | None = None  #: the sign by which the pack was found full; None while it is not …
+    full_pct: float | None = None  #: … the SOC at that moment …
+    held_s: float = 0.0  #: … and how long charging has continued since
+    unseen_s: float = 0.0  #: uncounted time that may have passed before a kill; the limits count it as charged
+    result: Cause | None = None  #: why it ended; None while it continues
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What one `step()` says. The service carries out `command` and shows the rest."""
+    """The result of one `decide()`. The service carries out `command` and shows the rest."""
 
     state: State
     cause: Cause  #: why the bay is in this state
-    command: Command | None = None  #: standing order for the charger's port; None: only poll
+    command: Command | None = None  #: repeated to the charger until confirmed; None: only poll
     setpoint: Setpoint = STANDBY
     step: Step | None = None  #: while energised
     faults: tuple[ActiveFault, ...] = ()  #: the most dangerous first
     alarm: Alarm = Alarm.NONE
-    closed: bool = False  #: the contactor between charger and battery is to be closed
+    closed: bool = False  #: the contactor between charger and battery should be closed
     session: Session | None = None  #: running, or just ended (`result` set, in this one decision)
     answer: Cause | None = None  #: why the operator's request was refused; None: it was not

@@ -1,1 +1,1 @@
-"""The devices' languages, without I/O: bytes in, records out, and back."""
+"""The devices' protocols, without I/O: bytes to records and back."""

@@ -1,4 +1,4 @@
-"""The charger's messages: what its frames mean (protocol 2/2, §3.3, §4.1.1 and §4.2)."""
+"""The charger's messages: the meaning of its frames (protocol 2/2, §3.3, §4.1.1 and §4.2)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,12 +28,12 @@ class Code(IntEnum):
     STATUS_REQUEST = 0x01
     SET = 0x02  #: acted on in manual mode only
     STATUS_REPLY = 0x03
-    REST = 0x10  #: stop (to standby, whatever it is doing) and resume; acted on in both modes
+    REST = 0x10  #: stop (to standby, from any activity) and resume; acted on in both modes
     ERROR = 0x1F
 
 
 class Kind1(IntFlag):
-    """The basic values that a status request asks for (§3.3.1)."""
+    """Basic values requested by a status request (§3.3.1)."""
 
     VOLTAGE = 0x01
     CURRENT = 0x02
@@ -43,7 +43,7 @@ class Kind1(IntFlag):
 
 
 class Kind2(IntFlag):
-    """The extended values that a status request asks for (§3.3.1)."""
+    """Extended values requested by a status request (§3.3.1)."""
 
     OPERATION = 0x01
     CURRENT_LIMIT = 0x02
@@ -53,7 +53,7 @@ class Kind2(IntFlag):
 
 
 class Push(IntFlag):
-    """Which value a 0x02 frame sets (§3.3.2). The document lists single bits only: one value a frame."""
+    """The value that a 0x02 frame sets (§3.3.2). The document lists single bits only: one value per frame."""
 
     OPERATION = 0x01
     CURRENT_LIMIT = 0x02
@@ -65,7 +65,7 @@ class Push(IntFlag):
 
 Kinds = tuple[int, int]  #: kind 1, kind 2
 
-#: What the service asks for: all but the two temperatures, which hold no information since 2022-01.
+#: The values that the service requests: all but the two temperatures, which carry no information since 2022-01.
 STATUS_KINDS: Kinds = (0x13, 0x1F)
 
 
@@ -74,7 +74,7 @@ def _frame(code: Code, *data: int) -> bytes:
 
 
 def status_request(kind1: int = STATUS_KINDS[0], kind2: int = STATUS_KINDS[1]) -> bytes:
-    """The frame that asks for these values."""
+    """The frame requesting these values."""
     return _frame(Code.STATUS_REQUEST, kind1, kind2)
 
 
@@ -82,7 +82,7 @@ STATUS_REQUEST = status_request()
 STOP_FRAME = _frame(Code.REST, 0)  #: to standby, in manual and automatic mode; always the first frame of a stop
 OPERATION_STOP_FRAME = _frame(Code.SET, Push.OPERATION, 0)  #: the second, in manual mode
 
-#: Every command that there is, with its frame: what is not in here cannot be sent (§4.2.1).
+#: Every command and its frame; nothing else can be sent (§4.2.1).
 _FRAMES: dict[Command, bytes] = {
     Command(Action.RESUME): _frame(Code.REST, 1),
     Command(Action.RUN): _frame(Code.SET, Push.OPERATION, 1),
@@ -93,9 +93,9 @@ _FRAMES: dict[Command, bytes] = {
 
 
 def encode(command: Command) -> bytes:
-    """The frame that carries a command out; ValueError if its value is outside the list of §4.2.1.
+    """The frame for a command; ValueError if its value is not listed in §4.2.1.
 
-    A stop is never refused, whatever value it carries. In manual mode `OPERATION_STOP_FRAME` follows it.
+    A stop is never refused, whatever its value. In manual mode `OPERATION_STOP_FRAME` follows it.
     """
     if command.action is Action.STOP:
         return STOP_FRAME
@@ -114,20 +114,20 @@ def _hundredths(raw: int) -> float:
 
 
 def _signed_tenths(raw: int) -> float:
-    # Scale 0.1 and range ±327.67 contradict each other in §4.1.1; taken as 0.1 and never relied on.
+    # §4.1.1 contradicts itself: scale 0.1, range ±327.67. We use 0.1 and never rely on the value.
     return (raw - 0x10000 if raw & 0x8000 else raw) / 10
 
 
 @dataclass(frozen=True, slots=True)
 class StatusValue:
-    """One row of §4.1.1: a value that a status reply can hold."""
+    """One row of §4.1.1: a value in a status reply."""
 
     name: str  #: as in `ChargerReading`
-    title: str  #: as a person calls it
+    title: str  #: for people
     kind1: int
     kind2: int
-    decode: Callable[[int], float]  #: of the 16 raw bits; ValueError if they are not documented
-    documented: str = ""  #: the values that are
+    decode: Callable[[int], float]  #: decodes the 16 raw bits; ValueError if they are not documented
+    documented: str = ""  #: the documented values
 
     def value(self, raw: int) -> float | Cause:
         """The value, or why it is none."""
@@ -141,8 +141,8 @@ class StatusValue:
         return f"{self.title} {raw} (documented: {self.documented})"
 
 
-#: In the order of a reply. The document numbers the data of the ten defined values 1 to 20 without a gap, so the six
-#: void ones, which it mentions (§3.3.3) but does not list, can only follow them. Nobody needs to ask for those.
+#: In the order of a reply. The document numbers the data of the ten defined values 1 to 20 without gaps, so the six
+#: void ones, mentioned in §3.3.3 but not listed, can only follow them. Nothing needs to request those.
 STATUS_VALUES = (
     StatusValue("voltage_v", "voltage", Kind1.VOLTAGE, 0, _hundredths),
     StatusValue("current_a", "current", Kind1.CURRENT, 0, _hundredths),
@@ -163,12 +163,12 @@ STATUS_VALUES = (
 
 @lru_cache(maxsize=64)
 def status_values(kind1: int, kind2: int) -> tuple[StatusValue, ...]:
-    """The rows that a request for these kinds is answered with, in order."""
+    """The rows in the reply to a request for these kinds, in order."""
     return tuple(row for row in STATUS_VALUES if row.kind1 & kind1 or row.kind2 & kind2)
 
 
 def reply_bytes(kind1: int, kind2: int) -> int:
-    """The length of the whole reply frame to a request for these kinds."""
+    """The length of the complete reply frame to a request for these kinds."""
     return 2 * len(status_values(kind1, kind2)) + OVERHEAD
 
 
@@ -196,7 +196,7 @@ def parse_values(frame: Frame, kind1: int, kind2: int) -> dict[str, float | Caus
 
 
 def parse_status(frame: Frame, kinds: Kinds, t_s: float) -> ChargerReading:
-    """The reading in a reply to a request for `kinds`, which must hold `STATUS_KINDS`, sent at `t_s`.
+    """The reading in a reply to a request sent at `t_s` for `kinds`, which must include `STATUS_KINDS`.
 
     A value outside its documented list is None and has its cause in `illegal`. ProtocolError as in `parse_values`.
     """
@@ -212,7 +212,7 @@ def parse_status(frame: Frame, kinds: Kinds, t_s: float) -> ChargerReading:
 
 @dataclass(frozen=True, slots=True)
 class ErrorReply:
-    """A 0x1F frame: the charger refuses the frame that it received, and repeats parts of it."""
+    """A 0x1F frame: the charger rejects the frame that it received, and repeats parts of it."""
 
     bits: ErrorBit
     length: int
@@ -222,6 +222,6 @@ class ErrorReply:
 
 
 def parse_error(frame: Frame) -> ErrorReply:
-    """The charger's complaint. The order's place holds the error bits (§3.3.5). ProtocolError if it is none."""
+    """The charger's error reply. The order byte holds the error bits (§3.3.5). ProtocolError for any other frame."""
     _expect(frame, Code.ERROR, 4, frame.order)
     return ErrorReply(ErrorBit(frame.order), *frame.data)

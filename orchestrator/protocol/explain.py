@@ -1,4 +1,4 @@
-"""Explains charger frames in any notation, good and bad, to a person and to a program (`orchestrator decode`)."""
+"""Explains charger frames, good or bad, in any notation, to people and programs (`orchestrator decode`)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,25 +20,25 @@ from orchestrator.protocol.frame import (
 from orchestrator.protocol.hextext import byte_count, hex_of, parse_hex
 from orchestrator.protocol.meaning import NAMES, meaning_of, order_words
 
-#: The one example of the document that is no frame; who types it in wants to know that it is not their mistake.
+#: The one example in the document that is not a valid frame; tell whoever types it in that the mistake is not theirs.
 _MISPRINT = bytes.fromhex("AFFA90071F031110058939AFA0")
 _MISPRINT_NOTE = "This is the example of §3.3.5: the document prints 0x39, the sum is 0x68. A charger would send 0x68."
 
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """One frame, one false start, or a run of bytes that belong to no frame."""
+    """One frame, one false start, or a run of bytes outside any frame."""
 
-    ok: bool  #: a good frame in which everything is documented
+    ok: bool  #: a good frame with only documented content
     text: str  #: several lines for a person
-    facts: dict[str, object]  #: the same for a program, JSON-able
+    facts: dict[str, object]  #: the same for a program, as JSON values
 
 
 def explain(text: str, kinds: Kinds | None = None) -> list[Explained]:
     """Everything in a hexadecimal text, in order. HexError if it is not hexadecimal.
 
-    A reply does not say which values it holds. It is decoded by `kinds`, else by the status request before it in the
-    same text, else by the kinds that the service asks for where its length fits; else its raw words are shown.
+    A reply does not identify its values. It is decoded by `kinds`, else by the preceding status request in the same
+    text, else by the kinds that the service requests if the length fits; else its raw words are shown.
     """
     data = parse_hex(text)
     explained = []
@@ -57,7 +57,7 @@ def explain(text: str, kinds: Kinds | None = None) -> list[Explained]:
 
 
 def _pieces(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Good frames, false starts as far as they claim to reach, and what lies between them, each with its offset."""
+    """Good frames, false starts to their declared length, and the bytes in between, each with its offset."""
     done = 0
     at = data.find(START)
     while at >= 0:
@@ -109,7 +109,7 @@ def _bad(at: int, data: bytes, piece: bytes, kinds: Kinds | None) -> Explained:
 
 
 def _hints(ahead: bytes, piece: bytes) -> list[str]:
-    """What may help to find the mistake: the document's own one, or an end in another place than the length says."""
+    """Hints at the mistake: the document's own one, or an end marker that contradicts the length."""
     if piece == _MISPRINT:
         return [_MISPRINT_NOTE]
     end = ahead.find(END, OVERHEAD - 2)
@@ -126,7 +126,7 @@ Row = tuple[str, bytes, str]
 
 
 def _fields(piece: bytes, frame: Frame, kinds: Kinds | None) -> tuple[list[Row], dict[str, object], list[str]]:
-    """A frame of the length that it declares, field by field, whether its values are right or not."""
+    """A frame of its declared length, field by field, whether its values are right or not."""
     meaning = meaning_of(frame, kinds)
     order, order_problem = order_words(frame)
     name, sender = NAMES.get(frame.command, ("unknown command", "not documented"))

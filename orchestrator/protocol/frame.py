@@ -2,8 +2,8 @@
 
     AF FA | address | length | command | order | data … | checksum | AF A0
 
-Nothing is escaped, so `AF FA` and `AF A0` may occur inside data: a decoder goes by the length, checks everything, and
-after anything wrong resumes its hunt one byte past the false start.
+Nothing is escaped, so `AF FA` and `AF A0` may occur inside data. The decoder relies on the length, checks everything,
+and after any error resumes its search one byte past the false start.
 """
 
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ from orchestrator.protocol.hextext import hex_of
 
 START = b"\xaf\xfa"
 END = b"\xaf\xa0"
-ADDRESS = 0x90  #: every charger's, for good (§3.2.3)
+ADDRESS = 0x90  #: fixed, the same for every charger (§3.2.3)
 MAX_DATA = 32  #: 16 values of 2 bytes (§3.3.3); the "at most 20" of §3.2.7 is the ten defined ones
 COUNTED = 3  #: command, order and checksum are counted in the length (§3.2.4)
-OVERHEAD = 9  #: bytes of a frame without its data
+OVERHEAD = 9  #: bytes in a frame besides its data
 MAX_FRAME = MAX_DATA + OVERHEAD
 
 _HEADER = 4  # start, address, length
@@ -33,10 +33,10 @@ def checksum(counted: bytes) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What a frame carries. ValueError if it could not be sent: a byte outside 0 … 255, more than 32 data bytes."""
+    """A frame's content. ValueError if it could not be sent: a byte outside 0 … 255, more than 32 data bytes."""
 
     command: int
-    order: int  #: the address of the charger meant; in a 0x1F frame the error bits
+    order: int  #: the address of the intended charger; in a 0x1F frame, the error bits
     data: bytes
 
     def __post_init__(self) -> None:
@@ -44,7 +44,7 @@ class Frame:
             raise ValueError(f"no frame can carry command {self.command}, order {self.order}, {len(self.data)} bytes")
 
     def encode(self) -> bytes:
-        """The frame as it goes over the wire."""
+        """The frame's bytes on the wire."""
         counted = bytes((ADDRESS, len(self.data) + COUNTED, self.command, self.order)) + self.data
         return START + counted + bytes((checksum(counted),)) + END
 
@@ -53,14 +53,14 @@ class Frame:
 
 
 def declared_size(candidate: bytes) -> int | None:
-    """How long the frame says that it is, in bytes from its start; None while (or if) its length makes no sense."""
+    """The frame's declared size in bytes, from its start; None if the length is missing or invalid."""
     if len(candidate) >= _HEADER and COUNTED <= candidate[3] <= _MAX_LENGTH:
         return candidate[3] + _UNCOUNTED
     return None
 
 
 def why_bad(candidate: bytes) -> str:
-    """Everything that is wrong with bytes that begin with AF FA, expected beside got; "" for a good frame."""
+    """Everything wrong with bytes that begin with AF FA, expected and got; "" for a good frame."""
     if len(candidate) > len(START) and candidate[2] != ADDRESS:
         return f"address 0x{candidate[2]:02X}, expected 0x{ADDRESS:02X}"
     size = declared_size(candidate)
@@ -80,7 +80,7 @@ def why_bad(candidate: bytes) -> str:
 
 
 def frame_size(data: bytes, at: int) -> int:
-    """Look at the start found at `at`: the size of the good frame there, 0 if it is incomplete, -1 if it is none."""
+    """The size of the good frame that starts at `at`; 0 if it is incomplete, -1 if it is not a frame."""
     here = len(data) - at
     if here < _HEADER:
         return _BAD if here > len(START) and data[at + 2] != ADDRESS else _INCOMPLETE
@@ -97,30 +97,30 @@ def frame_size(data: bytes, at: int) -> int:
 
 
 class FrameDecoder:
-    """Finds the good frames in any stream of bytes, however it is cut up; holds less than one largest frame.
+    """Finds the good frames in a byte stream, however it is split; buffers less than one maximum-size frame.
 
-    A false start can declare a length and so wait for bytes that never come, with a good frame already among those that
-    came. When the line has fallen quiet (a gap, or the reply deadline), the caller says so with `flush()`.
+    A false start can declare a length and wait for bytes that never come, while a good frame is already among the
+    bytes received. When the line falls quiet (a gap, or the reply deadline), the caller calls `flush()`.
     """
 
     __slots__ = ("_pending", "bad_frames", "skipped_bytes")
 
     def __init__(self) -> None:
         self._pending = b""
-        self.bad_frames = 0  #: starts that turned out to begin no good frame
-        self.skipped_bytes = 0  #: bytes that belonged to no good frame
+        self.bad_frames = 0  #: starts not followed by a good frame
+        self.skipped_bytes = 0  #: bytes outside good frames
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames that these bytes complete, in order."""
+        """The frames completed by these bytes, in order."""
         return self._hunt(self._pending + data, final=False)
 
     def flush(self) -> list[Frame]:
-        """Wait no longer for the rest of what came: the good frames inside it. Nothing is pending afterwards."""
+        """Stop waiting for the rest; return the good frames inside the pending bytes. Nothing is pending afterwards."""
         return self._hunt(self._pending, final=True)
 
     def _hunt(self, data: bytes, *, final: bool) -> list[Frame]:
         frames: list[Frame] = []
-        done = 0  # everything before is framed or skipped
+        done = 0  # everything before it is framed or skipped
         at = data.find(START)
         while at >= 0:
             size = frame_size(data, at)

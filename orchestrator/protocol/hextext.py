@@ -1,4 +1,4 @@
-"""Bytes in words, and hexadecimal as people paste it: `AF FA 90`, `AFFA90`, `0xAF,0xFA`, `[AF:FA]`, `\\xAF\\xFA`."""
+"""Bytes as text, and hexadecimal as people paste it: `AF FA 90`, `AFFA90`, `0xAF,0xFA`, `[AF:FA]`, `\\xAF\\xFA`."""
 
 import re
 
@@ -20,13 +20,13 @@ def byte_count(count: int) -> str:
 
 
 def parse_hex(text: str) -> bytes:
-    """The bytes in a text. HexError names every character that is not hexadecimal, counted from 1."""
-    spaced = _PREFIX.sub("  ", text)  # as long as the prefix, so that positions stay true
+    """The bytes in a text. HexError names every character that is not hexadecimal, by position from 1."""
+    spaced = _PREFIX.sub("  ", text)  # as long as the prefix, to keep positions correct
     strange = [f"{found[0]!r} at character {found.start() + 1}" for found in _STRANGE.finditer(spaced)]
     if strange:
         raise HexError(f"not hexadecimal: {', '.join(strange)}")
     groups = list(_DIGITS.finditer(spaced))
-    # A lone digit is a byte that was printed without its zero; a longer odd group has lost a digit, nobody knows where.
+    # A lone digit is a byte printed without its zero; a longer odd group lost a digit at an unknown place.
     odd = [f"{found[0]!r} at character {found.start() + 1}" for found in groups if len(found[0]) % 2 and found[0][1:]]
     if odd:
         raise HexError(f"an odd number of digits: {', '.join(odd)}; a byte has two")

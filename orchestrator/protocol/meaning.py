@@ -1,4 +1,4 @@
-"""What the data of a charger's frame means, in words for a person and as values for a program."""
+"""The meaning of the data in a charger's frame, in words for people and as values for programs."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -19,14 +19,14 @@ from orchestrator.protocol.hextext import byte_count
 
 @dataclass(slots=True)
 class Meaning:
-    """Rows of (bytes, words), JSON-able facts, and what the document does not allow."""
+    """Rows of (bytes, words), facts as JSON values, and violations of the document."""
 
     rows: list[tuple[bytes, str]] = field(default_factory=list)
     facts: dict[str, object] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
 
 
-#: What each command is called, and who sends it.
+#: Each command's name and its sender.
 NAMES: dict[int, tuple[str, str]] = {
     Code.STATUS_REQUEST: ("status request", "controller → charger"),
     Code.SET: ("set value", "controller → charger, acted on in manual mode only"),
@@ -35,7 +35,7 @@ NAMES: dict[int, tuple[str, str]] = {
     Code.ERROR: ("error", "charger → controller: the frame that it received was bad"),
 }
 
-#: As the charger's document counts its steps, and as people see them everywhere.
+#: The current steps, by their value in a frame (0 … 4) and as people see them everywhere (1 … 5).
 _STEPS = {0: "step 1, the lowest", 1: "step 2", 2: "step 3", 3: "step 4", 4: "step 5, the highest"}
 _PUSHED: dict[int, tuple[str, dict[int, str]]] = {
     Push.OPERATION: ("operation", {0: "stop", 1: "run"}),
@@ -48,7 +48,7 @@ _UNITS = {"v": " V", "a": " A", "c": " °C"}
 
 
 def _raw(data: bytes) -> list[tuple[bytes, str]]:
-    """Rows of data of which no more is known."""
+    """Rows of undecoded data."""
     return [(data[at : at + 8], "") for at in range(0, len(data), 8)]
 
 
@@ -122,7 +122,7 @@ def _status_reply(frame: Frame, kinds: Kinds | None) -> Meaning:
 
 
 def _raw_reply(frame: Frame, kinds: Kinds | None) -> Meaning:
-    """The words of a reply that does not fit the kinds, or whose kinds nobody knows."""
+    """The raw words of a reply that does not fit the kinds, or whose kinds are unknown."""
     count = len(frame.data)
     words = [int.from_bytes(frame.data[at : at + 2]) for at in range(0, count, 2)]
     meaning = Meaning(_raw(frame.data), {"words": words})
@@ -152,7 +152,7 @@ def _error(frame: Frame, _kinds: Kinds | None) -> Meaning:
     )
 
 
-#: How many data bytes a command has, where that is fixed, and what they mean.
+#: By command: the number of its data bytes, if fixed, and the function that decodes them.
 _DATA: dict[int, tuple[int | None, Callable[[Frame, Kinds | None], Meaning]]] = {
     Code.STATUS_REQUEST: (2, _status_request),
     Code.SET: (2, _set),
@@ -163,7 +163,7 @@ _DATA: dict[int, tuple[int | None, Callable[[Frame, Kinds | None], Meaning]]] = 
 
 
 def order_words(frame: Frame) -> tuple[str, str]:
-    """What the order's place says, and what is wrong with it."""
+    """The meaning of the order byte, and what is wrong with it."""
     if frame.command == Code.ERROR:
         return f"what was wrong: {', '.join(error_names(frame.order)) or 'no documented bit is set'}", ""
     if frame.order != ADDRESS:
@@ -173,7 +173,7 @@ def order_words(frame: Frame) -> tuple[str, str]:
 
 
 def meaning_of(frame: Frame, kinds: Kinds | None) -> Meaning:
-    """What the frame's data says. `kinds` are those of the request that a reply answers, None if they are not known."""
+    """The meaning of the frame's data. `kinds` are those of the request that a reply answers, None if unknown."""
     size, decode = _DATA.get(frame.command, (None, None))
     if decode is not None and size in (None, len(frame.data)):
         return decode(frame, kinds)

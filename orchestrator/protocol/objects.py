@@ -1,4 +1,4 @@
-"""The BMU's object map: which CANopen object holds which field, in which bits. Data: the document leaves it open.
+"""The BMU's object map: which CANopen object holds which field, in which bits. It is data: the document leaves it open.
 
 Source: CANopen manual §1.5 (names and order of the fields), §4.1 (the only sample). Words are little-endian on the wire
 (§3); here a word is already an unsigned integer.
@@ -10,16 +10,16 @@ from enum import StrEnum
 from orchestrator.keys import Range, Source, key
 from orchestrator.model import BatteryReading
 
-#: The names that a map may give to its fields.
+#: The permitted field names of a map.
 READING_FIELDS = tuple(each.name for each in fields(BatteryReading))
 
 
 class Evidence(StrEnum):
-    """How sure a row of the map is."""
+    """How certain a row of the map is."""
 
-    DOCUMENTED = "documented"  #: the device's document says so
-    INFERRED = "inferred"  #: the only reading of a documented sample that makes sense
-    ASSUMED = "assumed"  #: check on hardware before charging by it
+    DOCUMENTED = "documented"  #: stated in the device's document
+    INFERRED = "inferred"  #: the only sensible reading of a documented sample
+    ASSUMED = "assumed"  #: check on hardware before relying on it
 
 
 class Sweep(StrEnum):
@@ -57,7 +57,7 @@ class ObjectEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TpdoEntry:
-    """What one TPDO carries: whole objects, one behind the other from byte 0."""
+    """The content of one TPDO: whole objects, consecutive from byte 0."""
 
     number: int = key("1, 2 or 3 (COB-ID 0x180, 0x280, 0x380 + node id)", ge=1, le=3)
     objects: tuple[int, ...] = key("the indexes of the objects, in order")

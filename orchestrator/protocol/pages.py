@@ -1,9 +1,9 @@
-"""The BMU's older protocol, which is not CANopen: three pages that carry the values of the object map in a known order.
+"""The BMU's older protocol, which is not CANopen: three pages carrying the values of the object map in a known order.
 
-It is not in the BMU's document; request, pages and units are those of public robot software that reads the same BMUs.
-So nothing is charged by it: it only helps to find out which object map is right (`orchestrator probe --old-protocol`).
-A request is one byte; each page is one frame: the request's byte, the page's number, then the values, little-endian.
-The COB-ID of the pages is not known.
+The BMU's document does not describe it; request, pages and units come from public robot software that reads the same
+BMUs. No charge relies on it: it only helps to identify the right object map (`orchestrator probe --old-protocol`). A
+request is one byte. Each page is one frame: the request byte, the page number, then the values, little-endian. The
+COB-ID of the pages is unknown.
 """
 
 from functools import partial
@@ -12,23 +12,23 @@ from orchestrator.keys import Range
 from orchestrator.protocol.objects import Evidence, FieldMap
 from orchestrator.protocol.words import Decoded, decode_fields
 
-_PAGE_BYTES = 8  #: the echo, the page's number, and six bytes of values
+_PAGE_BYTES = 8  #: the echoed request, the page number, and six bytes of values
 
 
 def pages_request_cob_id(node_id: int) -> int:
-    """Where a node is asked for its pages."""
+    """The COB-ID for requesting a node's pages."""
     return 0x460 + node_id
 
 
 def pages_request(node_id: int) -> bytes:
-    """The data of the request; the pages begin with it."""
+    """The data of the request; each page begins with it."""
     return bytes((0x60 + node_id,))
 
 
 _field = partial(FieldMap, evidence=Evidence.ASSUMED)
 _minutes = partial(_field, width=16, unavailable=0xFFFF, range=Range(0, 65534))  # as in the object maps
 
-#: The values on each page, by its number.
+#: The values on each page, by page number.
 PAGES = {
     1: (
         _field(name="voltage_v", first_bit=0, width=16, scale=0.01, range=Range(0, 100)),
@@ -50,7 +50,7 @@ PAGES = {
 
 
 def parse_page(node_id: int, data: bytes) -> dict[str, Decoded]:
-    """The values on a page of this node; nothing for any other frame."""
+    """The values on a page from this node; empty for any other frame."""
     if len(data) != _PAGE_BYTES or data[:1] != pages_request(node_id) or data[1] not in PAGES:
         return {}
     return decode_fields(PAGES[data[1]], int.from_bytes(data[2:], "little"), 0.0)

@@ -1,7 +1,7 @@
-"""CANopen's expedited SDO exchange and the few other frames that the BMU speaks, without I/O (CANopen manual §2, §3).
+"""CANopen's expedited SDO exchange and the few other frames that the BMU uses, without I/O (CANopen manual §2, §3).
 
-An object is read or written with one frame each way; segmented and block transfers, which could go on for ever, are not
-understood on purpose. Everything is little-endian (§3).
+Reading or writing an object takes one frame each way. Segmented and block transfers, which could continue for ever, are
+deliberately not supported. Everything is little-endian (§3).
 """
 
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ _ABORT = 0x80
 
 
 class NmtCommand(IntEnum):
-    """What an NMT frame (COB-ID 0) can ask of a node (§3.7)."""
+    """The commands of an NMT frame (COB-ID 0) (§3.7)."""
 
     START = 0x01
     STOP = 0x02
     PREOPERATIONAL = 0x80
     RESET_NODE = 0x81  #: the board reboots
-    RESET_COMMUNICATION = 0x82  #: the boot-up frame is sent again
+    RESET_COMMUNICATION = 0x82  #: the node sends its boot-up frame again
 
 
 class NmtState(IntEnum):
-    """What a heartbeat says (§3.8)."""
+    """The state in a heartbeat (§3.8)."""
 
     BOOT_UP = 0x00
     STOPPED = 0x04
@@ -43,22 +43,22 @@ _TPDO_BASES = {1: 0x180, 2: 0x280, 3: 0x380, 4: 0x480}
 
 
 def request_cob_id(node_id: int) -> int:
-    """SDO requests to this node."""
+    """The COB-ID of SDO requests to this node."""
     return 0x600 + node_id
 
 
 def reply_cob_id(node_id: int) -> int:
-    """SDO replies of this node."""
+    """The COB-ID of SDO replies from this node."""
     return 0x580 + node_id
 
 
 def heartbeat_cob_id(node_id: int) -> int:
-    """Boot-up and heartbeat of this node."""
+    """The COB-ID of boot-up and heartbeat from this node."""
     return 0x700 + node_id
 
 
 def tpdo_cob_id(number: int, node_id: int) -> int:
-    """TPDO 1 … 4 of this node."""
+    """The COB-ID of TPDO 1 … 4 from this node."""
     return _TPDO_BASES[number] + node_id
 
 
@@ -74,7 +74,7 @@ def _multiplexer(index: int, sub: int) -> bytes:
 
 
 def read_request(index: int, sub: int) -> bytes:
-    """The frame that asks for an object."""
+    """The frame that reads an object."""
     return bytes((_READ,)) + _multiplexer(index, sub) + bytes(4)
 
 
@@ -92,7 +92,7 @@ class SdoValue:
     index: int
     sub: int
     value: int  #: unsigned
-    size: int  #: bytes that the reply declares: 1, 2 or 4
+    size: int  #: bytes declared by the reply: 1, 2 or 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class SdoWritten:
 
 @dataclass(frozen=True, slots=True)
 class SdoAbort:
-    """The node is there and refuses."""
+    """The node is there but refuses."""
 
     index: int
     sub: int
@@ -120,7 +120,7 @@ class SdoAbort:
 
 @dataclass(frozen=True, slots=True)
 class SdoMalformed:
-    """Not a reply that we understand; it counts as none."""
+    """A reply that we do not understand; it counts as no reply."""
 
     cause: Cause
 
@@ -129,7 +129,7 @@ SdoReply = SdoValue | SdoWritten | SdoAbort | SdoMalformed
 
 
 def parse_reply(data: bytes | bytearray) -> SdoReply:
-    """What a frame on a node's reply COB-ID says. Never raises. (python-can hands out bytearrays.)"""
+    """Decode a frame on a node's reply COB-ID. Never raises. (python-can delivers bytearrays.)"""
     if len(data) != FRAME_BYTES:
         return SdoMalformed(Cause.of("sdo_length", size=len(data), expected=FRAME_BYTES, data=hex_of(data)))
     command, index, sub = data[0], data[1] | data[2] << 8, data[3]

@@ -1,6 +1,6 @@
-"""SDO frames of other masters: who asks for which object, and how their longer transfers go on (CiA 301, §7.2.4).
+"""SDO frames of other masters: which object they request, and how their longer transfers proceed (CiA 301, §7.2.4).
 
-We never use these transfers; we must only know whose an answer is.
+We never use these transfers; we only need to know which request a reply belongs to.
 """
 
 from dataclasses import dataclass
@@ -10,25 +10,25 @@ from orchestrator.protocol.sdo import FRAME_BYTES
 
 
 class Ask(Enum):
-    """What a request wants."""
+    """What a request asks for."""
 
     READ = auto()
     WRITE = auto()
     BLOCK_READ = auto()
     BLOCK_WRITE = auto()
-    STREAM = auto()  #: "send the next block": numbered segments follow, one behind the other
-    ON = auto()  #: the next frame of a transfer that has begun
+    STREAM = auto()  #: "send the next block": numbered segments follow in sequence
+    ON = auto()  #: the next frame of a running transfer
     ABORT = auto()
 
 
 @dataclass(frozen=True, slots=True)
 class SdoRequest:
-    """A request to a node; `index` and `sub` mean nothing for STREAM and ON."""
+    """A request to a node; `index` and `sub` are meaningless for STREAM and ON."""
 
     ask: Ask
     index: int = 0
     sub: int = 0
-    timer_ms: int | None = None  #: what is written, if that is an expedited value of 16 bits
+    timer_ms: int | None = None  #: the value written, if it is an expedited 16-bit value
 
 
 _BY_SPECIFIER = {0: Ask.ON, 1: Ask.WRITE, 2: Ask.READ, 3: Ask.ON, 4: Ask.ABORT}
@@ -37,7 +37,7 @@ _U16 = 0x2B
 
 
 def parse_request(data: bytes) -> SdoRequest | None:
-    """What a frame on a node's request COB-ID asks for; None if it is no SDO request."""
+    """Decode a frame on a node's request COB-ID; None if it is not an SDO request."""
     if len(data) != FRAME_BYTES:
         return None
     specifier = data[0] >> 5
@@ -56,7 +56,7 @@ def parse_request(data: bytes) -> SdoRequest | None:
 
 
 class Part(Enum):
-    """What a reply that is not an expedited one says."""
+    """The meaning of a reply that is not expedited."""
 
     BEGIN = auto()  #: a longer transfer of the object begins
     MORE = auto()  #: one frame of it
@@ -65,7 +65,7 @@ class Part(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SdoPart:
-    """A reply within a longer transfer; `index` and `sub` mean something for BEGIN only."""
+    """A reply within a longer transfer; `index` and `sub` are meaningful for BEGIN only."""
 
     part: Part
     index: int = 0
@@ -76,9 +76,9 @@ _BLOCK_WRITTEN = {0: Part.BEGIN, 1: Part.LAST, 2: Part.MORE}
 
 
 def parse_part(data: bytes) -> SdoPart | None:
-    """What a reply says that belongs to a longer transfer; None if it is an expedited reply, or none at all.
+    """Decode a reply within a longer transfer; None if it is an expedited reply, or not a reply.
 
-    Segments of a block read have no mark of their own: who knows that one streams asks `segment_number`.
+    Segments of a block read carry no marker: a caller that knows one is streaming uses `segment_number`.
     """
     if len(data) != FRAME_BYTES:
         return None
@@ -97,5 +97,5 @@ def parse_part(data: bytes) -> SdoPart | None:
 
 
 def segment_number(data: bytes) -> int:
-    """Of a segment of a block, 1 … 127."""
+    """The sequence number of a block segment, 1 … 127."""
     return data[0] & 0x7F

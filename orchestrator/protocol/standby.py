@@ -1,26 +1,26 @@
-"""The stop, and the proof that it was obeyed, as bytes: all that a process of last resort needs, quick to import."""
+"""The stop, and the proof that it was obeyed, as bytes: all that a last-resort process needs, and quick to import."""
 
-#: 0x10 rest 0: to standby, whatever the charger is doing, in manual and in automatic mode (§3.3.4, §1.3.1).
+#: 0x10 rest 0: to standby from any activity, in manual and in automatic mode (§3.3.4, §1.3.1).
 STOP_FRAME = bytes.fromhex("AF FA 90 04 10 90 00 34 AF A0")
-#: 0x02 push 0x01 value 0: so that a later resume does not run on; acted on in manual mode only (§3.3.2).
+#: 0x02 push 0x01 value 0: keeps a later resume from running the charger; acted on in manual mode only (§3.3.2).
 OPERATION_STOP_FRAME = bytes.fromhex("AF FA 90 05 02 90 01 00 28 AF A0")
-#: Kinds 0x12 and 0x01: amps, control mode, operation (§3.3.1). The service asks for eight values or more, so that no
-#: answer to a question of its own, from before the stop perhaps, can be taken for an answer to this one. The control
-#: mode is for distance only: without it the frame would have the checksum of `run`.
+#: Kinds 0x12 and 0x01: current, control mode, operation (§3.3.1). The service requests eight values or more, so a reply
+#: to the service's own request, perhaps from before the stop, cannot be mistaken for a reply to this one. The control
+#: mode is there only to change the checksum: without it, the frame would have the checksum of `run`.
 QUESTION = bytes.fromhex("AF FA 90 05 01 90 12 01 39 AF A0")
 
-#: How its answer begins: address, length (6 bytes of data + 3), command 0x03, order (§3.3.3).
+#: The beginning of its answer: address, length (6 bytes of data + 3), command 0x03, order (§3.3.3).
 _ANSWER_HEAD = bytes.fromhex("AF FA 90 09 03 90")
 _ANSWER_END = bytes.fromhex("AF A0")
 _DATA_BYTES = 6
 ANSWER_BYTES = len(_ANSWER_HEAD) + _DATA_BYTES + 1 + len(_ANSWER_END)
 _CURRENT, _OPERATION = slice(0, 2), slice(4, 6)
-#: In 0.01 A: standby may show so much, as everywhere else.
+#: In 0.01 A: the most that standby may show, as everywhere else.
 _STANDBY_CENTIAMPS = 50
 
 
 def stands_by(data: bytes) -> bool | None:
-    """What the newest good answer to QUESTION in `data` says: True for standby, False for running, None without one.
+    """The newest good answer to QUESTION in `data`: True for standby, False for running, None if there is none.
 
     Standby is operation 0 and at most 0.5 A.
     """

@@ -1,4 +1,4 @@
-"""From the BMU's words to measurements, by an object map."""
+"""Decodes the BMU's words into measurements, by an object map."""
 
 from collections.abc import Iterable
 
@@ -11,12 +11,12 @@ Decoded = Measurement | Cause | None
 
 
 def raw_bits(field: FieldMap, word: int) -> int:
-    """The field's own bits of a word, sign and scale not yet applied."""
+    """The field's bits in a word, before sign and scale."""
     return word >> field.first_bit & (1 << field.width) - 1
 
 
 def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[str, Decoded]:
-    """Every field of an object, from the unsigned word that a reply of `size` bytes carried; asked for at `t_s`."""
+    """Every field of an object, from the unsigned word in a reply of `size` bytes to a request made at `t_s`."""
     if size != entry.size:
         why = Cause.of("size_differs", index=entry.index, sub=entry.sub, size=size, expected=entry.size)
         return {field.name: why for field in entry.fields}
@@ -24,7 +24,7 @@ def decode_word(entry: ObjectEntry, word: int, size: int, t_s: float) -> dict[st
 
 
 def decode_fields(fields: Iterable[FieldMap], word: int, t_s: float) -> dict[str, Decoded]:
-    """Every field of a word that is as long as it should be; asked for at `t_s`."""
+    """Every field of a word of the right length, requested at `t_s`."""
     return {field.name: _decode(field, word, t_s) for field in fields}
 
 

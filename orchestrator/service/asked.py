@@ -1,4 +1,4 @@
-"""A request of an operator on its way: decided by one step, answered when its effect is on the disk."""
+"""An operator's request on its way: handled by one decision, answered when its effect is on disk."""
 
 from collections.abc import Callable
 from itertools import takewhile
@@ -9,7 +9,7 @@ from orchestrator.service.store import KEPT_WITHIN_S, Store
 
 
 class Asked:
-    """`answer` is set when `done` is: None is yes."""
+    """`answer` is valid once `done` is set: None means yes."""
 
     def __init__(self, request: Request) -> None:
         self.request = request
@@ -18,7 +18,7 @@ class Asked:
 
 
 class Requests:
-    """What was asked of one bay and is not decided yet. From any thread."""
+    """The requests to one bay that are not decided yet. Thread-safe."""
 
     def __init__(self) -> None:
         self._asked: list[Asked] = []
@@ -28,7 +28,7 @@ class Requests:
         return bool(self._asked)
 
     def put(self, asked: Asked) -> None:
-        """A stop waits for nothing: what was asked before it and is not done yet is refused."""
+        """Add a request. A stop waits for nothing: earlier requests that are not done yet are refused."""
         with self._lock:
             if asked.request is Request.STOP:
                 for early in (one for one in self._asked if one.request is not Request.STOP):
@@ -38,7 +38,7 @@ class Requests:
             self._asked.append(asked)
 
     def take(self) -> list[Asked]:
-        """The request whose turn it is, as often as it was made in a row: one step answers all of them."""
+        """The next request, with its consecutive repetitions: one decision answers all of them."""
         with self._lock:
             taken = list(takewhile(lambda one: one.request is self._asked[0].request, self._asked))
             del self._asked[: len(taken)]
@@ -46,20 +46,20 @@ class Requests:
 
 
 class Answers:
-    """The requests of one bay that were done, and are not on the disk yet. Used by the control loop only.
+    """One bay's completed requests that are not on disk yet. Used by the control loop only.
 
-    A start that no disk takes is withdrawn: `withdraw` holds the bay again. Nothing has begun: a charger is told
-    to run only once the disk has the beginning.
+    A start that the disk does not take is withdrawn: `withdraw` holds the bay again. Nothing has begun by then: a
+    charger is commanded to run only once the start is on disk.
     """
 
     def __init__(self, store: Store, withdraw: Callable[[], None]) -> None:
         self._store, self._withdraw = store, withdraw
         self.waiting: list[
             tuple[Asked, int, float, bool]
-        ] = []  #: with the revision that keeps it, until when to wait, and whether it changed something
+        ] = []  #: (request, revision that persists it, time until which to wait, whether it changed anything)
 
     def give(self, asked: Asked, answer: Cause | None, revision: int, now_s: float, *, changed: bool = True) -> None:
-        """Answer it: a refusal at once, what was done when the disk has it."""
+        """Answer a request: a refusal at once, an accepted one when it is on disk."""
         asked.answer = answer
         if answer is not None:
             asked.done.set()
@@ -67,7 +67,7 @@ class Answers:
             self.waiting.append((asked, revision, now_s + KEPT_WITHIN_S, changed))
 
     def look(self, now_s: float) -> None:
-        """Tell those whose time has come."""
+        """Answer the requests that are on disk or have waited long enough."""
         kept = self._store.kept_revision
         left = []
         for asked, revision, until_s, changed in self.waiting:

@@ -1,4 +1,4 @@
-"""One bay in the running service: its devices' newest views in, one decision out, carried out and written down."""
+"""One bay in the running service: the devices' newest views in, one decision out, carried out and recorded."""
 
 import traceback
 from collections.abc import Callable
@@ -34,12 +34,12 @@ from orchestrator.service.status import bay_status, contactor_fields
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
 
-#: A bay without news is looked at this often; what has gone stale is noticed within it.
+#: A bay without news is decided this often, so that stale values are noticed.
 TICK_S = 0.2
 
 
 class BayRunner:
-    """Runs `step()` for one bay. Used by the control loop's thread only, but for `ask` and `status`."""
+    """Runs `decide()` for one bay. Used by the control loop's thread only, except `ask` and `status`."""
 
     def __init__(
         self,
@@ -56,18 +56,18 @@ class BayRunner:
         language: str = "en",
     ) -> None:
         self.name, self.place = bay.name, Place.of(bay)
-        self.last_s = 0.0  #: when the last step was taken
+        self.last_s = 0.0  #: when the last decision was made
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
         self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
-        self._memory: Memory | None = None  # before the first step: what the last run has left is still being read
-        self._revision = 0  # the one that keeps this bay's memory
+        self._memory: Memory | None = None  # None before the first decision: the persisted state is still being read
+        self._revision = 0  # the revision that persists this bay's memory
         self._ending: Cause | None = None
-        self._waits: Cause | None = None  # why the next run has to wait for an operator
+        self._waits: Cause | None = None  # why the next run must wait for an operator
         self._asleep_s = 0.0
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
-        self._starts = starts or Starts(0.0, "")  # nobody to wait for
+        self._starts = starts or Starts(0.0, "")  # no other bay to wait for
         self._written: tuple[Cause | None, bool] | None = None  # of the contactor: problem, closed
         self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
         self._requests = Requests()
@@ -75,7 +75,7 @@ class BayRunner:
 
     @property
     def verified(self) -> bool:
-        """The charger stands by, by its own word, and nothing is ordered."""
+        """Whether the charger is in verified standby, and nothing is commanded."""
         decision = self.decision
         return decision is not None and decision.state in SETTLED and decision.command is None
 
@@ -86,45 +86,45 @@ class BayRunner:
 
     @property
     def owes(self) -> bool:
-        """Somebody waits for an answer."""
+        """Whether somebody is waiting for an answer."""
         return bool(self._requests or self._answers.waiting)
 
     def answer(self) -> None:
-        """At the end of the service: nobody can wait any longer for an answer."""
+        """Give all pending answers, at the end of the service."""
         self._answers.look(inf)
 
     def end(self, why: Cause, *, orderly: bool = True) -> None:
-        """Stop for the end of the service: this stop is no operator's, so the next run does not keep to it.
+        """Stop because the service ends: this is not an operator's stop, so the next run may resume.
 
-        Unless it is not `orderly` and ends a charge: that one waits for an operator, as after any other failure (G3).
+        Unless it is not `orderly` and ends a charge: then the bay waits for an operator, as after any failure (G3).
         """
         self._ending = why
         if not orderly and self.decision is not None and self.decision.state in ENERGISED:
             self._waits = Cause.of("ended_in_charge", why=why)
 
     def isolate(self) -> None:
-        """Open the contactor for good, at the end of the service, and write it down."""
+        """Open the contactor for good, at the end of the service, and record that."""
         if self._contactor is not None:
             self._contactor.give_back()
             self._write_down_contactor(self._contactor)
 
     def ask(self, asked: Asked) -> None:
-        """Hand in an operator's request; it is answered by the next step."""
+        """Submit an operator's request; the next decision handles it."""
         self._requests.put(asked)
 
     def _withdraw(self) -> None:
-        """Hold, as after a stop: a start could not be kept."""
+        """Hold, as after a stop: a start could not be persisted."""
         self.ask(Asked(Request.STOP))
 
     def run(self, now_s: float, asleep_s: float = 0.0) -> None:
-        """Take one step. An exception of our own code stops the bay and is told to the next step.
+        """Make one decision. An exception in our own code stops the bay and is passed to the next decision.
 
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
         asked, before = self._requests.take(), self._revision
         try:
             self._step(now_s, asleep_s, asked[0].request if asked else None)
-        except Exception as error:  # noqa: BLE001 - whatever it is: the charger must not go on
+        except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
             self._charger.order(STOP)
             self._failed(error, now_s, asked[0].request if asked else None)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
@@ -135,7 +135,7 @@ class BayRunner:
         self._answers.look(now_s)
 
     def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:
-        """Go on from a memory that knows since when the bay is being stopped; where even that fails, from none."""
+        """Continue with a memory that knows since when the bay has been stopping; if even that fails, without one."""
         where = traceback.extract_tb(error.__traceback__)[-1]
         internal = f"{error!r} in {where.name}, line {where.lineno}"
         if internal != self._internal:
@@ -146,7 +146,7 @@ class BayRunner:
             memory = memory or self._store.past(self.place).memory(now_s)
             self.decision, self._memory = carry_on(now_s, snapshot, memory, internal, self.name)
             self._keep(self._memory, now_s)
-        except Exception:  # noqa: BLE001 - the stop is out; what is said of it is the least that there is
+        except Exception:  # noqa: BLE001 - the stop is out; report the minimum
             self.decision = Decision(State.STOPPING, Cause.of("failed", error=internal), STOP, alarm=Alarm.DANGER)
 
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
@@ -179,7 +179,7 @@ class BayRunner:
         return Cause.of("bay_goes", bay=self.name, before=before.state.value, state=state, reason=reason)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
-        """All that is known of the bay now."""
+        """Everything known about the bay now."""
         reading, charger_link = self._charger.view
         values, battery_link = self._battery.view
         late_s = now_s - self.last_s - TICK_S if self.decision else 0.0
@@ -192,7 +192,7 @@ class BayRunner:
             battery_link,
             request,
             self._internal,
-            late_s=late_s if late_s > TICK_S else 0.0,  # less is how such a machine lives
+            late_s=late_s if late_s > TICK_S else 0.0,  # less is normal on such a machine
             slept_s=slept_s if slept_s > TICK_S else 0.0,
             unkept=self._store.unkept(now_s),
             ending=self._ending,
@@ -206,7 +206,7 @@ class BayRunner:
         return snapshot
 
     def _drive(self, now_s: float, *, closed: bool) -> None:
-        """Bring the contactor, if there is one, to what was decided: after the order, so that a stop goes first."""
+        """Drive the contactor, if any, as decided: after the command, so that a stop goes first."""
         if self._contactor is not None:
             self._contactor.drive(now_s, closed=closed)
             self._write_down_contactor(self._contactor)

@@ -1,4 +1,4 @@
-"""Which boot of the machine this is: monotonic times can be compared within one boot only."""
+"""Identifies the boot of the machine: monotonic times are comparable within one boot only."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 def boot_id() -> str:
-    """The kernel's own name for this boot; "" where it tells none."""
+    """The kernel's id of this boot; "" if it has none."""
     try:
         return BOOT_ID.read_text(encoding="ascii").strip()
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""One client of the control socket: its request as it comes, its answer as it goes. Nothing here ever waits."""
+"""One client of the control socket: its incoming request and its outgoing answer. Nothing here ever blocks."""
 
 import json
 import socket
@@ -12,31 +12,31 @@ from orchestrator.model import Cause
 MAX_REQUEST = 4096
 #: How long a client may take for its whole request, and then for its whole answer.
 CLIENT_S = 1.0
-#: What the kernel may hold of one answer: a client that does not read costs no more.
+#: The kernel's buffer for one answer: a client that does not read costs no more.
 BUFFER = 64 * 1024
 
 
 class Client:
-    """A connection that was just accepted. Belongs to the control thread."""
+    """An accepted connection. Belongs to the control thread."""
 
     def __init__(self, connection: socket.socket, now_s: float) -> None:
         connection.settimeout(0)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
-        self.line = b""  #: its request, once that is complete
+        self.line = b""  #: its request, once complete
         self.request: Mapping[str, object] = {}
-        self.heard_s = now_s  #: when the last byte of its request came
-        self.end_s = now_s + CLIENT_S  #: its time is up then, whatever it is doing
+        self.heard_s = now_s  #: when the last byte of its request arrived
+        self.end_s = now_s + CLIENT_S  #: when its time is up, whatever it is doing
         self.answering = False
         self._connection = connection
         self._heard = bytearray()
         self._left = memoryview(b"")
 
     def fileno(self) -> int:
-        """For a selector."""
+        """The descriptor for a selector."""
         return self._connection.fileno()
 
     def peer(self) -> tuple[int, int, int]:
-        """Process, user and group at the other end."""
+        """The process, user and group at the other end."""
         pid, uid, gid = struct.unpack("3i", self._connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
         return pid, uid, gid
 
@@ -51,15 +51,15 @@ class Client:
         if not part or len(self._heard) > MAX_REQUEST:
             raise RequestError(Cause.of("request_too_long", limit=MAX_REQUEST))
         if b"\n" in part:
-            self.line = bytes(self._heard)  # whatever stands behind the line makes it no request
+            self.line = bytes(self._heard)  # anything after the line makes it an invalid request
         return bool(self.line)
 
     def answer(self, text: bytes, now_s: float) -> None:
-        """From now on this is to be written; `text` may be shared with others."""
+        """Start writing this answer; `text` may be shared with other clients."""
         self._left, self.answering, self.end_s = memoryview(text), True, now_s + CLIENT_S
 
     def write(self) -> bool:
-        """Write as much as it takes now; whether that was all. OSError where it has left."""
+        """Write as much as possible without blocking; returns whether that was all. OSError if the client has left."""
         try:
             self._left = self._left[self._connection.send(self._left) :]
         except BlockingIOError:
@@ -67,7 +67,7 @@ class Client:
         return not self._left
 
     def close(self) -> None:
-        """Let it go."""
+        """Close the connection."""
         self._left.release()
         self._connection.close()
 

@@ -1,4 +1,4 @@
-"""The end of everything that may hang: each in a thread of its own, all of them within one time."""
+"""Closes everything that may hang: each in its own thread, all within one time limit."""
 
 import threading
 from collections.abc import Callable, Iterable
@@ -6,7 +6,7 @@ from time import monotonic
 
 
 def close_all(closings: Iterable[Callable[[], object]], within_s: float) -> bool:
-    """Begin all of them at once; whether they have all ended within this. What hangs is left behind."""
+    """Begin all of them at once; returns whether all ended in time. Those that hang are abandoned."""
     end_s = monotonic() + within_s
     threads = [threading.Thread(target=close, name="closing", daemon=True) for close in closings]
     for thread in threads:

@@ -1,4 +1,4 @@
-"""What people read: lines on standard error, from a thread of its own. Who reads slowly, or not, delays nobody."""
+"""Writes lines for people on standard error, in its own thread: a slow or absent reader delays nothing."""
 
 import io
 import os
@@ -11,21 +11,21 @@ from contextlib import suppress
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
 
-#: Lines that wait for somebody to read; of more than that the oldest go, and are counted.
+#: The maximum number of waiting lines; beyond that the oldest are dropped and counted.
 BACKLOG = 1000
 #: Standard error.
 FD = 2
 
 
 class Console:
-    """`say` never waits. From `start` to `close`, whoever prints to `sys.stderr` says it here, too."""
+    """`say` never blocks. From `start` to `close`, output to `sys.stderr` also goes through here."""
 
     def __init__(self, fd: int = FD, language: str = "en") -> None:
         self._language = language
-        self._fd = fd if sys.__stderr__ is not None else None  # started without: by now that may be a charger's port
+        self._fd = fd if sys.__stderr__ is not None else None  # closed at start: by now it may be a charger's port
         self._said: deque[str] = deque()
         self._left_out = 0
-        self._lock = threading.Lock()  # guards the lines; nobody writes with it
+        self._lock = threading.Lock()  # guards the lines; never held while writing
         self._wake = threading.Event()
         self._ended = False
         self._before = sys.stderr
@@ -37,7 +37,7 @@ class Console:
         self._thread.start()
 
     def say(self, text: str) -> None:
-        """A line, or several."""
+        """Queue one or more lines."""
         with self._lock:
             self._said.append(text)
             if len(self._said) > BACKLOG:
@@ -46,7 +46,7 @@ class Console:
         self._wake.set()
 
     def close(self, within_s: float = 1.0) -> None:
-        """Write what is left and end; who does not read by then does not learn of it."""
+        """Write what is left and end; lines not read by then are lost."""
         self._ended = True
         self._wake.set()
         if self._thread.is_alive():
@@ -60,7 +60,7 @@ class Console:
             ended = self._ended
             while text := self._next():
                 if self._fd is not None:
-                    with suppress(OSError):  # nobody has to listen
+                    with suppress(OSError):  # there need not be a reader
                         _write(self._fd, f"{text}\n".encode(errors="backslashreplace"))
             if ended:
                 return
@@ -77,12 +77,12 @@ def _write(fd: int, data: bytes) -> None:
     while data:
         try:
             data = data[os.write(fd, data) :]
-        except BlockingIOError:  # whoever shares it may have made it so
+        except BlockingIOError:  # another process sharing the descriptor may have made it non-blocking
             select.select([], [fd], [])
 
 
 class _Stream(io.TextIOBase):
-    """In the place of `sys.stderr`: a traceback, say, or a warning, must not wait for a reader either."""
+    """Replaces `sys.stderr`: tracebacks and warnings must not wait for a reader either."""
 
     def __init__(self, console: Console) -> None:
         self._console = console

@@ -1,7 +1,7 @@
-"""One bay's contactor in the running service: what the core wants of it, carried out, and told to the next step.
+"""One bay's contactor in the running service: carries out the core's decision, and reports to the next one.
 
-Its line is taken when the first decision is carried out, so after the port's first stop. A line that fails is given
-back and taken anew every second; it is open then, and stays so until a decision closes it.
+Its line is taken when the first decision is carried out, so after the port's first stop. A line that fails is released
+and taken again every second; it is then open, and stays open until a decision closes it.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,18 @@ from orchestrator.errors import LinkError
 from orchestrator.model import Cause, ChargerReading
 
 REOPEN_S = 1.0
-#: A contactor has closed within this, and the charger's measurement has followed. A reading from before proves nothing.
+#: Within this a contactor has closed and the charger's measurement has followed. An earlier reading proves nothing.
 CLOSING_S = 0.3
 
 
 class Output(Protocol):
-    """The open line, as `link.gpio.OutputLine` is. It is open when it is taken."""
+    """The GPIO line, as in `link.gpio.OutputLine`. When taken, it holds the contactor open."""
 
     def drive(self, *, closed: bool) -> None:
         """Close the contactor, or open it. May raise LinkError."""
 
     def close(self) -> None:
-        """Give the line back."""
+        """Release the line."""
 
 
 class Contactor:
@@ -37,11 +37,11 @@ class Contactor:
         self._retry_s = 0.0
 
     def connects(self, reading: ChargerReading | None) -> bool:
-        """Whether it was closed when the charger measured this."""
+        """Whether it was closed at the time of this reading."""
         return self.closed_s is not None and reading is not None and reading.t_s >= self.closed_s + CLOSING_S
 
     def drive(self, now_s: float, *, closed: bool) -> None:
-        """Bring it to what the newest decision says. Written each time: what a driver has lost is set again."""
+        """Drive it as the newest decision says. Written each time, to restore anything that the driver has lost."""
         if self._output is None and now_s < self._retry_s:
             return
         try:
@@ -56,7 +56,7 @@ class Contactor:
         self.closed_s = (self.closed_s or now_s) if closed else None
 
     def give_back(self) -> None:
-        """Open it and give the line back."""
+        """Open it and release the line."""
         output, self._output, self.closed_s = self._output, None, None
         if output is not None:
             with suppress(LinkError):

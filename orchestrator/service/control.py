@@ -1,9 +1,9 @@
-"""The control socket: who may ask, and how. One JSON object a line, in and out.
+"""The control socket: accepts clients and their requests. One JSON object per line, in and out.
 
 Only the owner of the service (and root) can open the socket. One thread serves all clients at once and waits for none:
-each has its time, its bytes and its place, and whoever is slow is slow alone. Stops go first (`reception.py`). After
-each turn the thread rests, so that no number of clients takes more of the processor than its share; the control loop
-never waits for a client.
+each has limits on time and bytes, and a slow client delays only itself. Stops go first (`reception.py`). After each
+turn the thread rests, so that no number of clients takes more than a fixed share of the CPU; the control loop never
+waits for a client.
 """
 
 import errno
@@ -23,20 +23,20 @@ from orchestrator.service.client import Client, parse_request
 from orchestrator.service.reception import Handler, Reception, encode, refused
 from orchestrator.service.socketfile import identity, listen, remove
 
-#: So many clients are served at once; for one more the longest idle one goes.
+#: The maximum number of clients served at once; one more displaces the longest idle one.
 MAX_CLIENTS = 256
-#: So many are taken in in one turn.
+#: The maximum number accepted in one turn.
 TURN_CLIENTS = 64
-#: After each turn the thread rests for so many times the processor time that the turn took, up to this.
+#: After each turn the thread rests for this multiple of the turn's CPU time, up to a limit.
 REST, REST_S = 4.0, 0.05
-#: How often the bays' answers, the clients' time, and the socket's name are looked at.
+#: How often to check the bays' answers, the clients' time limits, and the socket's name.
 POLL_S, TICK_S, NAME_S = 0.002, 0.1, 2.0
 #: A turn that takes longer than this hangs.
 STALL_S = 30.0
-#: What accept() says of a listener that was closed; after anything else it is worth another try, a little later.
+#: accept()'s errors for a closed listener; after any other error it is worth trying again a little later.
 CLOSED = (errno.EINVAL, errno.EBADF)
 RETRY_S = 0.1
-#: Strangers are counted, and troubles said, this often at most.
+#: The shortest interval between reports of rejected users and other problems.
 SAY_S = 60.0
 
 
@@ -52,13 +52,13 @@ class ControlSocket:
         language: str = "en",
     ) -> None:
         self._path, self._clock, self._say, self._language = path, clock, say, language
-        self._strangers, self._said_s = 0, -inf  # turned away since that was said last
-        self._turn_s: float | None = None  # since when a turn lasts
+        self._strangers, self._said_s = 0, -inf  # turned away since the last report
+        self._turn_s: float | None = None  # when the present turn began
         self._closing = False
         self._clients: set[Client] = set()
         self._handler = handler
         self._reception = Reception(handler, self._reply, language)
-        self._accept_s = -inf  # nobody is taken in before
+        self._accept_s = -inf  # nobody is accepted before this
         self._selector = selectors.DefaultSelector()
         self._listener = listen(path)
         self._identity, self._name_s = identity(path), clock()
@@ -70,12 +70,12 @@ class ControlSocket:
         self._thread.start()
 
     def stalled(self, now_s: float) -> bool:
-        """True when nobody answers any more, or one turn has taken far too long."""
+        """True if the thread has died, or one turn has taken far too long."""
         began_s = self._turn_s
         return not self._thread.is_alive() or (began_s is not None and now_s - began_s > STALL_S)
 
     def close(self) -> None:
-        """Stop listening and take the socket's name away."""
+        """Stop listening and remove the socket's name."""
         self._closing = True
         remove(self._path, self._identity)
         with suppress(OSError):
@@ -91,7 +91,7 @@ class ControlSocket:
                 self._turn_s, began_s = self._clock(), thread_time()
                 try:
                     self._turn([key.fileobj for key, _ in ready], self._turn_s)
-                except Exception as error:  # noqa: BLE001 - a defect here must not keep the next one from stopping a bay
+                except Exception as error:  # noqa: BLE001 - a defect here must not prevent the next stop
                     self._begin_anew(error)
                 self._turn_s = None
                 sleep(min(REST * (thread_time() - began_s), REST_S))
@@ -102,7 +102,7 @@ class ControlSocket:
             self._selector.close()
 
     def _begin_anew(self, error: Exception) -> None:
-        """Without those who were here when it happened."""
+        """Start over, without the clients present when it happened."""
         self._complain(Cause.of("socket_internal", error=repr(error)))
         for client in tuple(self._clients):
             self._drop(client)
@@ -110,13 +110,13 @@ class ControlSocket:
 
     @property
     def _patience_s(self) -> float:
-        """How long nothing may happen until the next turn."""
+        """How long to wait for events before the next turn."""
         if self._reception.busy:
             return POLL_S
         return TICK_S if self._clients or self._accept_s > -inf else NAME_S
 
     def _turn(self, ready: list[object], now_s: float) -> None:
-        """Hear everybody, then act."""
+        """Read from all ready clients, then act."""
         if self._listener in ready:
             self._accept(now_s)
         for client in ready:
@@ -139,7 +139,7 @@ class ControlSocket:
     def _accept(self, now_s: float) -> None:
         for _ in range(TURN_CLIENTS):
             if len(self._clients) >= MAX_CLIENTS and not self._make_room():
-                self._pause_accepting(now_s)  # all of them have asked for a stop, and are being answered
+                self._pause_accepting(now_s)  # all clients have requested a stop, and are being answered
                 return
             try:
                 connection, _ = self._listener.accept()
@@ -155,7 +155,7 @@ class ControlSocket:
                 connection.close()
 
     def _take_in(self, client: Client, now_s: float) -> None:
-        """Turn strangers away; who has something to say has mostly said it already."""
+        """Turn away other users; read at once, because the request has mostly arrived already."""
         pid, uid, _ = client.peer()
         self._selector.register(client, selectors.EVENT_READ)
         self._clients.add(client)
@@ -173,7 +173,7 @@ class ControlSocket:
         self._selector.unregister(self._listener)
 
     def _make_room(self) -> bool:
-        """Let the longest idle client go; where all have asked something, one whose request is not being done."""
+        """Drop the longest idle client; if all have made a request, one whose request is not being carried out."""
         others = self._clients - self._reception.stopping
         if others:
             self._drop(min(others, key=lambda client: (bool(client.line), client.heard_s)))
@@ -189,7 +189,7 @@ class ControlSocket:
     # --- what they say, and are told ---
 
     def _serve(self, client: Client, now_s: float) -> None:
-        """Go on with one client that has something to say, or takes more of its answer."""
+        """Continue with one client that has sent something, or can take more of its answer."""
         try:
             if client.answering:
                 self._write(client)
@@ -225,7 +225,7 @@ class ControlSocket:
     # --- the name that they find it by ---
 
     def _look_for_name(self) -> None:
-        """Somebody may tidy up, or bind a socket of his own to our name: nobody could stop a bay here any more."""
+        """Check the socket's name: if somebody removes or rebinds it, nobody can stop a bay here any more."""
         found = identity(self._path)
         if self._closing or found == self._identity:
             return

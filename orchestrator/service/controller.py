@@ -11,14 +11,14 @@ from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.supervisor import Supervisor
 from orchestrator.text.catalogue import say
 
-#: What a service has open besides its bays and buses: streams, sockets, journal, clients.
+#: Open files besides bays and buses: streams, sockets, journal, clients.
 SHARED = 32
 
 
 def main(fd: int, station: str) -> int:
     """Run the service for a station file; 0 if every charger was verified at the end."""
     language = "en"
-    guardian = GuardianLink(fd)  # stays open to the last word: its end is the sign that this process has ended
+    guardian = GuardianLink(fd)  # stays open to the very end: closing it signals the end of this process
     try:
         loaded = load_station(station)
         language = loaded.language.value
@@ -36,7 +36,7 @@ def main(fd: int, station: str) -> int:
 def check_limit(bays: int, buses: int) -> None:
     """Raise the limit as far as may be; StartError where a station of this size needs more.
 
-    A bay has its port, its contactor, and a file more while one of them is opened; the rest is everybody's.
+    A bay needs its port, its contactor, and one more file while one of them is being opened; the rest is shared.
     """
     needed, limit = SHARED + 3 * bays + 4 * buses, os.sysconf("SC_OPEN_MAX")
     if 0 <= limit < needed and 0 <= (limit := raised(limit)) < needed:

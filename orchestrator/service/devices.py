@@ -1,4 +1,4 @@
-"""What a bay in the running service needs of its two devices."""
+"""The interfaces of a bay's two devices in the running service."""
 
 from typing import Protocol
 
@@ -7,19 +7,19 @@ from orchestrator.model import BatteryLink, BatteryReading, ChargerLink, Charger
 
 
 class Charger(Protocol):
-    """What a bay needs of a charger's port (`devices.charger.ChargerPort`)."""
+    """The interface of a charger's port (`devices.charger.ChargerPort`)."""
 
     @property
     def view(self) -> tuple[ChargerReading | None, ChargerLink]:
-        """The newest reading and how the line is doing."""
+        """The newest reading and the state of the link."""
 
     def order(self, command: Command | None, grant: Grant | None = None) -> None:
-        """Leave a standing order."""
+        """Give the command to repeat."""
 
 
 class Battery(Protocol):
-    """What a bay needs of a BMU (`devices.battery.BatteryNode`)."""
+    """The interface of a BMU (`devices.battery.BatteryNode`)."""
 
     @property
     def view(self) -> tuple[BatteryReading, BatteryLink]:
-        """The newest values and how the bus is doing."""
+        """The newest values and the state of the link."""

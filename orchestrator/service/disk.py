@@ -1,8 +1,8 @@
-"""Files that are on the disk once a call has returned, not just on their way. Every call may raise OSError, or hang.
+"""File operations that are on disk once they return. Every call may raise OSError, or hang.
 
-A name that was renamed, or made, is on the disk only when its directory is; so that one is synchronised, too.
+A new or renamed file is on disk only once its directory is; so the directory is synced as well.
 """
-# ruff: noqa: PTH102, PTH105 - the kernel's own calls, one after another: each of them may be the one that hangs
+# ruff: noqa: PTH102, PTH105 - the kernel's own calls, one by one: each of them may be the one that hangs
 
 import errno
 import fcntl
@@ -16,7 +16,7 @@ def code_of(error: OSError) -> str:
 
 
 def make_directory(directory: Path) -> None:
-    """Make it, and what is missing above it, for good."""
+    """Make it and its missing parents, durably."""
     try:
         os.mkdir(directory, 0o750)
     except FileExistsError:
@@ -28,19 +28,19 @@ def make_directory(directory: Path) -> None:
 
 
 def sync_directory(directory: Path) -> None:
-    """Bring the names in it to the disk."""
+    """Sync the names in it to disk."""
     fd = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(fd)
     except OSError as error:
-        if error.errno != errno.EINVAL:  # this file system has no such thing
+        if error.errno != errno.EINVAL:  # the file system does not support it
             raise
     finally:
         os.close(fd)
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Put `data` in the place of what is there, as a whole: after a power cut it is one or the other."""
+    """Replace the file's content atomically: after a power cut it is the old or the new one."""
     fresh = path.with_name(f"{path.name}.new")
     fd = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NONBLOCK, 0o640)
     try:
@@ -54,7 +54,7 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def read_file(path: Path, most: int) -> bytes:
-    """All of it; OSError (EFBIG) where it has more than `most` bytes."""
+    """The whole content; OSError (EFBIG) if it exceeds `most` bytes."""
     fd = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
         parts = [part := os.read(fd, most + 1)]
@@ -69,7 +69,7 @@ def read_file(path: Path, most: int) -> bytes:
 
 
 def lock_file(path: Path) -> int:
-    """Lock it for as long as the descriptor is open; BlockingIOError where another process has locked it."""
+    """Lock it for as long as the descriptor is open; BlockingIOError if another process has locked it."""
     fd = os.open(path, os.O_RDWR | os.O_CREAT, 0o640)
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)

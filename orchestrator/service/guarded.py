@@ -1,4 +1,4 @@
-"""The controller's side of the guardian: heartbeats, what is handed over, and what to do when it is gone."""
+"""The controller's side of the guardian: heartbeats, shared descriptors, and detecting that it is gone."""
 
 import array
 import socket
@@ -36,7 +36,7 @@ class GuardianLink:
         return self._gone
 
     def hold(self, port: str, fd: int) -> None:
-        """Give the guardian its own descriptor of an open port."""
+        """Give the guardian a duplicate descriptor of an open port."""
         self._send(PORT + port.encode(errors="surrogateescape"), fd)
 
     def drop(self, port: str) -> None:
@@ -44,11 +44,11 @@ class GuardianLink:
         self._send(DROP + port.encode(errors="surrogateescape"))
 
     def hold_contactor(self, name: str, fd: int | None) -> None:
-        """Give the guardian its own descriptor of a contactor's line; None: let it close the one that it has."""
+        """Give the guardian a duplicate descriptor of a contactor's line; None: let it close the one it has."""
         self._send(CONTACTOR + name.encode(errors="surrogateescape"), fd)
 
     def done(self) -> None:
-        """Every charger was stopped, and verified where it can be; the end of this process needs no other stop."""
+        """Report that every charger was stopped, and verified if possible: no further stop is needed."""
         self._send(DONE)
 
     def _answered(self) -> bool:
@@ -59,14 +59,14 @@ class GuardianLink:
             except BlockingIOError:
                 return heard
             except OSError:
-                data = b""  # it died with messages of ours unread
+                data = b""  # it died with our messages unread
             if not data:
                 self._gone = DIED
                 return heard
             heard = heard or data == ALIVE
 
     def _send(self, message: bytes, fd: int | None = None) -> None:
-        """Send without waiting. A guardian that takes no message cannot be relied on: no port may be lost to it."""
+        """Send without blocking. A guardian that takes no message is unreliable: it must not miss a port."""
         ancillary = [] if fd is None else [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [fd]))]
         try:
             with self._lock:
@@ -78,7 +78,7 @@ class GuardianLink:
 
 
 class GuardedLine:
-    """A serial line of which the guardian has a duplicate for as long as it is open."""
+    """A serial line; the guardian has a duplicate of it while it is open."""
 
     def __init__(self, port: str, open_line: Callable[[], SerialLine], guardian: GuardianLink) -> None:
         self._port, self._guardian = port, guardian
@@ -88,13 +88,13 @@ class GuardedLine:
         self.restore, self.locked_by = self._line.restore, self._line.locked_by
 
     def close(self) -> None:
-        """Give the port back; the guardian does, too."""
+        """Release the port, also in the guardian."""
         self._guardian.drop(self._port)
         self._line.close()
 
 
 class GuardedOutput:
-    """A contactor's line of which the guardian has a duplicate for as long as it is open."""
+    """A contactor's line; the guardian has a duplicate of it while it is open."""
 
     def __init__(self, name: str, open_output: Callable[[], OutputLine], guardian: GuardianLink) -> None:
         self._name, self._guardian = name, guardian
@@ -103,6 +103,6 @@ class GuardedOutput:
         self.drive = self._output.drive
 
     def close(self) -> None:
-        """Give the line back; the guardian does, too."""
+        """Release the line, also in the guardian."""
         self._guardian.hold_contactor(self._name, None)
         self._output.close()

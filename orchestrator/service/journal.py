@@ -1,8 +1,8 @@
-"""The journal: JSON Lines on disk, rotated and bounded. A disk that is full or gone never stops a charge, nor a stop.
+"""The journal: JSON Lines on disk, rotated and bounded. A full or missing disk never stops a charge, or delays a stop.
 
-Two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and `snapshots`, far more
-of it, for a replay; each has its own share of the space, so that snapshots never push the reasons out. Both begin each
-run of the service with a line `run`: monotonic times of two runs, or two boots, have nothing to do with each other.
+There are two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and the much
+larger `snapshots` for replay; each has its own share of the space, so that snapshots never displace the reasons. Both
+begin each run of the service with a line `run`: monotonic times of two runs, or two boots, are not comparable.
 """
 
 import json
@@ -22,14 +22,14 @@ from orchestrator.service.rotating import RotatingFile
 
 #: Of these lines; the first had no `run`, the second no causes but sentences, the third sentences in its snapshots.
 VERSION = 4
-#: Of the allowed space, what the events may take.
+#: The events' share of the allowed space.
 EVENTS_SHARE = 0.25
-#: Lines that wait for a disk that does not take them; beyond it the oldest are dropped and counted.
+#: Lines waiting for a disk that does not take them; beyond that the oldest are dropped and counted.
 BACKLOG = 20_000
-#: How long lines are gathered before they are written, and how long a refused disk is left alone.
+#: How long lines are gathered before they are written, and the pause after a disk error.
 GATHER_S = 0.5
 RETRY_S = 5.0
-#: A disk may be slow, a loop that has not turned for this long hangs.
+#: A disk may be slow, but a writer without progress for this long hangs.
 STALL_S = 30.0
 
 T = TypeVar("T")
@@ -37,17 +37,17 @@ Entry = tuple[float, float, str, Line]  #: monotonic s, wall s, bay, line
 
 
 class Stream:
-    """The lines of one file that wait for the disk. A gap in them is a line of its own: what follows lacks its base."""
+    """One file's lines waiting for the disk. A gap in them is marked by a line, because what follows lacks its base."""
 
     def __init__(self, file: RotatingFile, begin: Callable[[], bytes]) -> None:
         self._file, self._begin = file, begin
         self._lines: deque[bytes] = deque()
-        self._ahead: deque[bytes] = deque()  # our own lines, which come before them
+        self._ahead: deque[bytes] = deque()  # our own lines, written before them
         self._begun = False
-        self.gap = False  #: lines are missing before the first one that waits
+        self.gap = False  #: lines are missing before the first waiting one
 
     def add(self, line: bytes) -> int:
-        """One line more; how many are lost by it."""
+        """Add a line; returns how many are lost because of it."""
         if not self._begun:
             self._begun = True
             self._ahead.append(self._begin())
@@ -59,7 +59,7 @@ class Stream:
         return 1
 
     def write(self, lost: bytes) -> None:
-        """Bring them to the disk, or raise OSError; `lost` is the line that stands for a gap."""
+        """Write them, or raise OSError; `lost` is the line that marks a gap."""
         if self.gap and self._lines:
             self._ahead.append(lost)
             self.gap = False
@@ -68,9 +68,9 @@ class Stream:
 
 
 class Journal:
-    """Takes lines from any thread without ever waiting; one thread of its own writes them.
+    """Takes lines from any thread without blocking; its own thread writes them.
 
-    Lines that the disk does not take wait for it; `lost` counts those that were dropped because there were too many.
+    Lines that the disk does not take wait for it; `lost` counts those dropped because there were too many.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Journal:
         self._turn_s = clock()
         self._problem: Cause | None = None
         self.lost = 0
-        self._lost_before = 0  # as it was when the lines that wait were last taken
+        self._lost_before = 0  # its value when the waiting lines were last taken
 
     def start(self) -> None:
         """Begin to write."""
@@ -119,7 +119,7 @@ class Journal:
         return self._problem
 
     def stalled(self, _now_s: float) -> bool:
-        """True when the writer has died. That it waits for a disk is no hang: no disk stops a charge."""
+        """True if the writer has died. Waiting for a disk does not count: no disk stops a charge."""
         return not self._thread.is_alive()
 
     def close(self) -> None:
@@ -159,7 +159,7 @@ class Journal:
 
 
 def _drained(waiting: "deque[T]") -> Iterator[T]:
-    """Take out what is there, while other threads add to it."""
+    """Take out all items, while other threads may add more."""
     with suppress(IndexError):
         while True:
             yield waiting.popleft()
@@ -169,9 +169,9 @@ def _line(entry: Entry) -> bytes:
     t_s, wall_s, bay, (kind, fields) = entry
     head = {"t": t_s, "wall": rfc3339(wall_s), "bay": bay, "kind": kind}
     text = json.dumps({**head, **fields}, ensure_ascii=False, separators=(",", ":")) + "\n"
-    return text.encode(errors="backslashreplace")  # of file names that are no text; still JSON
+    return text.encode(errors="backslashreplace")  # file names need not be valid text; the result is still JSON
 
 
 def rfc3339(wall_s: float) -> str:
-    """A wall-clock time as people and programs read it, in UTC."""
+    """A wall-clock time in UTC, for people and programs."""
     return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

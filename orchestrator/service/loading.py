@@ -1,4 +1,4 @@
-"""What the last run of the service has left on the disk, and what each bay of today makes of it."""
+"""Reads the persisted state of the last run, and derives each bay's past from it."""
 # ruff: noqa: PTH105, PTH208 - as in `disk.py`
 
 import os
@@ -19,15 +19,15 @@ MOST_BYTES = 16_000_000
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """All entries, those of today's bays among them."""
+    """All entries, including those of the present bays."""
 
     entries: tuple[Entry, ...]
     run: int = 1  #: the number of this run
-    aside: tuple[str, ...] = ()  #: the files that are to be moved aside, for a person to look at
+    aside: tuple[str, ...] = ()  #: files to be moved aside, for a person to inspect
 
 
 def load(directory: Path, places: Sequence[Place], now: Stamp) -> Loaded:
-    """Read it. Where that cannot be done, every bay is held: nobody knows what was latched."""
+    """Read it. If that fails, every bay is held, because latches may be lost."""
     path = directory / FILE
     try:
         found = _read(directory, now)
@@ -37,7 +37,7 @@ def load(directory: Path, places: Sequence[Place], now: Stamp) -> Loaded:
             held(places, Cause.of("state_unreadable", file=str(path), error=reason)), aside=(FILE, FIRST_FILE)
         )
     if found is None:
-        if any(name.startswith("events") for name in names(directory)):  # the file is there before the first of them
+        if any(name.startswith("events") for name in names(directory)):  # the file is written before the first event
             return Loaded(held(places, Cause.of("state_lost", file=str(path))))
         return Loaded(tuple(Entry(place, Persisted(), 1) for place in places))
     run, entries = found
@@ -46,14 +46,14 @@ def load(directory: Path, places: Sequence[Place], now: Stamp) -> Loaded:
 
 
 def held(places: Sequence[Place], why: Cause) -> tuple[Entry, ...]:
-    """Every bay where nobody knows anything."""
+    """An entry for every bay, held because its past is unknown."""
     return tuple(Entry(place, Persisted(hold=why), 1) for place in places)
 
 
 def _read(directory: Path, now: Stamp) -> tuple[int, list[Entry]] | None:
-    """The number of this run and all entries; None where there are none.
+    """The number of this run and all entries; None if there are none.
 
-    The first format's file beside ours is newer: an older version of the service has written it since.
+    A file of the first format beside ours is newer: an older version of the service has written it since.
     """
     ours = _bytes(directory / FILE)
     first = _bytes(directory / FIRST_FILE)
@@ -74,7 +74,7 @@ def _bytes(path: Path) -> bytes | None:
 
 
 def names(directory: Path) -> list[str]:
-    """What is in the directory."""
+    """The names in the directory."""
     try:
         return os.listdir(directory)
     except FileNotFoundError:
@@ -82,7 +82,7 @@ def names(directory: Path) -> list[str]:
 
 
 def move_aside(directory: Path, files: Sequence[str], word: str) -> None:
-    """Give these files other names, those of them that are there: none of them is lost."""
+    """Rename these files, if they exist, without overwriting any."""
     there = names(directory)
     for name in files:
         if name in there:

@@ -1,4 +1,4 @@
-"""Who may write in a journal's directory: the one service that holds the lock in it."""
+"""Ownership of a journal's directory: only the service that holds the lock in it may write there."""
 
 import os
 import threading
@@ -9,19 +9,19 @@ from pathlib import Path
 from orchestrator.service.disk import lock_file, make_directory
 
 LOCK = "lock"
-#: A service that has just been killed may hold the lock for so long.
+#: How long a service that was just killed may still hold the lock.
 LOCKED_S = 1.5
 
 
 class Ownership:
-    """The lock of one directory, which is made if there is none. `clock` is monotonic."""
+    """The lock of one directory, which is created if missing. `clock` is monotonic."""
 
     def __init__(self, directory: Path, clock: Callable[[], float]) -> None:
         self._directory, self._clock = directory, clock
         self._descriptor: int | None = None
 
     def take(self, ended: Callable[[], bool]) -> None:
-        """Be the only service that writes here; BlockingIOError where another one stays until it is over."""
+        """Become the only service that writes here; BlockingIOError if another one keeps the lock."""
         if self._descriptor is not None:
             return
         make_directory(self._directory)
@@ -35,8 +35,8 @@ class Ownership:
                 pause.wait(0.05)
 
     def give_up(self) -> None:
-        """Let another service have it."""
+        """Release the lock."""
         descriptor, self._descriptor = self._descriptor, None
         if descriptor is not None:
-            with suppress(OSError):  # it is closed, whatever the file system says to that
+            with suppress(OSError):  # it is closed anyway
                 os.close(descriptor)

@@ -1,8 +1,8 @@
-"""The past of a bay: which of the entries that were written down are its own, and what it makes of others'. Pure.
+"""A bay's past: which persisted entries are its own, and what it inherits from others. Pure.
 
-What is known belongs to a *place*: the bay's name, its charger's port and its BMU. A station file that is edited moves
-names, ports and batteries between bays; then nobody knows what is wired where, and a person must look. Whatever was
-latched, held or running at either place goes on.
+Persisted state belongs to a *place*: the bay's name, its charger's port and its BMU. Editing the station file can move
+names, ports and batteries between bays; then the actual wiring is unknown, and a person must look. Whatever was
+latched, held or running at either place stays so.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ from orchestrator.model.cause import SEVERAL, together
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """What an entry belongs to; of the first format only the name is known, the rest is empty."""
+    """The owner of an entry; in the first format only the name is known, the rest is empty."""
 
     bay: str
     port: str = ""  #: absolute, as configured: names below by-path are not resolved
@@ -28,7 +28,7 @@ class Place:
 
     @classmethod
     def of(cls, bay: Bay) -> "Place":
-        """Where this bay is now."""
+        """The present place of this bay."""
         charger, battery, port = bay.charger, bay.battery, abspath(bay.charger.port)  # noqa: PTH100 - not resolved
         return cls(bay.name, port, battery.can, battery.node_id, charger.control, charger.rs485)
 
@@ -38,11 +38,11 @@ class Place:
         return self.can, self.node_id
 
     def is_port_of(self, other: "Place") -> bool:
-        """Whether both are the same serial port, by whatever names."""
+        """Whether both are the same serial port, whatever their names."""
         return self.port == other.port or ("" not in (self.port, other.port) and _device(self) == _device(other))
 
     def overlaps(self, other: "Place") -> bool:
-        """Whether they have a name, a port or a BMU in common."""
+        """Whether they share a name, a port or a BMU."""
         return self.bay == other.bay or self.is_port_of(other) or self.bmu == other.bmu
 
     def __str__(self) -> str:
@@ -51,17 +51,17 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is known of one place."""
+    """The persisted state of one place."""
 
     place: Place
     persisted: Persisted
-    run: int  #: the newest run of the service in which this place was a bay's
+    run: int  #: the newest run of the service in which a bay had this place
 
 
 def past_of(place: Place, entries: Sequence[Entry], file: str) -> Persisted:
-    """What a bay begins with.
+    """The state that a bay begins with.
 
-    Another entry counts if its place was in use after the bay's own was: before, it has been taken over already.
+    Another entry counts if its place was used later than the bay's own: otherwise it was inherited already.
     """
     own = next((entry for entry in entries if entry.place == place), None)
     since = own.run if own else -1
@@ -91,12 +91,12 @@ def _moved(old: Place, new: Place) -> Cause:
 
 
 def shown(port: str) -> str:
-    """A path for people; one that is no text, too."""
+    """A path for people, even if it is not valid text."""
     return port.encode(errors="backslashreplace").decode()
 
 
 def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
-    """All of them together, as the strictest would have it, held for `moves` and for whatever held one of them."""
+    """The strictest combination of all of them, held for `moves` and for whatever held any of them."""
     holds = dict.fromkeys([*moves, *(one for part in parts if part.hold is not None for one in _holds(part.hold))])
     faults: dict[str, PersistedFault] = {}
     for part in parts:
@@ -118,13 +118,13 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
 
 
 def _holds(hold: Cause) -> list[Cause]:
-    """What a bay was held for, each for itself."""
+    """The individual reasons for which a bay was held."""
     whats = hold.param("whats") if hold.id == SEVERAL else None
     return [one for one in (whats or (hold,)) if isinstance(one, Cause)]
 
 
 def _worse(one: PersistedFault, other: PersistedFault) -> PersistedFault:
-    """One fault at two places: in force if it is at one of them, and it is not gone before it is at both."""
+    """One fault at two places: active if it is active at either, and gone only once it is gone at both."""
     first, second = sorted((one, other), key=lambda fault: (fault.latched, fault.raised is not None), reverse=True)
     gone = None if None in (one.clean, other.clean) else min(one.clean or 0.0, other.clean or 0.0)
     strikes = max(one.strikes, other.strikes, key=len)
@@ -134,9 +134,9 @@ def _worse(one: PersistedFault, other: PersistedFault) -> PersistedFault:
 def settled(
     places: Sequence[Place], pasts: Mapping[Place, Persisted], entries: Iterable[Entry], run: int
 ) -> list[Entry]:
-    """All entries once the bays have taken their pasts over, in this run of the service.
+    """All entries after the bays have inherited their pasts, in this run of the service.
 
-    What belongs to places that no bay has today stays, for ever. A charger that runs is with the bay that has its port.
+    Entries of places without a bay stay for ever. A running charger belongs to the bay that has its port.
     """
     now = [Entry(place, pasts[place], run) for place in places]
     for entry in entries:

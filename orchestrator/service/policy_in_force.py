@@ -1,4 +1,4 @@
-"""The policy that a bay runs by, and one that has been read anew and waits until the bay stands by."""
+"""A bay's policy in force, and a newly read one that waits until the bay is in standby."""
 
 from dataclasses import replace
 
@@ -8,16 +8,16 @@ from orchestrator.model import Cause
 
 
 class PolicyInForce:
-    """`rules` are what the bay is decided by. Used by the control loop's thread only, but for `offer` and `status`."""
+    """`rules` are the rules in force. Used by the control loop's thread only, except `offer` and `status`."""
 
     def __init__(self, bay: Bay) -> None:
         self.rules = Rules.of(bay)
-        self._offered: Bay | None = None  # with a policy that is not in force yet
+        self._offered: Bay | None = None  # has a policy that is not in force yet
 
     def offer(self, bay: Bay | None) -> Cause:
-        """Take another policy over at the next standby; what will come of it. From any thread.
+        """Offer another policy, to be adopted at the next standby; returns the outcome for people. Thread-safe.
 
-        `bay` is this bay in the station file as it is now, None if it is not in there any more.
+        `bay` is this bay in the present station file, None if the file no longer has it.
         """
         mine = self.rules.bay
         if bay is None or replace(bay, policy=mine.policy) != mine:
@@ -29,7 +29,7 @@ class PolicyInForce:
         return Cause.of("policy_offered", policy=name_of(bay))
 
     def take_over(self) -> Bay | None:
-        """The bay stands by: what was offered is in force from now on. The bay with it, None if there is nothing."""
+        """The bay is in standby: put the offered policy into force. Returns the bay with it, None if there is none."""
         bay, self._offered = self._offered, None
         if bay is not None:
             self.rules = Rules.of(bay)
@@ -47,6 +47,6 @@ class PolicyInForce:
 
 
 def name_of(bay: Bay) -> Cause:
-    """The policy of a bay, and which file it is."""
+    """The name of a bay's policy, with its file."""
     source = bay.policy.source
     return Cause.of("policy", policy=bay.policy.policy, file=source.file, sha256=source.digest)

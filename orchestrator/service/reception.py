@@ -1,9 +1,9 @@
-"""What is answered at the control socket, in which order: a stop before all that waits, one status for many.
+"""Decides the order of answers at the control socket: a stop before everything that waits, one status for many.
 
-A stop is acted on in the turn in which it is heard. What waits then for the same bays was asked before it, or cannot be
-told from that, and is refused: a start must not be carried out after a stop that it preceded. Stops that say the same
-share one answer as long as nothing else has been asked in between. A status is made once for all who ask at the same
-time; other requests go to the bays one after another.
+A stop takes effect in the turn in which it is received. Requests waiting for the same bays were made before it, or may
+have been, and are refused: a start must not be carried out after a stop that followed it. Identical stops share one
+answer as long as nothing else was requested in between. A status is built once for all who ask at the same time; other
+requests go to the bays one after another.
 """
 
 import json
@@ -19,27 +19,27 @@ from orchestrator.model.cause import plain
 from orchestrator.service.client import Client
 from orchestrator.text.catalogue import say
 
-#: So many questions are answered in one turn: a stop is looked for after each.
+#: The maximum number of queries answered in one turn, so that stops are looked for in between.
 TURN_QUESTIONS = 32
-#: Whoever asks for the status within this gets the same one.
+#: All who ask for the status within this get the same one.
 SHARED_S = 0.02
-#: Other requests than stops go to the bays this far apart, and one that has waited for so long is refused.
+#: The interval between requests other than stops, and the longest time that one may wait before it is refused.
 PAUSE_S = 0.02
 QUEUE_S = 2.0
-#: The bays have answered within this, or never will.
+#: The bays answer within this, or never.
 ANSWER_S = 10.0
 
 STOP, STATUS = "stop", "status"
 
 Answer = Mapping[str, object]
-Later = Callable[[], Answer | None]  #: the answer, None while there is none
+Later = Callable[[], Answer | None]  #: returns the answer, None while there is none
 Handler = Callable[[Mapping[str, object]], Answer | Later]
 Reply = Callable[[Client, bytes, float], None]
 
 
 @dataclass(slots=True)
 class Pending:
-    """A request that the bays have not answered yet, and all who made it."""
+    """A request that the bays have not answered yet, and all its clients."""
 
     later: Later
     clients: list[Client]
@@ -47,9 +47,9 @@ class Pending:
 
 
 class Reception:
-    """Takes complete requests, and calls `reply` once for each. Belongs to the control thread; nothing here waits.
+    """Takes complete requests, and calls `reply` once for each. Belongs to the control thread; nothing here blocks.
 
-    `handler` must not wait either: what takes time it answers with a function that is asked until it has the answer.
+    `handler` must not block either: if an answer takes time, it returns a function to be polled for it.
     """
 
     def __init__(self, handler: Handler, reply: Reply, language: str = "en") -> None:
@@ -57,36 +57,36 @@ class Reception:
         self._urgent: list[Client] = []
         self._questions: deque[Client] = deque()
         self._requests: deque[Client] = deque()
-        self._request_s = -inf  # the next one goes to the bays no earlier
+        self._request_s = -inf  # the earliest time for the next one to go to the bays
         self._pending: list[Pending] = []
-        self._stops: dict[bytes, Pending] = {}  # those that the same stop may join
-        self._shared: dict[bytes, bytes] = {}  # a status, by the request for it
-        self._shared_s = -inf  # when the oldest of them was made
+        self._stops: dict[bytes, Pending] = {}  # pending stops that identical ones may join
+        self._shared: dict[bytes, bytes] = {}  # a status, by its request
+        self._shared_s = -inf  # when the oldest of them was built
 
     @property
     def busy(self) -> bool:
-        """Whether somebody waits for an answer."""
+        """Whether somebody is waiting for an answer."""
         return bool(self._pending or self._questions or self._requests or self._urgent)
 
     @property
     def stopping(self) -> set[Client]:
-        """Those who have asked for what is being done now: they are not turned out."""
+        """The clients whose requests are being carried out: they must not be dropped."""
         return {*self._urgent, *(client for pending in self._pending for client in pending.clients)}
 
     def take(self, client: Client, now_s: float) -> None:
-        """A client whose request is complete."""
+        """Queue a client whose request is complete."""
         client.end_s = now_s + QUEUE_S + ANSWER_S
         verb = client.request.get("verb")
         (self._urgent if verb == STOP else self._questions if verb == STATUS else self._requests).append(client)
 
     def forget(self, client: Client) -> None:
-        """A client that has gone; what it has asked is done all the same, once it has begun."""
+        """Forget a client that has gone; a request already begun is still carried out."""
         for queue in (self._questions, self._requests):
             with suppress(ValueError):
                 queue.remove(client)
 
     def work(self, now_s: float) -> None:
-        """Every stop, then of all else so much as one turn may take."""
+        """Handle every stop, then as much of the rest as fits into one turn."""
         urgent, self._urgent = self._urgent, []
         for client in urgent:
             self._overtake(client, now_s)
@@ -114,7 +114,7 @@ class Reception:
             self._stops[client.line] = pending
 
     def _begin(self, client: Client, now_s: float) -> None:
-        self._stops.clear()  # a stop after this request is another one than a stop before it
+        self._stops.clear()  # a stop after this request differs from a stop before it
         self._handle(client, now_s)
 
     def _tell_status(self, client: Client, now_s: float) -> None:
@@ -127,9 +127,9 @@ class Reception:
             self._handle(client, now_s, shared=self._shared)
 
     def _handle(self, client: Client, now_s: float, shared: dict[bytes, bytes] | None = None) -> Pending | None:
-        """Let the handler answer; what is pending if it will later."""
+        """Let the handler answer; returns the pending request if it will answer later."""
         if shared is None:
-            self._shared.clear()  # the next status has to show what comes of this request
+            self._shared.clear()  # the next status must show the effect of this request
         try:
             answer = self._handler(client.request)
         except CauseError as error:
@@ -149,7 +149,7 @@ class Reception:
         return None
 
     def _look_for_answers(self, now_s: float) -> None:
-        """Those requests that the bays have answered by now."""
+        """Reply to the requests that the bays have answered by now."""
         for pending in tuple(self._pending):
             try:
                 answer = pending.later()
@@ -171,7 +171,7 @@ class Reception:
 
 
 def encode(answer: Answer) -> bytes:
-    """One line."""
+    """An answer as one line."""
     return json.dumps(answer, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
@@ -185,6 +185,6 @@ def _internal(error: Exception) -> Cause:
 
 
 def _share_bays(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
-    """Whether two requests may be for the same bay; null is for all."""
+    """Whether two requests may concern the same bay; null means all."""
     names, others = one.get("bays"), other.get("bays")
     return not isinstance(names, list) or not isinstance(others, list) or any(name in others for name in names)

@@ -1,4 +1,4 @@
-"""What the journal says: one decision after another, turned into lines. Pure; the writing is the journal's."""
+"""Turns decisions into the journal's lines. Pure; the journal writes them."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -28,16 +28,16 @@ from orchestrator.text.catalogue import say
 
 Line = tuple[str, dict[str, object]]  #: kind, fields
 
-#: What of a record is said for people, beside its cause.
+#: The parts of a record that are texts for people, beside the cause.
 TEXTS = frozenset({"reason", "text", "rule", "result"})
-#: What of a snapshot is about this service and its contactor.
+#: The parts of a snapshot that concern this service and its contactor.
 OURS = (
     "internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem", "waits", "moves",
     "running_kept",
 )  # fmt: skip
 #: What of a reading or a link may have causes in it; the rest is written as it is.
 DEEP = frozenset({Cause, tuple, dict})
-#: A whole snapshot, with the memory and the bay's rules, at least this often: a reader may begin at each of them.
+#: The longest interval, in lines, between complete snapshots with memory and rules: a reader can begin at each of them.
 WHOLE_EVERY = 250
 
 
@@ -67,12 +67,12 @@ def _at(clock: WallClock | None, cause: Cause | None) -> Cause | None:
 
 
 def command_fields(command: Command | None) -> dict[str, object]:
-    """A standing order as the journal and the status show it."""
+    """A command as shown in journal and status."""
     return {"action": command.action, "value": command.value} if command else {"action": None}
 
 
 def without_texts(said: Mapping[str, object]) -> dict[str, object]:
-    """What a record says without the sentences, which depend on language and version."""
+    """A record without its texts, which depend on language and version."""
     kept = {name: value for name, value in said.items() if name not in TEXTS}
     return {name: without_texts(value) if name == "step" and value else value for name, value in kept.items()}  # type: ignore[arg-type]
 
@@ -85,7 +85,7 @@ def _step_fields(step: Step | None, language: str) -> dict[str, object] | None:
 
 
 def _gist(decision: Decision) -> tuple[object, ...]:
-    """A decision without the figures of its cause, which change all the time."""
+    """A decision without the figures of its cause, which change constantly."""
     return decision.state, decision.step, decision.setpoint, decision.alarm
 
 
@@ -117,7 +117,7 @@ def _session_lines(before: Decision | None, now: Decision, language: str, clock:
 
 
 def session_fields(session: Session, language: str = "en", clock: WallClock | None = None) -> dict[str, object]:
-    """A session in figures that a person can read."""
+    """A session as rounded figures, for people."""
     return {
         "elapsed_s": round(session.elapsed_s, 1),
         "energised_s": round(session.energised_s, 1),
@@ -132,10 +132,10 @@ def session_fields(session: Session, language: str = "en", clock: WallClock | No
 
 
 class SnapshotRecorder:
-    """Turns the steps of one bay into `snapshot` lines: whole now and then, else what differs from the line before.
+    """Turns the decisions of one bay into `snapshot` lines: some complete, the others differences from the line before.
 
-    In a quiet state nothing is written until something happens; then a whole line begins anew. All that a step was
-    given is there: who takes it again comes to the same decision.
+    In a quiet state nothing is written until something happens; then a complete line starts over. A line has the whole
+    input of a decision: repeating it gives the same result.
     """
 
     def __init__(self, bay: Bay) -> None:
@@ -143,14 +143,14 @@ class SnapshotRecorder:
         self.begin(bay)
 
     def begin(self, bay: Bay) -> None:
-        """Begin anew with a whole line, by what is in force from now on."""
+        """Start over with a complete line, with the policy now in force."""
         self._config = json.loads(json.dumps(asdict(bay), default=str))
         self._last: Snapshot | None = None
 
     def line(self, now_s: float, snapshot: Snapshot, memory: Memory, state: State, *, news: bool) -> Line | None:
-        """The line for a step that was taken at `now_s` with `snapshot` and `memory`; None where nothing is to be said.
+        """The line for a decision made at `now_s` with `snapshot` and `memory`; None if nothing is to be recorded.
 
-        `state` is where the step has led, `news` is whether it gave `decision_lines`.
+        `state` is the resulting state, `news` is whether there were any `decision_lines`.
         """
         if state in QUIET and not news and snapshot.request is None:
             self._last = None
@@ -167,7 +167,7 @@ class SnapshotRecorder:
 
 
 def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
-    """Only the parts that are not the same; of the battery's values only those that are new."""
+    """Only the parts that differ; of the battery's values only the new ones."""
     said: dict[str, object] = {}
     if new.charger is not old.charger:
         said["charger"] = _plain(new.charger)

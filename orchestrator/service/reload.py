@@ -1,7 +1,6 @@
-"""A changed policy comes into force without a restart: read anew when asked, each bay takes it over when it stands by.
+"""Puts changed policies into force without a restart: rereads them on request; each bay adopts its own in standby.
 
-Only policies: what is wired where, and the hard limits, are fixed for as long as the service runs. A file with an error
-changes nothing.
+Policies only: wiring and hard limits are fixed while the service runs. A file with an error changes nothing.
 """
 
 import threading
@@ -15,9 +14,9 @@ from orchestrator.service.bay import BayRunner
 
 
 class Reload:
-    """Reads the station's files in a thread of its own: the control loop must not wait for a disk.
+    """Reads the station's files in its own thread: the control loop must not wait for a disk.
 
-    However often it is asked meanwhile, it reads once more, and that finds what all of them meant.
+    However many requests arrive meanwhile, it reads once more for all of them.
     """
 
     def __init__(self, station: Station, bays: Sequence[BayRunner], say: Callable[[Cause], None]) -> None:
@@ -26,11 +25,11 @@ class Reload:
         self._thread = threading.Thread(target=self._run, name="reload", daemon=True)
 
     def start(self) -> None:
-        """Wait to be asked."""
+        """Start waiting for requests."""
         self._thread.start()
 
     def ask(self) -> None:
-        """Begin; what comes of it is said."""
+        """Request a reload; the result is reported to people."""
         self._asked.set()
 
     def _run(self) -> None:
@@ -39,11 +38,11 @@ class Reload:
             self._asked.clear()
             try:
                 self.read()
-            except Exception as error:  # noqa: BLE001 - the next one may be better
+            except Exception as error:  # noqa: BLE001 - the next attempt may succeed
                 self._say(Cause.of("reload_failed", file=self._file, error=repr(error)))
 
     def read(self) -> None:
-        """Offer each bay what its station file says now."""
+        """Offer each bay its policy from the present station file."""
         try:
             fresh = {bay.name: bay for bay in load_station(self._file).bays}
         except OrchestratorError as error:

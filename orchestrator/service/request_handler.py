@@ -1,4 +1,4 @@
-"""What is asked at the control socket, in its own thread: the status, or a request that is handed to the bays."""
+"""Handles requests from the control socket, in its thread: builds the status, or passes requests to the bays."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -15,12 +15,12 @@ from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.service.strays import Strays
 from orchestrator.text.catalogue import say
 
-#: A request is decided by the next step, and answered when it is on disk or after 2 s; longer is a loop that hangs.
+#: The next decision handles a request; the answer comes when it is on disk, or after 2 s. Later means a hung loop.
 ANSWER_S = 3.0
 
 
 class RequestHandler:
-    """Answers for a station. `wake` has the control loop step the bay with this number."""
+    """Answers for a station. `wake` makes the control loop decide the bay with this number."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class RequestHandler:
         raise RequestError(Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", *map(str, Request))))
 
     def _drop(self, port: str) -> Later:
-        """Forget a charger that no bay has any more; told when the disk has it."""
+        """Forget a charger without a bay; answered once that is on disk."""
         self._store.refuse_unkept(self._clock())
         what, revision = self._strays.drop(port)
         end_s = self._clock() + KEPT_WITHIN_S
@@ -79,7 +79,7 @@ class RequestHandler:
         raise RequestError(Cause.of("bay_unknown", bay=f"{name!s:.80}", bays=known))
 
     def _ask(self, bays: Sequence[BayRunner], request: Request) -> Later:
-        """Hand the request to each bay; what they say is there later, "" is yes."""
+        """Pass the request to each bay; their answers come later, "" means yes."""
         asked = {bay.name: Asked(request) for bay in bays}
         for bay in bays:
             bay.ask(asked[bay.name])

@@ -1,18 +1,18 @@
-"""A file of lines that never takes more than its space: it is divided, and the oldest part goes."""
+"""A file of lines with bounded size: the space is divided into parts, and the oldest part is dropped."""
 
 import os
 from collections import deque
 from contextlib import suppress
 from pathlib import Path
 
-#: Into how many files the space is divided.
+#: The number of files into which the space is divided.
 FILES = 8
 
 
 class RotatingFile:
-    """`NAME.jsonl` is written; `NAME.1.jsonl` … `NAME.7.jsonl` are older and go when there is no space for them.
+    """`NAME.jsonl` is written; `NAME.1.jsonl` … `NAME.7.jsonl` are older and are dropped for lack of space.
 
-    What is `durable` is on the disk when it has been taken: the reasons for a stop outlive a power cut right after it.
+    `durable`: lines are on disk once taken, so the reasons for a stop survive a power cut right after it.
     """
 
     def __init__(self, directory: Path, name: str, max_bytes: int, *, durable: bool = False) -> None:
@@ -21,7 +21,7 @@ class RotatingFile:
         self._mended = False
 
     def take(self, lines: deque[bytes]) -> None:
-        """Write these lines and remove them; OSError where the disk does not take them: what is left is not written."""
+        """Write these lines and remove them; OSError if the disk does not take them: the remaining ones are pending."""
         self._directory.mkdir(parents=True, exist_ok=True, mode=0o750)
         while lines:
             path = self._path(0)
@@ -70,7 +70,7 @@ def _size(path: Path) -> int:
 
 
 def _cut_off(path: Path) -> bytes:
-    """What must be written before the next line: an end for the last one, if a power failure has cut that off."""
+    """The bytes to write before the next line: a line end, if a power failure has cut off the last line."""
     size = _size(path)
     if not size:
         return b""

@@ -1,20 +1,20 @@
-"""Entries of the second format, which had sentences where now are causes: each becomes a cause that says its sentence.
+"""Converts entries of the second format, which had sentences instead of causes: each becomes a cause with that text.
 
-What comes in is hostile still: what is not decoded here is, or is refused, with the rest.
+The input is still untrusted: whatever is not decoded here is decoded, or refused, with the rest.
 """
 
 from collections.abc import Mapping
 
 from orchestrator.model.cause import SAID
 
-#: Until there was the state HELD, a hold ended with what to do about it; the bay itself says that now.
+#: Before the state HELD existed, a hold ended with what to do about it; the bay itself adds that now.
 OLD_END = "; start to go on"
-#: The sentences that anything depends on.
+#: The sentences that other code depends on.
 KNOWN = {"stopped by the operator": "operator_stop", "reset by the operator": "operator_reset"}
 
 
 def of_sentences(entry: Mapping[str, object]) -> dict[str, object]:
-    """An entry as the third format has it."""
+    """The entry in the third format."""
     new = dict(entry)
     new["hold"] = said(entry.get("hold"))
     faults, session = entry.get("faults"), entry.get("session")
@@ -33,7 +33,7 @@ def _fault(fault: object) -> object:
 
 
 def said(text: object) -> dict[str, object] | None:
-    """The cause of a sentence, in plain values; None for an empty one. ValueError for what is none."""
+    """The cause for a sentence, as plain values; None for an empty one. ValueError if it is not a text."""
     if not isinstance(text, str):
         raise ValueError(f"{text!r:.80} is no sentence")
     if not text:

@@ -1,4 +1,4 @@
-"""The control socket's name in the file system: made owner-only, watched, and taken away only while it is ours."""
+"""The control socket's name in the file system: created owner-only, watched, and removed only while it is ours."""
 
 import os
 import socket
@@ -8,16 +8,16 @@ from orchestrator.errors import StartError
 from orchestrator.model import Cause
 from orchestrator.service.disk import code_of
 
-#: So many clients may wait for their turn; after that, connecting itself waits.
+#: The number of clients that may wait to be accepted; beyond that, connecting itself waits.
 WAITING = 128
-#: Connecting to a socket on this machine takes no time, unless nobody takes the connections.
+#: Connecting to a local socket takes no time, unless nobody accepts.
 PROBE_S = 1.0
 
 Identity = tuple[int, int]  #: device and inode
 
 
 def listen(path: Path) -> socket.socket:
-    """The listening socket, owner-only from the first moment on; a dead one in its place is removed."""
+    """The listening socket, owner-only from the first moment; a dead one in its place is removed."""
     if not _is_free(path):
         raise StartError(Cause.of("socket_occupied", socket=str(path)))
     if is_alive(path):
@@ -35,7 +35,7 @@ def listen(path: Path) -> socket.socket:
 
 
 def _is_free(path: Path) -> bool:
-    """Whether there is a socket or nothing; what we may not look at is said by `bind`."""
+    """Whether there is a socket or nothing; `bind` reports what we may not look at."""
     try:
         return path.is_socket() or not os.path.lexists(path)
     except OSError:
@@ -44,27 +44,27 @@ def _is_free(path: Path) -> bool:
 
 def _bind(listener: socket.socket, path: Path) -> None:
     path.unlink(missing_ok=True)
-    os.fchmod(listener.fileno(), 0o600)  # Linux gives the name the mode that the socket has; the umask is all threads'
+    os.fchmod(listener.fileno(), 0o600)  # Linux gives the name the socket's mode; the umask would affect all threads
     listener.bind(str(path))
 
 
 def is_alive(path: Path) -> bool:
-    """Whether somebody answers on a socket of this name; one that we may not ask counts as well."""
+    """Whether somebody answers on a socket with this name; one that we may not connect to counts as well."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         try:
             probe.settimeout(PROBE_S)
             probe.connect(str(path))
         except (BlockingIOError, TimeoutError):
-            return True  # there are more clients than it has answered yet
+            return True  # its queue of clients is full
         except PermissionError:
-            return identity(path) is not None  # another user's; or we may not even look into the folder
+            return identity(path) is not None  # another user's; or we may not even look into the directory
         except OSError:
             return False
     return True
 
 
 def identity(path: Path) -> Identity | None:
-    """Which file has this name now; None if none has, or if that cannot be told."""
+    """The file that has this name now; None if there is none, or if it is not visible to us."""
     try:
         found = path.lstat()
     except OSError:
@@ -73,6 +73,6 @@ def identity(path: Path) -> Identity | None:
 
 
 def remove(path: Path, ours: Identity | None) -> None:
-    """Take the name away, unless it is another's by now."""
+    """Remove the name, unless it belongs to another socket by now."""
     if ours is not None and identity(path) == ours:
         path.unlink(missing_ok=True)

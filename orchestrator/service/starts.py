@@ -1,9 +1,9 @@
-"""Whose turn it is to begin a charge: one bay of a station after the other, so that each is seen on its own BMU.
+"""Decides whose turn it is to begin a charge: one bay of a station after another, so that each is seen on its own BMU.
 
-Theory of operation. Two equal packs with swapped cables or node ids look right to both bays: volts agree, amps agree,
-and each pack is watched by the other one's BMU. Only a beginning tells them apart. So a bay that is ready waits for its
-turn; the turn ends when its own BMU has seen its first amperes, when it gave up, or after `TURN_S`; and turns begin
-`stagger_s` apart. Whose BMU moves instead is told to the bay, which stops by it (FAULTS P8).
+Theory of operation. Two equal packs with swapped cables or node ids look right to both bays: voltage and current agree,
+and each pack is watched by the other one's BMU. Only the beginning of a charge exposes that. So a bay that is ready
+waits for its turn; the turn ends when its own BMU has seen its first amperes, when it gives up, or after `TURN_S`; and
+turns begin `stagger_s` apart. If another bay's BMU moves instead, the bay is told which, and stops (FAULTS P8).
 
 Used by the control loop's thread only. A station with one bay has nobody to wait for.
 """
@@ -16,13 +16,13 @@ from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses.followed import FIRST_A, OWN_SHARE
 from orchestrator.model import Cause, Snapshot, State
 
-#: A turn takes no longer than this: the charger's sequence takes 2 s on a good line, and its first amperes follow.
+#: The longest turn: the charger's sequence takes 2 s on a good line, and its first amperes follow.
 TURN_S = 20.0
 
 
 @dataclass(frozen=True, slots=True)
 class Amps:
-    """What a bay's two witnesses said last."""
+    """The latest readings of a bay's two witnesses."""
 
     bmu: float = 0.0
     charger: float = 0.0
@@ -30,7 +30,7 @@ class Amps:
 
 @dataclass(slots=True)
 class Turn:
-    """One bay's turn, and what every bay showed when its charge began."""
+    """One bay's turn, and every bay's readings when its charge began."""
 
     name: str
     since_s: float
@@ -39,7 +39,7 @@ class Turn:
 
 
 class Starts:
-    """`waits` and `moves` before a bay's step, `follow` after it."""
+    """Call `waits` and `moves` before a bay's decision, and `follow` after it."""
 
     def __init__(self, stagger_s: float, at: str) -> None:
         self._stagger_s, self._at = stagger_s, at
@@ -60,11 +60,11 @@ class Starts:
         return Cause.of("waits_for_stagger", key="stagger_s", place=self._at, stagger_s=self._stagger_s)
 
     def moves(self, name: str) -> str:
-        """The bay whose BMU has seen what this bay's charger began; "" if none has but its own."""
+        """The other bay whose BMU has seen this bay's charge begin; "" if there is none."""
         return self._moves if self._turn is not None and self._turn.name == name else ""
 
     def follow(self, name: str, now_s: float, memory: Memory, snapshot: Snapshot) -> None:
-        """Take note of a bay's step; `memory` is what the step has left."""
+        """Take note of a bay's decision; `memory` is its resulting memory."""
         bmu, charger = snapshot.battery.current_a, snapshot.charger
         self._seen[name] = Amps(bmu.value if bmu is not None else 0.0, charger.current_a if charger else 0.0)
         turn = self._turn
@@ -87,7 +87,7 @@ class Starts:
             self._turn = None
 
     def _moved(self, turn: Turn) -> str:
-        """The other bay whose BMU has risen by what this charger gives, and by nothing of its own."""
+        """The other bay whose BMU has risen by this charger's current, and not by its own charger's."""
         flows_a = self._seen[turn.name].charger
         if flows_a < FIRST_A:
             return ""

@@ -1,4 +1,4 @@
-"""The file of what survives a restart: JSON with a version. What comes from a disk is hostile until it is decoded."""
+"""The file format of the persisted state: JSON with a version. Data from a disk is untrusted until it is decoded."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -12,14 +12,14 @@ from orchestrator.service.sentences import of_sentences, said
 from orchestrator.service.typed import MOST, structure
 
 FORMAT = 3
-#: The format before had sentences in the place of causes.
+#: The previous format had sentences instead of causes.
 SENTENCES = 2
-#: Before this moment (2024-01-01) no clock that was ever set can have been.
+#: A clock before this moment (2024-01-01) has never been set.
 NEVER_SET_S = 1_704_067_200.0
-#: What stands beside a bay's persisted state.
+#: The keys beside a bay's persisted state.
 PLACE = ("bay", "port", "can", "node_id", "control", "rs485", "run")
 TOO_DEEP = "it is nested deeper than anything that this service writes"
-#: No entry is without these; what later versions have added has its defaults.
+#: Every entry must have these; keys added by later versions have defaults.
 NEEDED = frozenset({"running", "hold", "paused", "faults"})
 
 
@@ -29,10 +29,10 @@ class Stamp:
 
     wall_s: float  #: by the wall clock
     clock_s: float  #: by the monotonic clock …
-    boot: str  #: … of this boot of the machine; "" where that is not known
+    boot: str  #: … of this boot of the machine; "" if unknown
 
     def age_s(self, now: "Stamp") -> float:
-        """How long ago that was; 0 where no clock can tell. Too little keeps every limit in force."""
+        """How long ago that was; 0 if no clock can tell. An age too small keeps every limit in force."""
         if self.boot and self.boot == now.boot and self.clock_s <= now.clock_s:
             return min(now.clock_s - self.clock_s, MOST / 2)
         if self.wall_s < NEVER_SET_S or not self.wall_s <= now.wall_s <= MOST / 2:
@@ -41,7 +41,7 @@ class Stamp:
 
 
 def encode(stamp: Stamp, run: int, entries: Sequence[Entry]) -> bytes:
-    """The file's bytes, one entry a line."""
+    """The file's bytes, one entry per line."""
     head = {"format": FORMAT, "written": stamp.wall_s, "clock_s": stamp.clock_s, "boot": stamp.boot, "run": run}
     lines = ",\n".join(json.dumps(_entry(entry)) for entry in entries)
     return f'{json.dumps(head)[:-1]}, "entries": [\n{lines}\n]}}\n'.encode()
@@ -62,7 +62,7 @@ def _entry(entry: Entry) -> dict[str, object]:
 
 
 def decode(data: bytes, now: Stamp) -> tuple[int, list[Entry]]:
-    """The newest run of the service and all entries, as old as they are `now`; ValueError for what is none of ours."""
+    """The newest run of the service and all entries, with their ages `now`; ValueError for a foreign file."""
     try:
         document = json.loads(data)
         if not isinstance(document, dict) or document.get("format") not in (FORMAT, SENTENCES):
@@ -98,19 +98,19 @@ def _entries(values: object, age_s: float, *, sentences: bool) -> Iterator[Entry
             raise ValueError(f"{', '.join(sorted(NEEDED - value.keys()))} is missing")
         plain = {key: one for key, one in value.items() if key not in PLACE}
         persisted: Persisted = structure(of_sentences(plain) if sentences else plain, Persisted)
-        unseen_s = age_s or COUNTERS_S  # an age that cannot be told is 0
+        unseen_s = age_s or COUNTERS_S  # an unknown age is 0
         yield Entry(place, persisted.aged(age_s, unseen_s), structure(value.get("run"), int))
 
 
 def _path(value: object) -> str:
-    """A path need not be text, and was written as Python has it."""
+    """A path; it need not be valid text, and was written in Python's representation."""
     if not isinstance(value, str) or "\0" in value:
         raise ValueError(f"{value!r:.80} is no path")
     return value
 
 
 def decode_first(data: bytes, run: int) -> list[Entry]:
-    """The entries of the first format, which knew bays by their names only; ValueError for what is none of ours."""
+    """The entries of the first format, which had only the bays' names; ValueError for a foreign file."""
     try:
         document = json.loads(data)
     except RecursionError:

@@ -1,6 +1,6 @@
-"""The status document: what `status --json` prints and everything north of the service reads. Its names are fixed.
+"""The status document, printed by `status --json` and read by everything north of the service. Its names are fixed.
 
-Values are the newest that were heard, however old: `age_s` says how old, and what the core does not rely on any more is
+Values are the newest received, however old: `age_s` gives their age, and values that the core no longer relies on are
 `old`.
 """
 
@@ -24,18 +24,18 @@ from orchestrator.service.records import command_fields, session_fields
 from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import fields, say
 
-#: What of a charger's reading the status shows; `t_s` is when it was asked for, in monotonic seconds of this machine.
+#: The parts of a charger's reading in the status; `t_s` is when it was requested, in monotonic seconds of this machine.
 SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
-#: Of the battery's values those that are read several times a second; the others come once a second.
+#: The battery's values that are read several times a second; the others once a second.
 FAST = ("voltage_v", "current_a", "status", "temperature_c")
 
 
 def bay_status(
     name: str, snapshot: Snapshot, decision: Decision, now_s: float, wall_s: float, language: str = "en"
 ) -> dict[str, object]:
-    """One bay as it is now. Values are None where nothing valid is known; `since` is Unix time, as `wall_s`.
+    """The present state of one bay. Values are None if nothing valid is known; `since` is Unix time, like `wall_s`.
 
-    Each cause stands there as data; `reason`, `text`, `step_rule` and `result` say it in `language`.
+    Each cause is included as data; `reason`, `text`, `step_rule` and `result` are its texts in `language`.
     """
     step, session, clock = decision.step, decision.session, WallClock(now_s, wall_s)
     cause = clock.told(decision.cause)
@@ -91,9 +91,9 @@ def station_status(
     unkept: Cause | None = None,
     strays: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, object]:
-    """The whole station. `alarm` is the worst of all its bays and strays, also where `bays` are only some of them.
+    """The whole station. `alarm` is the worst of all its bays and strays, even if `bays` has only some of them.
 
-    `strays` are chargers of bays that the station file has not any more.
+    `strays` are chargers of bays that the station file no longer has.
     """
     return {
         "station": station.station,

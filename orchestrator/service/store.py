@@ -1,12 +1,12 @@
-"""What must outlive the process, on the disk: one file, one owner, one thread that waits for nothing but its disk.
+"""Stores the persisted state on disk: one file, one owner, one thread that waits only for its disk.
 
-Theory of operation. The control loop puts what each bay is to remember; the thread writes the whole file whenever
-something has changed that may be relied on (`Persisted.gist`), and mere counters now and then. Every such change has a
-revision; what is answered, or begun, waits until `kept_revision` has come to it. A disk that is full, gone or hangs
-delays nobody: it is told by `unkept`, and no charge begins.
+Theory of operation. The control loop puts each bay's state here; the thread writes the whole file whenever anything
+changes that may be relied on (`Persisted.gist`), and plain counters periodically. Every such change has a revision;
+answers and starts wait until `kept_revision` has reached it. A disk that is full, gone or hung delays nobody: `unkept`
+reports it, and no charge begins.
 
-A restart is neither a reset nor a start. Where the file cannot be read, every bay is held; it is moved aside, never
-overwritten. Where the disk does not answer in time, nothing is written at all, and the next start finds what is there.
+A restart is neither a reset nor a start. If the file cannot be read, every bay is held; the file is moved aside, never
+overwritten. If the disk does not answer in time, nothing is written at all, and the next start finds the old state.
 """
 
 import threading
@@ -23,17 +23,17 @@ from orchestrator.service.past import Entry, Place
 from orchestrator.service.remembered import Remembered
 from orchestrator.service.stateformat import Stamp, encode
 
-#: A change that is not on disk within this counts as not kept (FAULTS P9).
+#: A change that is not on disk within this counts as not persisted (FAULTS P9).
 KEPT_WITHIN_S = 2.0
-#: A disk that refused is asked again this often.
+#: How often writing is retried after a disk error.
 RETRY_S = 1.0
 
 
 class Store:
-    """The persisted state of a station's bays. `put` and the questions never wait; any thread may ask them.
+    """The persisted state of a station's bays. `put` and the queries never block and are thread-safe.
 
-    `clock` is monotonic, `wall` the wall clock, `boot` names the boot of the machine. `on_kept` is called from the
-    store's thread with the places whose changes have just come to the disk; it has to be quick.
+    `clock` is monotonic, `wall` the wall clock, `boot` identifies the boot of the machine. `on_kept` is called from the
+    store's thread with the places whose changes have just reached the disk; it must be quick.
     """
 
     def __init__(
@@ -49,13 +49,13 @@ class Store:
         self.path = directory / FILE
         self._directory, self._places = directory, tuple(places)
         self._clock, self._wall, self._boot, self._on_kept = clock, wall, boot, on_kept
-        self._lock = threading.Lock()  # guards what follows; nobody waits for a disk with it
+        self._lock = threading.Lock()  # guards the following; never held while waiting for a disk
         self._table: dict[Place, Remembered] = {}
-        self._gists: dict[Place, object] = {}  # as they were last written
-        self._disk: dict[Place, Persisted] = {}  # without what a write under way may turn round
+        self._gists: dict[Place, object] = {}  # as last written
+        self._disk: dict[Place, Persisted] = {}  # without entries that the write under way may change
         self._revision, self.kept_revision = 1, 0  # the file is written once at the start
         self._pending_s: float | None = None  # since when a change has been waiting for the disk …
-        self._later_s: float | None = None  # … and one that the write under way does not have
+        self._later_s: float | None = None  # … and one that is not part of the write under way
         self._counted = False  # a counter has changed
         self._problem: Cause | None = None
         self._foreign: Cause | None = None
@@ -68,10 +68,10 @@ class Store:
         self._wake, self._loaded = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, name="store", daemon=True)
 
-    # --- asked by the control loop ------------------------------------------------------------------------------------
+    # --- used by the control loop -------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Lock the directory, read what the last run has left, then write what changes."""
+        """Lock the directory, read the last run's state, then write changes."""
         self._thread.start()
 
     def wait(self, within_s: float) -> bool:
@@ -82,7 +82,7 @@ class Store:
         return known
 
     def past(self, place: Place) -> Persisted:
-        """What a bay begins with. From the first call on, what the disk has not told by then is not asked for."""
+        """The state that a bay begins with. If it has not been read by the first call, it is not used at all."""
         with self._lock:
             if not self._table:
                 self._blind = Cause.of("disk_silent", directory=str(self._directory))
@@ -90,13 +90,13 @@ class Store:
             return self._table[place].persisted
 
     def strays(self) -> list[Place]:
-        """Where a charger may be running, at a port that no bay has today."""
+        """The places where a charger may be running on a port that no bay has now."""
         with self._lock:
             running = [place for place, put in self._table.items() if put.persisted.running]
         return [place for place in running if not any(place.is_port_of(one) for one in self._places)]
 
     def put(self, place: Place, persisted: Persisted) -> int:
-        """Remember this from now on. The revision that keeps it: `kept_revision` comes to it."""
+        """Store this state. Returns its revision: it is on disk once `kept_revision` has reached it."""
         now_s = self._clock()
         with self._lock:
             old = self._table[place]
@@ -114,7 +114,7 @@ class Store:
         return revision
 
     def on_disk(self, place: Place) -> Persisted | None:
-        """What the disk has of this place, ages as they were then; None while it is not certain whether that runs."""
+        """This place's state on disk, with the ages of that time; None while a write may be changing `running`."""
         return self._disk.get(place)
 
     def unkept(self, now_s: float) -> Cause | None:
@@ -132,7 +132,7 @@ class Store:
             raise RequestError(Cause.of("not_done", problem=why))
 
     def stalled(self, _now_s: float) -> bool:
-        """True when the writer has died. That it waits for its disk is no hang: it is what `unkept` is for."""
+        """True if the writer has died. Waiting for its disk does not count: `unkept` reports that."""
         return not self._thread.is_alive()
 
     def close(self, within_s: float) -> Cause | None:
@@ -174,7 +174,7 @@ class Store:
         try:
             if self._due(ended=ended):
                 self._write()
-        except Exception as error:  # noqa: BLE001 - a thread that dies here takes every charge with it
+        except Exception as error:  # noqa: BLE001 - if this thread died, every charge would end
             self._fail(Cause.of("disk_internal", error=repr(error)), self._clock())
 
     def _begin(self, entries: Sequence[Entry]) -> None:
@@ -183,7 +183,7 @@ class Store:
         self._pending_s = now_s
 
     def _load(self) -> Sequence[Entry]:
-        """Every place's entry at the start; BlockingIOError where another service owns the directory."""
+        """Every place's entry at the start; BlockingIOError if another service owns the directory."""
         try:
             self._ownership.take(lambda: self._ended)
         except BlockingIOError:
@@ -220,12 +220,12 @@ class Store:
             move_aside(self._directory, self._aside, "unread")
             self._aside = ()
             replace_file(self.path, encode(stamp, self._run_number, entries))
-            if not self.kept_revision:  # an older version that is started again finds nothing, and holds every bay
+            if not self.kept_revision:  # an older version started again then finds nothing, and holds every bay
                 move_aside(self._directory, [FIRST_FILE], "old")
         except OSError as error:
             self._fail(_said(error, self.path), stamp.clock_s)
             if isinstance(error, FileNotFoundError):
-                self._ownership.give_up()  # somebody has removed the directory and the lock in it: it is locked anew
+                self._ownership.give_up()  # somebody has removed the directory with its lock: lock it again
             return
         with self._lock:
             self._disk = {place: put.persisted for place, put in table.items()}

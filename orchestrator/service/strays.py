@@ -1,8 +1,8 @@
-"""Chargers in hand that no bay has any more: an earlier run had them run, on a port that the station file lacks now.
+"""Chargers in hand without a bay: an earlier run had them running, on a port that the station file no longer has.
 
-Whoever stops, stops those too. Each is stopped on the port that was written down, until two status replies in a row
-show that it stands by, and is watched for a little longer; then its port is given back. What was known of its bay stays
-written down, and holds it if it ever comes back.
+Every stop includes those. Each is stopped on its recorded port until two consecutive status replies show standby, and
+watched for a little longer; then its port is released. Its bay's persisted state stays, and holds the bay if it ever
+comes back.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,9 +19,9 @@ from orchestrator.service.past import Place, shown
 from orchestrator.service.store import Store
 from orchestrator.text.catalogue import fields, say
 
-#: A charger that delivers no more than this delivers nothing: its measurement is no better.
+#: Up to this current a charger delivers nothing: its measurement is no better.
 STANDBY_A = 0.5
-#: One that runs again within this was not stopped (FAULTS C30).
+#: A charger that runs again within this was not stopped (FAULTS C30).
 WATCHED_S = 10.0
 
 
@@ -31,15 +31,15 @@ class _Stray:
 
     place: Place
     port: ChargerPort
-    ran_s: float = -inf  #: when it was last seen to run
+    ran_s: float = -inf  #: when it was last seen running
     stop_s: float | None = None  #: when the first stop after that was sent
-    seen_s: float | None = None  #: when it was first asked and showed standby after that
+    seen_s: float | None = None  #: the request time of the first reply after that which showed standby
     verified_s: float | None = None  #: when it had shown it twice
     closed: bool = False
 
 
 class Strays:
-    """All of them. `open_port` makes a port that is not started yet; `say` tells people. Used by the control loop."""
+    """All of them. `open_port` creates a port without starting it; `say` informs people. Used by the control loop."""
 
     def __init__(self, store: Store, open_port: Callable[[Place], ChargerPort], say: Callable[[Cause], None]) -> None:
         self._store, self._open_port, self._say = store, open_port, say
@@ -55,7 +55,7 @@ class Strays:
             self._tell("stray_found", place)
 
     def look(self, now_s: float) -> None:
-        """See how far they have come."""
+        """Check their progress."""
         for stray in self._strays:
             if not stray.closed:
                 self._look(stray, now_s)
@@ -71,7 +71,7 @@ class Strays:
             if link.stop_sent_s is not None and link.stop_sent_s > stray.ran_s:
                 stray.stop_s = link.stop_sent_s
         elif reading.t_s < stray.stop_s:
-            pass  # it is older than the stop
+            pass  # the reading is older than the stop
         elif stray.seen_s is None:
             stray.seen_s = reading.t_s
         elif stray.verified_s is None and reading.t_s > stray.seen_s:
@@ -94,7 +94,7 @@ class Strays:
         return self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
 
     def drop(self, port: str) -> tuple[str, int]:
-        """A person says that a charger is gone for good: forget it. What was forgotten, and the revision that keeps it.
+        """Forget a charger that a person reports gone for good. Returns its name, and the revision that persists that.
 
         Nothing else is lost: its bay stays held if it ever comes back. RequestError where it is not gone.
         """
@@ -108,7 +108,7 @@ class Strays:
         self._strays = [one for one in self._strays if one is not stray]
         revision = self._remember(stray, running=False)
         self._tell("stray_dropped", stray.place)
-        Thread(target=stray.port.close, name="drop", daemon=True).start()  # its driver may take its time
+        Thread(target=stray.port.close, name="drop", daemon=True).start()  # its driver may be slow
         return str(stray.place), revision
 
     def _tell(self, id_: str, place: Place) -> None:
@@ -116,23 +116,23 @@ class Strays:
 
     @property
     def unverified(self) -> list[Cause]:
-        """Those that may be running still."""
+        """Those that may still be running."""
         return [_cause("stray", stray.place) for stray in self._strays if stray.verified_s is None]
 
     @property
     def alarm(self) -> Alarm:
-        """Somebody must find out why such a charger is there, also when it stands by."""
+        """The alarm level: somebody must find out why such a charger exists, even if it is in standby."""
         if self.unverified:
             return Alarm.DANGER
         return Alarm.ATTENTION if self._strays else Alarm.NONE
 
     @property
     def ports(self) -> Iterable[ChargerPort]:
-        """To be closed at the end."""
+        """The ports to close at the end."""
         return [stray.port for stray in self._strays]
 
     def status(self, language: str = "en") -> list[dict[str, object]]:
-        """For the status document."""
+        """The entries for the status document."""
         return [
             {
                 "bay": stray.place.bay,

@@ -1,8 +1,8 @@
-"""The running service: one thread a serial port, one a CAN bus, and this loop, which wakes on every new reading.
+"""The running service: one thread per serial port, one per CAN bus, and this loop, which wakes on every new reading.
 
-Theory of operation. Devices replace their view and put their bay's number into a queue; the loop takes a step for every
-bay that has news, and for every bay at least each TICK_S, so that what did *not* come is noticed, too. The queue is the
-only thing that the loop waits for. Signals only put into it. At the end every bay is stopped and verified.
+Theory of operation. Devices replace their view and put their bay's number into a queue; the loop makes a decision for
+every bay with news, and for every bay at least each TICK_S, so that *missing* readings are noticed as well. The loop
+waits only for the queue, and signals only put into it. At the end every bay is stopped and verified.
 """
 
 import signal
@@ -35,22 +35,22 @@ from orchestrator.service.strays import Strays
 from orchestrator.service.wiring import charger_port, open_contactor, stray_port
 from orchestrator.text.catalogue import say
 
-#: How often the guardian hears that every loop turns: five times before it acts.
+#: The heartbeat period: the guardian acts after five missed ones.
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
 STOP_S = 3.0
-#: A disk that answers has told what the last run has left within this; else the chargers are stopped meanwhile …
+#: A working disk delivers the persisted state within this; otherwise the chargers are stopped meanwhile …
 LOCK_S = 0.3
 #: … and it has this long.
 LOAD_S = 3.0
-#: At the end, what has changed is written, and everything is closed, within this.
+#: The time limits at the end for closing the control socket, writing changes, and closing everything else.
 CONTROL_S = 0.2
 KEEP_S = 2.5
 CLOSE_S = 2.5
 
 
 class Supervisor:
-    """The service for one station. `run` returns when the service was told to end."""
+    """The service for one station. `run` returns when the service is told to end."""
 
     def __init__(self, station: Station, guardian: GuardianLink) -> None:
         self._station, self._language = station, station.language.value
@@ -81,7 +81,7 @@ class Supervisor:
         )
 
     def _build(self) -> None:
-        """Devices for every bay; nothing is opened yet."""
+        """Create the devices for every bay; nothing is opened yet."""
         nodes: dict[str, list[BatteryNode]] = {name: [] for name in self._station.can}
         buses = {
             name: CanBus(name, settings, [bay.battery.node_id for bay in self._station.bays if bay.battery.can == name])
@@ -109,7 +109,7 @@ class Supervisor:
         return (*self._ports, *self._buses)
 
     def run(self) -> int:
-        """Run until SIGTERM or SIGINT; 0 if every charger was then verified to stand by, else 1. SIGHUP: `Reload`.
+        """Run until SIGTERM or SIGINT; returns 0 if every charger was then verified in standby, else 1.
 
         Without its guardian it ends, too, and with 1. Raises StartError where another service owns the journal.
         """
@@ -126,7 +126,7 @@ class Supervisor:
             self._console.close()
 
     def _begin(self) -> None:
-        """Stop every charger, find out what the last run has left, and take every bay's first step."""
+        """Stop every charger, read the persisted state, and make every bay's first decision."""
         self._store.start()
         if known := self._store.wait(LOCK_S):
             self._strays.begin()
@@ -136,7 +136,7 @@ class Supervisor:
         self._control.start()
         for port in self._ports:
             port.start()
-        load()  # the ports are stopping their chargers meanwhile; the first heartbeat comes when it is done
+        load()  # the ports stop their chargers meanwhile; the first heartbeat comes after this
         if not known and self._store.wait(LOAD_S):
             self._strays.begin()
         for bus in self._buses:
@@ -154,7 +154,7 @@ class Supervisor:
             self._run(bay)
 
     def _on_kept(self, places: Collection[Place]) -> None:
-        """What has come to the disk may let a charge begin, or answer a request."""
+        """A change on disk may let a charge begin, or answer a request."""
         for number, bay in enumerate(self._bays):
             if bay.place in places:
                 self._wake.put(number)
@@ -168,7 +168,7 @@ class Supervisor:
         self._wake.put(None)
 
     def _turn(self) -> None:
-        """Wait for news, then step the bays that have some, and those that have been left alone for a tick."""
+        """Wait for news, then decide the bays that have some, and those without a decision for a tick."""
         for number in self._news():
             self._run(self._bays[number])
         if self._reload_asked:
@@ -187,7 +187,7 @@ class Supervisor:
         bay.run(now_s, boottime() - now_s)
 
     def _beat(self, now_s: float) -> None:
-        """Let the guardian know that every loop turns; without it, end."""
+        """Tell the guardian that every loop makes progress; end if the guardian is gone."""
         workers = (*self._devices, self._control, self._journal, self._store)
         well = not any(worker.stalled(now_s) for worker in workers)
         self._beat_s = now_s
@@ -211,8 +211,8 @@ class Supervisor:
         self._run_all()
         while monotonic() < end_s and (self._unverified() or any(bay.owes for bay in self._bays)):
             self._turn()
-        close_all([self._control.close], CONTROL_S)  # who asks from now on is not answered *accepted*
-        self._run_all()  # … and who has asked is heard
+        close_all([self._control.close], CONTROL_S)  # no request is *accepted* from now on …
+        self._run_all()  # … and earlier ones are handled
         unverified = self._unverified()
         for bay in self._bays:
             bay.isolate()
@@ -232,5 +232,5 @@ class Supervisor:
 
 
 def boottime() -> float:
-    """As `monotonic`, but it goes on while the machine is suspended."""
+    """Like `monotonic`, but it also runs while the machine is suspended."""
     return clock_gettime(CLOCK_BOOTTIME)

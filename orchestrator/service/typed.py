@@ -1,4 +1,4 @@
-"""Plain JSON values made into records again, by the types of their fields. What does not fit is refused."""
+"""Turns plain JSON values back into records, by the types of their fields. Anything that does not fit is refused."""
 # ruff: noqa: ANN401 - the types come from the records themselves
 
 from collections.abc import Mapping
@@ -10,14 +10,14 @@ from typing import Any, get_args, get_origin, get_type_hints
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain
 
-#: No figure that is ever written down is larger; ages are in seconds.
+#: The largest figure ever written; ages are in seconds.
 MOST = 1e12
 
 
 def structure(value: object, kind: Any) -> Any:
-    """`value` as a `kind`: a record, mapping, tuple, text, number or truth value. ValueError where it is none.
+    """`value` as a `kind`: a record, mapping, tuple, text, number or truth value. ValueError if it is not one.
 
-    Of a record, fields may be missing (they have their defaults); unknown ones are refused.
+    A record's fields may be missing (they have defaults); unknown ones are refused.
     """
     origin = get_origin(kind)
     if origin is UnionType:
@@ -71,7 +71,7 @@ def _plain(value: object, kind: type) -> Any:
     if type(value) is not kind:
         raise ValueError(f"{value!r:.80} is no {kind.__name__}")
     if isinstance(value, str):
-        value.encode()  # half a character can be neither shown nor written again
+        value.encode()  # a lone surrogate can be neither shown nor written
     elif isinstance(value, int):
         _figure(value)
     return value

@@ -1,6 +1,6 @@
-"""The verbs of the running service: it is started, looked at, and asked to start, pause, stop or reset its bays.
+"""The verbs of the running service: run it, show its status, and request start, pause, stop or reset of its bays.
 
-Each imports what it needs when it runs, so that none waits for another's libraries.
+Each imports its dependencies when it runs, so that none waits for another's libraries.
 """
 
 import argparse
@@ -15,30 +15,30 @@ from typing import cast
 from orchestrator.errors import NoServiceError, ServiceError, UsageError
 
 REQUESTS = {
-    "start": "let a bay charge (again): after a stop, a pause or a reset",
-    "pause": "stop charging until `start`; the session goes on",
-    "stop": "stop charging; only `start` begins again",
-    "reset": "clear latched faults whose cause is gone; `start` then begins again",
+    "start": "let a bay charge (again) after a stop, a pause or a reset",
+    "pause": "stop charging until `start`; the session continues",
+    "stop": "stop charging; only `start` lets the bay charge again",
+    "reset": "clear latched faults whose cause is gone; `start` then lets the bay charge again",
 }
 
 
-#: Those that are done only when the charger was seen to stand by, and how long that is waited for: a charger that does
-#: not obey is uncontrollable after 3 s.
+#: The requests that are complete only once the charger is verified in standby, and how long to wait for that: a
+#: disobedient charger is uncontrollable after 3 s.
 STOPS = ("stop", "pause")
 STANDBY_S, LOOK_S = 4.0, 0.1
-#: `status --watch` looks this often.
+#: The refresh interval of `status --watch`.
 WATCH_S = 1.0
 
 
 def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """`run`, `status` and the requests."""
-    run = verbs.add_parser("run", help="run the service for a station, until it is told to end")
+    run = verbs.add_parser("run", help="run the service for a station until told to end")
     run.add_argument("station", nargs="?", default="station.yaml", help="the station file (default: %(default)s)")
     run.set_defaults(run=_run)
-    status = verbs.add_parser("status", help="what every bay does, and why")
+    status = verbs.add_parser("status", help="show what every bay is doing, and why")
     status.add_argument("bay", nargs="?", help="only this bay")
     status.add_argument("--json", action="store_true", help="the status document, for programs")
-    status.add_argument("--watch", action="store_true", help="again and again, until interrupted")
+    status.add_argument("--watch", action="store_true", help="refresh until interrupted")
     _add_socket(status)
     status.set_defaults(run=_status)
     for verb, about in REQUESTS.items():
@@ -46,7 +46,7 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
         request.add_argument("bay", nargs="*", help="the bays")
         request.add_argument("--all", action="store_true", help="every bay of the station")
         if verb == "reset":
-            request.add_argument("--port", help="forget the charger on this port, which no bay has and which is gone")
+            request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
 
@@ -123,12 +123,12 @@ def _request(arguments: argparse.Namespace) -> int:
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified: dict[str, str] = {}
     if arguments.verb in STOPS:
-        # A stop that is done can be answered with a complaint, that it is not kept, say: its charger is looked at, too.
+        # A stop may be carried out and still be answered with a problem, e.g. not persisted: watch its charger as well.
         looked_at = list(results) if arguments.verb == "stop" else accepted
         unverified = _wait_for_standby(path, looked_at, language, every=arguments.all)
     refused = [Cause.of("bay_refused", bay=bay, why=refusal) for bay, refusal in results.items() if refusal]
     for line in (*unverified.values(), *(say(one, language) for one in refused)):
-        print(line, file=sys.stderr, flush=True)  # what is to be done, before anything else
+        print(line, file=sys.stderr, flush=True)  # what to do, before anything else
     for bay in accepted:
         verified = arguments.verb in STOPS and bay not in unverified
         done = Cause.of("accepted_verified" if verified else "accepted", bay=bay, verb=arguments.verb)
@@ -137,9 +137,9 @@ def _request(arguments: argparse.Namespace) -> int:
 
 
 def _wait_for_standby(path: Path, names: Sequence[str], language: str, *, every: bool) -> dict[str, str]:
-    """Look at these bays until their chargers stand by; what to do about each that was not seen to in time.
+    """Watch these bays until their chargers are in standby; returns what to do about each that is not in time.
 
-    `every`: and at chargers that are no bay's any more.
+    `every`: also watch chargers without a bay.
     """
     from orchestrator.lastresort.asking import ask
     from orchestrator.model import Cause

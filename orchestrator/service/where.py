@@ -1,4 +1,4 @@
-"""Where the running service is found: its control socket, without being told if possible."""
+"""Finds the running service's control socket, without being told if possible."""
 
 import os
 from pathlib import Path
@@ -6,16 +6,16 @@ from pathlib import Path
 from orchestrator.config.ports import wiring
 from orchestrator.errors import UsageError
 
-#: The station file that `run` takes where none is named.
+#: The default station file of `run`.
 HERE = Path("station.yaml")
-#: Of the service that deploy/orchestrator.service starts.
+#: The socket of the service started by deploy/orchestrator.service.
 INSTALLED = Path("/run/orchestrator/orchestrator.sock")
 
 
 def find_socket(named: str | None, here: Path = HERE, installed: Path = INSTALLED) -> Path:
-    """The socket that was named, else $ORCHESTRATOR_SOCKET, else that of the station file here, else the installed one.
+    """The named socket, else $ORCHESTRATOR_SOCKET, else that of the station file here, else the installed one.
 
-    UsageError where there is none of these.
+    UsageError if there is none of these.
     """
     if name := named or os.environ.get("ORCHESTRATOR_SOCKET"):
         return Path(name)
@@ -37,7 +37,7 @@ def _written(station: Path) -> str:
 
 
 def _may_be_there(path: Path) -> bool:
-    """One in a folder that we may not look into is there: who asks it is told who may."""
+    """Whether it exists; one in a directory that we may not look into counts: connecting reports who may."""
     try:
         return path.exists()
     except PermissionError:

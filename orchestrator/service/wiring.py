@@ -1,4 +1,4 @@
-"""A bay's devices as the service has them: each port and each contactor's line with a duplicate at the guardian."""
+"""Creates a bay's devices for the service: the guardian gets a duplicate of each port and each contactor's line."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,7 +17,7 @@ from orchestrator.service.past import Place
 def charger_port(
     charger: ChargerConfig, limits: Limits, poke: Callable[[], None], guardian: GuardianLink
 ) -> ChargerPort:
-    """The port of one charger, not started yet; `poke` is called for every reading."""
+    """The port of one charger, not started; `poke` is called for every reading."""
     port, kernel = charger.port, charger.rs485 is Rs485.KERNEL
     return ChargerPort(
         charger,
@@ -29,13 +29,13 @@ def charger_port(
 
 
 def stray_port(guardian: GuardianLink, poke: Callable[[], None], place: Place) -> ChargerPort:
-    """A port that is only ever stopped: no current is within its limits."""
+    """A port that is only ever stopped: its limits allow no current."""
     charger = ChargerConfig(port=place.port, control=place.control, steps_a=(0.0,) * 5, rs485=place.rs485)
     return charger_port(charger, Limits(voltage_v=0.0, current_a=0.0, temperature_c=Range(0, 0)), poke, guardian)
 
 
 def open_contactor(bay: Bay, guardian: GuardianLink) -> Contactor | None:
-    """The bay's contactor, if it has one. LinkError where the library for it is not installed."""
+    """The bay's contactor, if it has one. LinkError if its library is not installed."""
     config = bay.contactor
     if config is None:
         return None

@@ -1,4 +1,4 @@
-"""An asyncio loop in a thread of its own, for emulators inside a test's process."""
+"""An asyncio loop in its own thread, for emulators inside a test process."""
 
 import asyncio
 import threading
@@ -8,12 +8,12 @@ from typing import Self, TypeVar
 
 T = TypeVar("T")
 
-#: A call into the loop that takes longer than this has found it stuck.
+#: If a call into the loop takes longer than this, the loop is stuck.
 CALL_S = 5.0
 
 
 class Background:
-    """`with Background() as background:` – then `call` what belongs into the loop's thread."""
+    """`with Background() as background:`, then `call` whatever belongs in the loop's thread."""
 
     def __init__(self) -> None:
         self.loop = asyncio.new_event_loop()
@@ -31,7 +31,7 @@ class Background:
         self.loop.close()
 
     def call(self, function: Callable[[], T]) -> T:
-        """Run it in the loop's thread and return what it returns."""
+        """Run it in the loop's thread and return its result."""
 
         async def run() -> T:
             return function()

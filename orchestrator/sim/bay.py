@@ -1,4 +1,4 @@
-"""One bay as nature has it: a charger and a pack on one pair of cables. Pure: time is an argument."""
+"""The physics of one bay: a charger and a pack on one pair of cables. Pure: time is an argument."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -7,13 +7,13 @@ from typing import Any
 from orchestrator.sim.charger import Charger
 from orchestrator.sim.pack import Pack, Readout
 
-#: Model time is cut into steps of at most this, so that pulses and the constant-voltage phase come out right.
+#: Model time advances in steps of at most this, so that pulses and the constant-voltage phase are modelled correctly.
 MAX_STEP_S = 0.1
 
 
 @dataclass(slots=True)
 class Bay:
-    """A charger and a pack; `falsify` changes what the BMU tells of it, by field of the readout."""
+    """A charger and a pack; `falsify` changes what the BMU reports, by field of the readout."""
 
     charger: Charger
     pack: Pack
@@ -26,12 +26,12 @@ class Bay:
             step_s = min(dt_s, MAX_STEP_S)
             self.pack.advance(step_s, self.charger.current_a)
             self.charger.advance(step_s, self.pack if self.connected else None)
-            # The pack sees the new current at once: charger and BMU are measured on one cable.
+            # The pack sees the new current at once: charger and BMU measure the same cable.
             self.pack.current_a = self.charger.current_a
             dt_s -= step_s
 
     def readout(self) -> Readout:
-        """What the BMU tells, falsified or not."""
+        """What the BMU reports, falsified or not."""
         truth = self.pack.readout()
         if not self.falsify:
             return truth

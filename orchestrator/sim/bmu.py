@@ -1,8 +1,8 @@
-"""An emulated BMU: `durand` answers CANopen, a pack model says what.
+"""An emulated BMU: `durand` handles CANopen, a pack model provides the values.
 
-durand is a CANopen responder that shares nothing with the `canopen` library, so that our client is not tested by its
-own makers. Two parts are written here. TPDOs: durand sends them on every change and knows no event timer (sub 5), while
-the BMU's manual has nothing but the timer (§2.5). And what a reset forgets: durand keeps all values through it.
+durand is a CANopen responder that shares nothing with the `canopen` library, so our client is not tested against its
+own code. Two parts are implemented here. TPDOs: durand sends them on every change and has no event timer (sub 5), while
+the BMU's manual has only the timer (§2.5). Resets: durand keeps all values, a real BMU forgets its settings.
 """
 
 import asyncio
@@ -24,19 +24,19 @@ DEVICE_NAME, NAME = 0x1008, b"TABOS battery management unit"  #: longer than the
 EMERGENCY, GUARD = 0x080, 0x700
 EVENT_TIMER = 5  #: sub-index of a TPDO's period in ms
 
-#: The objects that each TPDO carries, whole and in order.
+#: The objects in each TPDO, whole and in order.
 TPDOS = ((0x6000, 0x6001), (0x6002, 0x6003), (0x6004,))
 
 
 class Layout(Enum):
-    """How the fields lie in the words 0x6001 … 0x6003; the document leaves it open."""
+    """The layout of the fields in the words 0x6001 … 0x6003; the document leaves it open."""
 
     FIRST_HIGH = "first-named field in the most significant bits, as the documented sample of 0x6000 has it"
     FIRST_LOW = "first-named field in the least significant bits"
 
 
 def words(readout: Readout, layout: Layout) -> dict[int, int]:
-    """The five objects as 32-bit words. Values that do not fit are cut to the field's width, as firmware would."""
+    """The five objects as 32-bit words. Values that do not fit are truncated to the field's width, as in firmware."""
     volts, amps = round(readout.voltage_v * 100), round(readout.current_a * 100)
     to_full, to_empty = minutes(readout.time_to_full_min), minutes(readout.time_to_empty_min)
     soc, soh = round(readout.soc_pct), round(readout.soh_pct)
@@ -59,7 +59,7 @@ def _word(fields: list[tuple[int, int]], *, first_high: bool) -> int:
 
 
 class Bmu:
-    """One BMU on a bus; it says its boot-up when it is made. Belongs to the loop's thread."""
+    """One BMU on a bus; it sends its boot-up frame on creation. Belongs to the loop's thread."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class Bmu:
         return int(self._node.node_id)
 
     def reboot(self) -> None:
-        """Boot-up, and all settings forgotten."""
+        """Boot up, with all settings forgotten."""
         self._node.nmt.reset()
 
     def emergency(self, code: int, register: int = 1) -> None:
@@ -103,11 +103,11 @@ class Bmu:
         self._node.emcy.set(code, register)
 
     def short_emergency(self, code: int) -> None:
-        """An EMCY frame of two bytes, as some stacks send it."""
+        """Send an EMCY frame of two bytes, as some stacks do."""
         self.port.send(EMERGENCY + self.node_id, code.to_bytes(2, "little"))
 
     def close(self) -> None:
-        """Fall silent for ever."""
+        """Fall silent permanently."""
         self._forget()
         self.port.faults.mute = True
 

@@ -1,7 +1,7 @@
-"""What a poor CAN bus does to the frames on it.
+"""The effect of a poor CAN bus on its frames.
 
-A frame that is damaged on the wire fails its CRC: no node hears its data, the controllers are told of an error. What
-can still come in damaged is what an adapter on a serial or USB line cut short behind the bus.
+A frame damaged on the wire fails its CRC: no node receives its data, and the controllers see an error. Data can still
+arrive damaged if an adapter on a serial or USB line truncates it behind the bus.
 """
 
 import random
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import can
 
-#: linux/can/error.h: CAN_ERR_PROT | CAN_ERR_BUSERROR, as an adapter with error reporting tells of a CRC error.
+#: linux/can/error.h: CAN_ERR_PROT | CAN_ERR_BUSERROR, as reported for a CRC error by an adapter with error reporting.
 BUS_ERROR = 0x008 | 0x080
 
 
@@ -17,24 +17,24 @@ BUS_ERROR = 0x008 | 0x080
 class Bus:
     """A kind of bus; the default is perfect."""
 
-    lost: float = 0.0  #: the share of frames, either way, that nobody hears
-    damaged: float = 0.0  #: the share of frames, either way, that arrive as an error frame or cut short
+    lost: float = 0.0  #: share of frames lost, in both directions
+    damaged: float = 0.0  #: share of frames, in both directions, that arrive as an error frame or truncated
     seed: int = 1
 
 
-#: The buses that tests run on.
+#: The buses used in tests.
 BUSES = {"perfect": Bus(), "poor": Bus(lost=0.01, damaged=0.001)}
 
 
 class BusNoise:
-    """Spoils frames as its bus does; the same seed spoils the same ones."""
+    """Spoils frames as its bus does; the same seed spoils the same frames."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
-        self._random = random.Random(bus.seed)  # noqa: S311 - noise, no secret
+        self._random = random.Random(bus.seed)  # noqa: S311 - noise, not a secret
 
     def spoil(self, message: can.Message) -> can.Message | None:
-        """The frame as it arrives; None if it does not."""
+        """The frame as it arrives; None if it is lost."""
         bus, dice = self._bus, self._random
         if bus.lost and dice.random() < bus.lost:
             return None

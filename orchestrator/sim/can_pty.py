@@ -1,9 +1,8 @@
-"""A CAN bus between two processes without any network: python-can's `serial` frames over a pseudo-terminal.
+"""A CAN bus between two processes without a network: python-can's `serial` frames over a pseudo-terminal.
 
-A bus of the network's kind (`udp_multicast`) listens on all interfaces of the machine. This one is a file: the other
-end opens its name with `can.Bus(interface="serial", channel=NAME)`. One frame is AA, the time (4 bytes), the length,
-the id (4 bytes, with the flags of SocketCAN), the data, BB; little-endian (python-can's documentation, "CAN over
-Serial").
+A network bus (`udp_multicast`) listens on all interfaces of the machine. This one is a file: the other end opens it by
+name with `can.Bus(interface="serial", channel=NAME)`. One frame is AA, the time (4 bytes), the length, the id (4 bytes,
+with SocketCAN's flags), the data, BB; little-endian (python-can's documentation, "CAN over Serial").
 """
 
 import os
@@ -23,13 +22,13 @@ MAX_DATA = 8
 
 
 class PtyBus(can.BusABC):
-    """Our end of the bus; `channel` becomes a link to the other end, for whoever opens it."""
+    """Our end of the bus; `channel` becomes a symbolic link to the other end."""
 
     def __init__(self, channel: str) -> None:
         self.channel_info = f"pty {channel}"
         self._heard = bytearray()
         self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)  # open here as well, so that the line stays while nobody else has it open
+        tty.setraw(self._slave)  # we keep it open too, so that the line stays up while nobody else has it open
         os.set_blocking(self._master, False)
         self._link = Path(channel)
         self._link.unlink(missing_ok=True)
@@ -37,11 +36,11 @@ class PtyBus(can.BusABC):
         super().__init__(channel)
 
     def fileno(self) -> int:
-        """For an event loop."""
+        """The descriptor for an event loop."""
         return self._master
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002 - python-can's signature
-        """Write one frame, or lose it where nobody takes any, as a bus without a listener does."""
+        """Write one frame; without a reader it is lost, as on a bus without a listener."""
         flags = _EXTENDED * msg.is_extended_id | _REMOTE * msg.is_remote_frame | _ERROR * msg.is_error_frame
         frame = _HEAD.pack(START, 0, len(msg.data), msg.arbitration_id | flags) + bytes(msg.data) + bytes((END,))
         try:
@@ -50,7 +49,7 @@ class PtyBus(can.BusABC):
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}") from None
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:  # noqa: ARG002 - as above
-        """One frame of those that have come; what is none is passed over. Never waits."""
+        """One of the received frames; skips anything that is not a frame. Never blocks."""
         with suppress(BlockingIOError):
             self._heard += os.read(self._master, 4096)
         while self._heard:
@@ -66,7 +65,7 @@ class PtyBus(can.BusABC):
         return None, False
 
     def _size(self) -> int | None:
-        """Of the frame at the beginning of what was heard; None where there is none."""
+        """The size of the frame at the start of the buffer; None if there is none."""
         heard = self._heard
         if heard[0] != START:
             return None
@@ -77,7 +76,7 @@ class PtyBus(can.BusABC):
         return size if whole else None
 
     def shutdown(self) -> None:
-        """Take the bus and its name away."""
+        """Remove the bus and its name."""
         if not self._is_shutdown:
             super().shutdown()
             self._link.unlink(missing_ok=True)
@@ -86,7 +85,7 @@ class PtyBus(can.BusABC):
 
 
 def open_bus(keys: Mapping[str, Any]) -> can.BusABC:
-    """The bus of python-can's keys, and of one interface more: `pty`, ours."""
+    """The bus for python-can's keys, plus one more interface: our `pty`."""
     settings = dict(keys)
     return can.Bus(**settings) if settings.get("interface") != "pty" else PtyBus(settings["channel"])
 

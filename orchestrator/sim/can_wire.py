@@ -1,4 +1,4 @@
-"""A python-can bus served by an asyncio loop, and one node's access to it with the faults that a node can have."""
+"""A python-can bus served by an asyncio loop, and one node's access to it, with the node's faults."""
 
 import asyncio
 import threading
@@ -13,18 +13,18 @@ from orchestrator.sim.timers import Handler, Timers, Wire
 
 #: The length of every SDO frame.
 SDO_BYTES = 8
-#: How often the thread of a bus without a file descriptor looks whether it is to end.
+#: How often the thread of a bus without a file descriptor checks whether to end.
 LOOK_S = 0.02
 PERFECT = Bus()
-#: A bus that cannot be read is left alone for this long.
+#: How long to wait before reading a failed bus again.
 DOWN_S = 0.2
 
 
 class CanWire:
-    """Hands the frames of one bus to those who subscribed to their COB-ID. Belongs to the loop's thread."""
+    """Delivers the frames of one bus to the subscribers of their COB-ID. Belongs to the loop's thread."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, bus: can.BusABC, kind: Bus = PERFECT) -> None:
-        self.frames = 0  #: received, our own echo included where the bus gives one
+        self.frames = 0  #: received, including our own echo if the bus returns it
         self._loop = loop
         self._noise = BusNoise(kind)
         self._bus = bus
@@ -43,7 +43,7 @@ class CanWire:
             self._thread.start()
 
     def close(self) -> None:
-        """Stop serving; the bus itself is left to whoever made it."""
+        """Stop serving; the bus itself still belongs to its creator."""
         self._closing = True
         if self._thread is not None:
             self._thread.join()
@@ -51,23 +51,23 @@ class CanWire:
             self._loop.remove_reader(self._fd)
 
     def subscribe(self, cob_id: int, owner: object, handler: Handler) -> None:
-        """Several owners may have the same COB-ID: NMT and SYNC are for all."""
+        """Receive frames with this COB-ID. Several owners may share one: NMT and SYNC are for all."""
         self._subscribers.setdefault(cob_id, {})[owner] = handler
 
     def unsubscribe(self, cob_id: int, owner: object) -> None:
-        """No more frames of this COB-ID for this owner."""
+        """Stop delivering frames with this COB-ID to this owner."""
         self._subscribers.get(cob_id, {}).pop(owner, None)
 
     def subscribe_remote(self, cob_id: int, owner: object, handler: Handler) -> None:
-        """Have the remote frames that ask for this COB-ID."""
+        """Receive the remote frames for this COB-ID."""
         self._remote.setdefault(cob_id, {})[owner] = handler
 
     def send_remote(self, cob_id: int) -> None:
-        """Ask for the frame with this COB-ID."""
+        """Request the frame with this COB-ID by a remote frame."""
         self._put(can.Message(arbitration_id=cob_id, is_remote_frame=True, is_extended_id=False))
 
     def send(self, cob_id: int, data: bytes) -> None:
-        """Put one frame on the bus; a bus that does not take it loses it, as a node without a listener does."""
+        """Put one frame on the bus; if the bus refuses it, it is lost, as for a node without a listener."""
         self._put(can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
 
     def _put(self, whole: can.Message) -> None:
@@ -83,7 +83,7 @@ class CanWire:
         try:
             while (message := self._bus.recv(0)) is not None:
                 self._deliver(message)
-        except can.CanError:  # down, or rubbish in it: look again later, not at once for ever
+        except can.CanError:  # down, or garbage on it: try again later instead of spinning
             self._loop.remove_reader(self._fd)
             self._loop.call_later(DOWN_S, self._resume)
 
@@ -113,20 +113,20 @@ class CanWire:
 
 @dataclass(slots=True)
 class NodeFaults:
-    """What is wrong with a node's answers."""
+    """Faults in a node's answers."""
 
-    mute: bool = False  #: neither hears nor says anything
-    delay_s: float = 0.0  #: SDO answers come this late
+    mute: bool = False  #: neither receives nor sends anything
+    delay_s: float = 0.0  #: delay of SDO answers
     aborts: dict[int, int] = field(default_factory=dict)  #: object index → abort code, for reads
     short: set[int] = field(default_factory=set)  #: object indexes whose reads declare 2 bytes instead of 4
 
 
 class NodePort:
-    """What durand calls a network, for one node: it sends and subscribes, and here its faults take effect."""
+    """What durand calls a network, for one node: sends, subscribes, and applies the node's faults."""
 
     def __init__(self, wire: Wire, timers: Timers, main_loop: MainLoop | None = None) -> None:
         self.faults = NodeFaults()
-        self.reads = 0  #: SDO requests that came
+        self.reads = 0  #: SDO requests received
         self._wire = wire
         self._timers = timers
         self._main_loop = main_loop
@@ -138,7 +138,7 @@ class NodePort:
             if self.faults.mute:
                 return
             if cob_id & 0x780 == 0x600:
-                if len(data) != SDO_BYTES:  # CANopenNode takes no others; durand would answer with an abort
+                if len(data) != SDO_BYTES:  # CANopenNode ignores other lengths; durand would answer with an abort
                     return
                 self.reads += 1
             if self._main_loop is None:
@@ -149,7 +149,7 @@ class NodePort:
         self._wire.subscribe(cob_id, self, hear)
 
     def add_guard(self, cob_id: int, callback: Handler) -> None:
-        """Have the remote frames that ask for this COB-ID."""
+        """Receive the remote frames for this COB-ID."""
         self._wire.subscribe_remote(cob_id, self, lambda cob_id, data: self._handle(callback, cob_id, data))
 
     def _handle(self, callback: Handler, cob_id: int, data: bytes) -> None:

@@ -1,6 +1,6 @@
-"""The charger's side of its serial protocol, bytes in and bytes out, from its document alone (§3 and §4.1).
+"""The charger's side of its serial protocol, bytes in and bytes out, written from its document alone (§3 and §4.1).
 
-It shares nothing with `orchestrator.protocol`: where the two disagree, one of them has misread the document.
+It shares nothing with `orchestrator.protocol`: if the two disagree, one of them has misread the document.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ ADDRESS = 0x90
 HEAD, TAIL = b"\xaf\xfa", b"\xaf\xa0"
 STATUS, SET, REPLY, REST, ERROR = 0x01, 0x02, 0x03, 0x10, 0x1F
 
-#: What each request must have in its length byte: data + 3 (§3.2.4).
+#: The required length byte of each request: data + 3 (§3.2.4).
 LENGTHS = {STATUS: 5, SET: 5, REST: 4}
 
 LENGTH_ERROR, COMMAND_ERROR, ORDER_ERROR, CHECKSUM_ERROR = 1, 2, 4, 8
@@ -24,7 +24,7 @@ MAX_LENGTH = 23
 
 
 class Kind(IntEnum):
-    """What a status reply can hold, in the order of §4.1.1: five bits of kind 1, then five of kind 2."""
+    """The values of a status reply, in the order of §4.1.1: five bits of kind 1, then five of kind 2."""
 
     VOLTAGE = 0
     CURRENT = 1
@@ -40,7 +40,7 @@ class Kind(IntEnum):
 
 @dataclass(slots=True)
 class Lie:
-    """A value that a status reply says instead of the true one: in every reply, in each n-th, or only so often."""
+    """A false value in status replies: in every one, in every n-th, or a limited number of times."""
 
     value: int
     every: int = 1  #: 2: every second reply
@@ -48,7 +48,7 @@ class Lie:
     replies: int = 0  #: so far
 
     def is_told(self) -> bool:
-        """Whether the next reply has it."""
+        """Whether the next reply contains it."""
         self.replies += 1
         told = self.replies % self.every == 0 and self.times > 0
         self.times -= told
@@ -57,7 +57,7 @@ class Lie:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One frame as it came; `errors` has the bits of §3.3.5, 0 for a good one."""
+    """One frame as received; `errors` has the bits of §3.3.5, 0 for a good one."""
 
     length: int
     command: int
@@ -68,23 +68,23 @@ class Request:
 
 
 class Ear:
-    """Finds requests in a stream of bytes."""
+    """Finds requests in a byte stream."""
 
     def __init__(self) -> None:
         self._heard = b""
 
     @property
     def waiting(self) -> bool:
-        """Whether a frame has begun that has not ended."""
+        """Whether a frame has begun but not ended."""
         return bool(self._heard)
 
     def forget(self) -> int:
-        """Give up on a frame that does not end; how many bytes that were."""
+        """Give up on an unfinished frame; returns the number of bytes dropped."""
         count, self._heard = len(self._heard), b""
         return count
 
     def hear(self, chunk: bytes) -> list[Request]:
-        """The frames that are complete with this chunk, good and bad ones for address 0x90."""
+        """The frames completed by this chunk: good and bad ones for address 0x90."""
         self._heard += chunk
         found = []
         while (start := self._heard.find(HEAD)) >= 0 and len(self._heard) >= start + 4:
@@ -102,7 +102,7 @@ class Ear:
                 found.append(_read(self._heard[:size]))
                 whole = self._heard[size - 2 : size] == TAIL
                 self._heard = self._heard[size if whole else 1 :]
-        if start < 0:  # keep only what may be the first half of a head
+        if start < 0:  # keep only a possible first half of a head
             self._heard = HEAD[:1] if self._heard.endswith(HEAD[:1]) else b""
         return found
 
@@ -120,18 +120,18 @@ def _read(frame: bytes) -> Request:
 
 
 def frame(command: int, order: int, data: bytes) -> bytes:
-    """A frame of the charger's own."""
+    """A frame sent by the charger."""
     body = bytes((ADDRESS, len(data) + 3, command, order)) + data
     return HEAD + body + bytes((sum(body) & 0xFF,)) + TAIL
 
 
 def complaint(request: Request, errors: int) -> bytes:
-    """0x1F: the error bits, then what was received (§3.3.5)."""
+    """0x1F: the error bits, then parts of the received frame (§3.3.5)."""
     return frame(ERROR, errors, bytes((request.length, request.command, request.order, request.checksum)))
 
 
 def status(charger: Charger, kind1: int, kind2: int, lies: Mapping[Kind, int]) -> bytes:
-    """0x03: the requested values, in list order, two bytes each; no values for the bits that mean nothing.
+    """0x03: the requested values, in list order, two bytes each; no values for undefined bits.
 
     `lies` replaces values, whatever the charger is doing.
     """
@@ -142,7 +142,7 @@ def status(charger: Charger, kind1: int, kind2: int, lies: Mapping[Kind, int]) -
 
 
 def _values(charger: Charger) -> tuple[int, ...]:
-    """The ten values of §4.1.1, in its order; the two temperatures have no information since 2022-01."""
+    """The ten values of §4.1.1, in its order; the two temperatures carry no information since 2022-01."""
     return (
         _hundredths(charger.voltage_v),
         _hundredths(charger.current_a),

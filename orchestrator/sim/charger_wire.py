@@ -25,13 +25,13 @@ from orchestrator.sim.charger_frames import (
 )
 from orchestrator.sim.line import Line, Noise, garbled, is_clear
 
-#: A frame that pauses for this long (some 60 byte times) has been cut off.
+#: A frame interrupted for this long (about 60 byte times) is cut off.
 FRAME_GAP_S = 0.03
 
 
 @dataclass(slots=True)
 class Counters:
-    """What came over the line since it was opened; times are `time.monotonic()`."""
+    """What arrived on the line since it was opened; times are `time.monotonic()`."""
 
     polls: int = 0
     orders: int = 0
@@ -42,15 +42,15 @@ class Counters:
     first_stop_s: float | None = None  #: the first stop frame (0x10, rest 0) since `mark()`
 
     def mark(self) -> None:
-        """From now on, wait for the first byte and the first stop frame anew."""
+        """Start waiting again for the first byte and the first stop frame."""
         self.first_byte_s = self.first_stop_s = None
 
 
 class ChargerWire:
     """Serves one charger model on a pty.
 
-    `now()` is called before a request is acted upon and lets the model catch up with the time. All methods belong to
-    the loop's thread.
+    `now()` is called before each request takes effect, so that the model can catch up. All methods belong to the loop's
+    thread.
     """
 
     def __init__(
@@ -64,12 +64,12 @@ class ChargerWire:
     ) -> None:
         self.charger = charger
         self.counters = Counters()
-        self.mute_rx = False  #: hears nothing
-        self.mute_tx = False  #: says nothing
+        self.mute_rx = False  #: receives nothing
+        self.mute_tx = False  #: sends nothing
         self.complains = False  #: answers every frame with 0x1F, checksum error
-        self.lies: dict[Kind, int] = {}  #: values that its status replies say, whatever is true
-        self.liars: dict[Kind, Lie] = {}  #: as `lies`, but only now and then
-        self.on_bytes: Callable[[float, bytes], None] | None = None  #: called with (monotonic s, bytes) as they come
+        self.lies: dict[Kind, int] = {}  #: false values in every status reply
+        self.liars: dict[Kind, Lie] = {}  #: false values in some status replies
+        self.on_bytes: Callable[[float, bytes], None] | None = None  #: called with (monotonic s, bytes) on arrival
         self.path = ""
         self._loop = loop
         self._line = line or Line()
@@ -83,10 +83,10 @@ class ChargerWire:
     # --- the port ---
 
     def open(self) -> None:
-        """Make the pty, and the link to it if there is to be one. The line settings are the client's to set."""
+        """Create the pty, and the link to it if wanted. Setting up the line is the client's task."""
         self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)  # also keeps the line up while no client has it open
-        self.set_speed(termios.B9600)  # as a port that nobody has set up yet
+        tty.setraw(self._slave)  # keeping it open also keeps the line up while no client has it open
+        self.set_speed(termios.B9600)  # like a port that nothing has set up yet
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         if self._link is not None:
@@ -97,7 +97,7 @@ class ChargerWire:
         self._loop.add_reader(self._master, self._on_readable)
 
     def close(self) -> None:
-        """Take the pty away, as an adapter that is unplugged; its link goes too."""
+        """Remove the pty and its link, as if the adapter were unplugged."""
         if self._master < 0:
             return
         self._loop.remove_reader(self._master)
@@ -128,18 +128,18 @@ class ChargerWire:
             self._stranger = os.open(self.path, os.O_RDWR | os.O_NOCTTY)
             try:
                 fcntl.flock(self._stranger, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:  # the service has it: this program waits for its turn as long as it lives
+            except BlockingIOError:  # the service holds the lock, so the other program cannot have it
                 self.unlock()
 
     def unlock(self) -> None:
-        """It closes the port again."""
+        """The other program closes the port again."""
         if self._stranger >= 0:
             os.close(self._stranger)
             self._stranger = -1
 
     @property
     def is_clear(self) -> bool:
-        """Whether the port's settings are the charger's; else both hear garbage."""
+        """Whether the port's settings match the charger's; otherwise both sides receive garbage."""
         return is_clear(tcgetattr(self._slave))
 
     # --- hearing ---
@@ -148,7 +148,7 @@ class ChargerWire:
         now_s = self._loop.time()
         try:
             chunk = os.read(self._master, 4096)
-        except OSError:  # a client closed with bytes unread; the port itself stays
+        except OSError:  # a client closed the port with bytes unread; the port itself stays
             return
         if self.counters.first_byte_s is None:
             self.counters.first_byte_s = now_s
@@ -216,5 +216,5 @@ class ChargerWire:
         if self._master >= 0:
             try:
                 os.write(self._master, data if self.is_clear else garbled(data))
-            except OSError:  # nobody reads: a wire does not keep what nobody hears
+            except OSError:  # no reader: a wire does not store what nobody receives
                 return

@@ -1,4 +1,4 @@
-"""What a lithium cell's voltage says of its charge: the curves of two chemistries, and their BMU's alarm thresholds."""
+"""A lithium cell's voltage over its charge: the curves of two chemistries, and their BMU's alarm thresholds."""
 
 import math
 from bisect import bisect_right
@@ -8,7 +8,7 @@ Curve = tuple[tuple[float, float], ...]
 
 
 def interpolate(curve: Curve, x: float) -> float:
-    """The curve's value at x, straight between its points and flat beyond its ends; x must ascend."""
+    """The curve's value at x: linear between points, constant beyond the ends; the points' x must ascend."""
     upper = bisect_right(curve, (x, math.inf))
     if upper == 0:
         return curve[0][1]
@@ -20,12 +20,12 @@ def interpolate(curve: Curve, x: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Chemistry:
-    """One kind of cell: open-circuit volts, and what a BMU of such cells alarms at (wider than any charge policy)."""
+    """One kind of cell: open-circuit voltage, and its BMU's alarm thresholds (wider than any charge policy)."""
 
-    ocv: Curve  #: over the state of charge (0 … 1); beyond 1 it is overcharged
-    deep: Curve  #: below 0 %, over the share of the deep discharge that is gone (−1 … 0): steep at first, then flatter
-    high_cell_v: float  #: the BMU reports over-voltage above
-    low_cell_v: float  #: … and low voltage below
+    ocv: Curve  #: over the state of charge (0 … 1); beyond 1 the cell is overcharged
+    deep: Curve  #: below 0 %, over the share of the deep discharge (−1 … 0): steep at first, then flatter
+    high_cell_v: float  #: the BMU reports over-voltage above this
+    low_cell_v: float  #: … and low voltage below this
 
 
 #: Typical of nickel-manganese-cobalt and nickel-cobalt-aluminium cells.

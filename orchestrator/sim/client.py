@@ -1,4 +1,4 @@
-"""Start an emulated station in another process and talk to it: for the demo, tests and benchmarks."""
+"""Starts an emulated station in another process and talks to it: for the demo, tests and benchmarks."""
 
 import json
 import os
@@ -11,18 +11,18 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-#: Python starts, imports and opens 64 ports within this, also on a slow and busy machine.
+#: Enough for Python to start, import and open 64 ports, even on a slow and busy machine.
 READY_S = 20.0
-#: An answer that takes longer means that the process is stuck.
+#: If an answer takes longer, the process is stuck.
 ANSWER_S = 10.0
-#: After its stdin was closed the process ends within this.
+#: The process ends within this after its stdin is closed.
 END_S = 5.0
 
 
 class PlantProcess:
-    """`with PlantProcess(directory, "--bays", "2") as plant:` – the arguments are those of `orchestrator.sim.plant`.
+    """`with PlantProcess(directory, "--bays", "2") as plant:`; takes the arguments of `orchestrator.sim.plant`.
 
-    `bays` says where everything is: name, port, node_id, and which of the buses.
+    `bays` lists each bay's name, port, node_id and the index of its bus.
     """
 
     def __init__(self, directory: Path, *args: str) -> None:
@@ -47,7 +47,7 @@ class PlantProcess:
     def ask(self, command: Mapping[str, Any]) -> dict[str, Any]:
         """One command, one answer.
 
-        RuntimeError with the plant's reason where it cannot, TimeoutError where it says nothing.
+        RuntimeError with the plant's reason if it cannot comply, TimeoutError if it does not answer.
         """
         if self._process.stdin is None:
             raise RuntimeError("the emulated station has no stdin")
@@ -59,7 +59,7 @@ class PlantProcess:
         return answer
 
     def inject(self, fault: str, bay: int = 1, value: float | None = None) -> float:
-        """Let a fault happen in a bay (the first is 1); returns its moment, `time.monotonic()`."""
+        """Inject a fault into a bay (the first is 1); returns the time, `time.monotonic()`."""
         return float(self.ask({"bay": bay, "inject": fault, "value": value})["t_s"])
 
     def state(self, bay: int = 1) -> dict[str, Any]:
@@ -68,7 +68,7 @@ class PlantProcess:
         return answer
 
     def set(self, bay: int = 1, **values: float) -> None:
-        """Put a pack to `soc_pct`, `soh_pct` or `temperature_c`."""
+        """Set a pack's `soc_pct`, `soh_pct` or `temperature_c`."""
         self.ask({"bay": bay, "set": values})
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""A sender that answers in a node's name: a second BMU with its id, a broken gateway, or somebody who means harm."""
+"""A sender that answers in a node's name: a second BMU with the same id, a broken gateway, or an attacker."""
 
 import random
 from dataclasses import dataclass
@@ -7,11 +7,11 @@ from enum import Enum
 from orchestrator.sim.timers import Timer, Timers, Wire
 
 TEMPERATURE = 0x6004
-COLD = 200  #: 20.0 °C, as a lie about a hot pack
+COLD = 200  #: 20.0 °C, the false value for a hot pack
 
 
 class When(Enum):
-    """At which moment it lies."""
+    """When the forged answer is sent."""
 
     FIRST = "before the node answers, at once when it is asked"
     AFTER = "as soon as the node has answered"
@@ -21,14 +21,14 @@ class When(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Lie:
-    """What is said instead of the node's own answer."""
+    """The forged answer that replaces the node's own."""
 
     index: int = TEMPERATURE
     word: int = COLD
-    size: int = 4  #: bytes that the answer declares
+    size: int = 4  #: bytes declared by the answer
     abort: int = 0  #: an abort code instead of a value
     when: When = When.AFTER
-    share: float = 1.0  #: of the answers, for SOMETIMES
+    share: float = 1.0  #: share of the answers, for SOMETIMES
     period_s: float = 0.05  #: for UNASKED
 
     def answer(self, sub: int = 0) -> bytes:
@@ -41,25 +41,25 @@ class Lie:
 
 
 class Forger:
-    """Lies in the name of one node from the moment that it is made. Belongs to the thread of its clock.
+    """Forges one node's answers from its creation on. Belongs to the thread of its clock.
 
-    Where it needs to hear what others on its own wire say, the same holds as for `second_master.SecondMaster`.
+    To hear other senders on its own wire, it needs the same as `second_master.SecondMaster`.
     """
 
     def __init__(self, timers: Timers, wire: Wire, node_id: int, lie: Lie, seed: int = 1) -> None:
-        self.told = 0  #: lies
+        self.told = 0  #: forged answers sent
         self.node_id = node_id
         self._timers, self._wire, self._lie = timers, wire, lie
-        self._random = random.Random(seed)  # noqa: S311 - chance, no secret
+        self._random = random.Random(seed)  # noqa: S311 - chance, not a secret
         self._timer: Timer | None = None
-        self._asked = 0  # requests that are not answered yet
+        self._asked = 0  # unanswered requests
         wire.subscribe(0x600 + node_id, self, self._hear_request)
         wire.subscribe(0x580 + node_id, self, self._hear_answer)
         if lie.when is When.UNASKED:
             self._tick()
 
     def close(self) -> None:
-        """It is unplugged."""
+        """Unplug it."""
         self._wire.unsubscribe(0x600 + self.node_id, self)
         self._wire.unsubscribe(0x580 + self.node_id, self)
         if self._timer is not None:
@@ -80,7 +80,7 @@ class Forger:
 
     def _hear_answer(self, _: int, data: bytes) -> None:
         if self._asked and int.from_bytes(data[1:3], "little") == self._lie.index:
-            self._asked = 0  # what it hears of itself then asks for nothing
+            self._asked = 0  # so that its own echo triggers nothing
             self._tell(data[3])
 
     def _tick(self) -> None:

@@ -1,4 +1,4 @@
-"""What a serial line can do to the bytes on it."""
+"""The effects of a serial line on its bytes."""
 
 import random
 import termios
@@ -13,18 +13,18 @@ BYTE_S = 10 / 19200
 class Line:
     """A kind of line; the default is perfect and takes no time."""
 
-    byte_s: float = 0.0  #: time that one byte takes, `BYTE_S` for a real line
-    answer_s: float = 0.002  #: how long the charger thinks before it answers
-    bytewise: bool = False  #: answers come byte by byte, not frame by frame
-    loss: float = 0.0  #: the share of frames, either way, that lose one byte
-    lost: float = 0.0  #: the share of frames, either way, that are lost whole
-    wrong: float = 0.0  #: the share of frames, either way, in which one byte is another one
-    garbage: float = 0.0  #: the share of frames, either way, that have rubbish before them
-    echo: bool = False  #: an RS-485 adapter that returns what it sends
+    byte_s: float = 0.0  #: time per byte, `BYTE_S` for a real line
+    answer_s: float = 0.002  #: how long the charger takes before it answers
+    bytewise: bool = False  #: answers arrive byte by byte, not frame by frame
+    loss: float = 0.0  #: share of frames, in both directions, that lose one byte
+    lost: float = 0.0  #: share of frames, in both directions, lost entirely
+    wrong: float = 0.0  #: share of frames, in both directions, with one byte changed
+    garbage: float = 0.0  #: share of frames, in both directions, preceded by garbage
+    echo: bool = False  #: an RS-485 adapter that echoes what it sends
     seed: int = 1
 
 
-#: The lines that tests run on.
+#: The lines used in tests.
 LINES = {
     "perfect": Line(),
     "real": Line(byte_s=BYTE_S),
@@ -38,7 +38,7 @@ LINES = {
 
 
 def is_clear(settings: Sequence[object]) -> bool:
-    """Whether a port with these settings (of `termios.tcgetattr`) brings bytes to and from a charger as they are."""
+    """Whether a port with these settings (of `termios.tcgetattr`) passes bytes to and from a charger unchanged."""
     iflag, oflag, cflag, lflag, _, speed = (int(value) for value in settings[:6])  # type: ignore[call-overload]
     framed = cflag & (termios.CSIZE | termios.PARENB | termios.CSTOPB | termios.CRTSCTS | termios.CREAD)
     changed = iflag & (termios.ISTRIP | termios.ICRNL | termios.IXON) or oflag & termios.OPOST or lflag & termios.ICANON
@@ -46,19 +46,19 @@ def is_clear(settings: Sequence[object]) -> bool:
 
 
 def garbled(data: bytes) -> bytes:
-    """What is heard of bytes that were sent at another speed or in another format: fewer, and others."""
+    """What a receiver makes of bytes sent at another speed or in another format: fewer bytes, with other values."""
     return bytes(byte * 37 + 101 & 0xFF for byte in data[::2])
 
 
 class Noise:
-    """Spoils frames as its line does; the same seed spoils the same ones."""
+    """Spoils frames as its line does; the same seed spoils the same frames."""
 
     def __init__(self, line: Line) -> None:
         self._line = line
-        self._random = random.Random(line.seed)  # noqa: S311 - noise, no secret
+        self._random = random.Random(line.seed)  # noqa: S311 - noise, not a secret
 
     def spoil(self, frame: bytes) -> bytes:
-        """The frame as it arrives; b"" if it does not."""
+        """The frame as it arrives; b"" if it is lost."""
         line, dice = self._line, self._random
         if line.lost and dice.random() < line.lost:
             return b""

@@ -1,6 +1,6 @@
 """The BMU's older protocol, which is not CANopen (manual §2.4): one request, three pages with the same values.
 
-Request and pages are those of public robot software that reads the same BMUs; the manual does not have them.
+Request and pages come from public robot software that reads the same BMUs; the manual does not describe them.
 """
 
 import struct
@@ -8,10 +8,10 @@ import struct
 from orchestrator.sim.pack import Readout
 
 REQUEST_COB_ID = 0x460
-#: Invented: nobody has written down where the pages come. It is free for every node id.
+#: Invented: the real COB-ID of the pages is not documented. This one is free for every node id.
 REPLY_COB_ID = 0x4E0
 
-#: "Not available" in TTF and TTE, as gas gauges have it.
+#: "Not available" in TTF and TTE, as in gas gauges.
 NO_MINUTES = 0xFFFF
 
 
@@ -21,7 +21,7 @@ def minutes(value: float | None) -> int:
 
 
 def pages(node_id: int, request: bytes, told: Readout) -> list[bytes]:
-    """The frames that answer `request`; none when it is not one."""
+    """The frames that answer `request`; none if it is not a request."""
     echo = 0x60 + node_id
     if request != bytes((echo,)):
         return []

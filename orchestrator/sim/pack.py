@@ -1,11 +1,11 @@
 """A model of a lithium battery pack: charge, open-circuit voltage, resistance, heat. Pure: time is an argument.
 
-It is the equivalent circuit that is called Thevenin's: a voltage source (the open-circuit voltage over the charge), a
-series resistance and, if `polarisation_ohm` is given, one resistor beside a capacitor, which is why a pack's voltage
-goes on falling for a minute after the current has stopped. Its heat warms one lump that cools towards its surroundings.
+It is a Thevenin equivalent circuit: a voltage source (the open-circuit voltage over the charge), a series resistance
+and, if `polarisation_ohm` is given, one RC pair, which makes the voltage fall for another minute after the current has
+stopped. The heat warms a single thermal mass, which cools towards its surroundings.
 
-Below 0 % lies the deep discharge: a few per cent of the capacity in which the voltage of an NMC pack climbs from
-2.54 V to 3.0 V a cell. It is where a pack must be woken gently before it may be charged.
+Below 0 % is the deep discharge: a few per cent of the capacity, over which the voltage of an NMC pack climbs from
+2.54 V to 3.0 V per cell. A pack in that range must be woken gently before it may be charged.
 """
 
 import math
@@ -14,19 +14,19 @@ from dataclasses import dataclass
 from orchestrator.model import BatteryStatus
 from orchestrator.sim.chemistry import NMC, Chemistry, interpolate
 
-#: Where a BMU of this kind sets its status bits, °C; wider than what any charge policy allows.
+#: Where a BMU of this kind sets its status bits, °C; wider than any charge policy allows.
 HIGH_C, LOW_C = 60.0, -20.0
 
-#: The temperature that a resistance is given for, and absolute zero.
+#: The reference temperature of a resistance, and absolute zero.
 REFERENCE_C, ZERO_C = 25.0, -273.15
 
-#: How fast a fault can heat or cool a pack: not faster than a sensor's reading can be believed.
+#: How fast a fault can heat or cool a pack: slowly enough for the sensor's reading to stay plausible.
 DRIVEN_K_PER_S = 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class Readout:
-    """What a BMU knows of its pack. None: not available (no current flows in that direction)."""
+    """What a BMU knows about its pack. None: not available (no current flows in that direction)."""
 
     voltage_v: float
     current_a: float  #: positive while charging
@@ -42,15 +42,15 @@ class Readout:
 
 @dataclass(slots=True)
 class Pack:
-    """One battery. `charge_ah` is what it holds above 0 %; negative in the deep discharge."""
+    """One battery. `charge_ah` is its charge above 0 %; negative in the deep discharge."""
 
     chemistry: Chemistry = NMC
     cells: int = 13
     capacity_ah: float = 20.0  #: nominal; `soh_pct` of it can be used
-    deep_ah: float = 0.4  #: what lies between 2.54 V and 3.0 V a cell
-    resistance_ohm: float = 0.05  #: at once, at 25 °C
-    arrhenius_k: float = 0.0  #: how it grows in the cold: by exp(this × (1/T − 1/298 K)); 0: not at all
-    polarisation_ohm: float = 0.0  #: what comes to it …
+    deep_ah: float = 0.4  #: charge between 2.54 V and 3.0 V per cell
+    resistance_ohm: float = 0.05  #: series resistance at 25 °C
+    arrhenius_k: float = 0.0  #: its growth in the cold: by exp(this × (1/T − 1/298 K)); 0: none
+    polarisation_ohm: float = 0.0  #: additional resistance …
     polarisation_s: float = 60.0  #: … with this time constant
     soh_pct: float = 100.0
     temperature_c: float = 20.0
@@ -61,22 +61,22 @@ class Pack:
     polarisation_v: float = 0.0
     current_a: float = 0.0  #: positive while charging
     bias_v: float = 0.0  #: added to the open-circuit voltage by a fault
-    leaky: bool = False  #: a fault: charge that flows in is lost inside
-    driven_c: float | None = None  #: a fault drives the temperature here and holds it there
+    leaky: bool = False  #: a fault: incoming charge is lost
+    driven_c: float | None = None  #: a fault drives the temperature to this value and holds it
 
     @property
     def usable_ah(self) -> float:
-        """What fits between 0 and 100 % at this state of health."""
+        """The charge between 0 and 100 % at this state of health."""
         return self.capacity_ah * self.soh_pct / 100
 
     @property
     def soc(self) -> float:
-        """The true state of charge, 0 … 1; outside of that when overcharged or deeply discharged."""
+        """The true state of charge, 0 … 1; outside that range when overcharged or deeply discharged."""
         return self.charge_ah / self.usable_ah
 
     @property
     def ocv_v(self) -> float:
-        """Volts once the current has stopped; with polarisation they still fall from there."""
+        """The voltage right after the current has stopped; with polarisation it keeps falling from there."""
         chemistry, deep = self.chemistry, self.charge_ah < 0
         cell_v = (
             interpolate(chemistry.deep, self.charge_ah / self.deep_ah) if deep else interpolate(chemistry.ocv, self.soc)
@@ -93,11 +93,11 @@ class Pack:
 
     @property
     def voltage_v(self) -> float:
-        """Volts at the terminals with the present current."""
+        """The terminal voltage with the present current."""
         return self.ocv_v + self.current_a * self.series_ohm
 
     def set_soc(self, pct: float) -> None:
-        """Put the pack to a state of charge; −100 is the bottom of the deep discharge."""
+        """Set the pack's state of charge; −100 is the bottom of the deep discharge."""
         self.charge_ah = self.usable_ah * pct / 100 if pct >= 0 else self.deep_ah * pct / 100
 
     def advance(self, dt_s: float, current_a: float) -> None:
@@ -112,7 +112,7 @@ class Pack:
             self._drive(dt_s, self.driven_c)
 
     def _polarise(self, dt_s: float) -> float:
-        """The mean heat of the polarisation meanwhile."""
+        """The mean heat of the polarisation during `dt_s`."""
         if not self.polarisation_ohm:
             return 0.0
         before_v, settled_v = self.polarisation_v, self.current_a * self.polarisation_ohm
@@ -121,7 +121,7 @@ class Pack:
 
     def _warm(self, dt_s: float, polarisation_w: float) -> None:
         series_w = self.current_a * self.current_a * self.series_ohm
-        # The warmer it gets, the less resistance has a pack: as if it were cooled the better by that.
+        # A warmer pack has less resistance, which acts like additional cooling.
         kelvin = self.temperature_c - ZERO_C
         cooling_w_per_k = self.cooling_w_per_k + series_w * self.arrhenius_k / (kelvin * kelvin)
         surplus_w = series_w + polarisation_w - self.cooling_w_per_k * (self.temperature_c - self.ambient_c)
@@ -132,10 +132,10 @@ class Pack:
         step_k = DRIVEN_K_PER_S * dt_s
         self.temperature_c += min(max(target_c - self.temperature_c, -step_k), step_k)
         if self.temperature_c == target_c == self.ambient_c:
-            self.driven_c = None  # back where nature would have it
+            self.driven_c = None  # back at the natural temperature
 
     def status(self) -> int:
-        """The status bits that the pack's own state sets."""
+        """The status bits set by the pack's own state."""
         cell_v = self.voltage_v / self.cells
         active = (
             (BatteryStatus.OVER_VOLTAGE, cell_v > self.chemistry.high_cell_v),
@@ -146,7 +146,7 @@ class Pack:
         return sum(1 << bit for bit, is_set in active if is_set)
 
     def readout(self) -> Readout:
-        """All that the BMU measures and counts, now."""
+        """Everything that the BMU measures and counts, now."""
         remaining_ah = max(self.charge_ah, 0.0)
         idle = abs(self.current_a) < 0.05
         return Readout(
@@ -164,5 +164,5 @@ class Pack:
 
 
 def _minutes(charge_ah: float, current_a: float) -> float | None:
-    """How long `current_a` needs to move that charge; None when it flows the other way."""
+    """How long `current_a` takes to move that charge; None if it flows the other way."""
     return max(charge_ah, 0.0) / current_a * 60 if current_a > 0 else None

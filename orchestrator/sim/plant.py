@@ -1,9 +1,9 @@
-"""An emulated station as a process of its own: N chargers on ptys, N BMUs on CAN, each pair on one battery.
+"""An emulated station in its own process: N chargers on ptys, N BMUs on CAN, each pair on one battery.
 
     python -m orchestrator.sim.plant --dir DIR --bays 2 --pack demo
 
-When it is ready it says so in one JSON line on stdout: {"ready": true, "bays": [{"name", "port", "node_id", "can"}]}.
-Then it answers one JSON line for each that comes on stdin, and ends with {"quit": true} or when stdin closes:
+When ready, it prints one JSON line on stdout: {"ready": true, "bays": [{"name", "port", "node_id", "can"}]}. Then it
+answers each JSON line on stdin with one line, and ends on {"quit": true} or when stdin closes:
 
     {"bay": 1, "inject": "over_temperature", "value": 50}   a fault of `faults.py`; value is optional
     {"bay": 1, "set": {"soc_pct": 40, "temperature_c": 20, "soh_pct": 90}}
@@ -38,7 +38,7 @@ from orchestrator.sim.rig import Rig, Setup
 #: hop_limit 0: nothing leaves this machine.
 CAN = '{"interface": "udp_multicast", "channel": "239.74.163.2", "port": 43113, "hop_limit": 0}'
 LAYOUTS = {"first-high": Layout.FIRST_HIGH, "first-low": Layout.FIRST_LOW}
-#: Bays that nobody asks are advanced this often.
+#: Bays advance at least this often, even without requests.
 TICK_S = 0.1
 #: CANopen node ids end here.
 LAST_NODE_ID = 127
@@ -80,7 +80,7 @@ class Plant:
         self._loop.call_later(TICK_S, self._tick)
 
     def close(self) -> None:
-        """Take all devices away."""
+        """Remove all devices."""
         for rig in self.rigs:
             rig.close()
         for wire, bus in zip(self._wires, self._buses, strict=True):
@@ -103,7 +103,7 @@ class Plant:
         return {"ready": True, "bays": list(names)}
 
     def state(self, rig: Rig) -> dict[str, Any]:
-        """The truth of one bay, and what came over its lines."""
+        """The true state of one bay, and what arrived on its lines."""
         rig.catch_up()
         pack, charger = rig.bay.pack, rig.bay.charger
         return {
@@ -125,7 +125,7 @@ class Plant:
     # --- commands ---
 
     def obey(self, command: Mapping[str, Any]) -> dict[str, Any]:
-        """One command, one answer; what cannot be done is answered with its reason."""
+        """One command, one answer; an impossible command is answered with the reason."""
         rigs = self.rigs
         if "bay" in command:
             number = command["bay"]
@@ -163,7 +163,7 @@ def _set(rigs: Sequence[Rig], values: Mapping[str, float]) -> dict[str, Any]:
 
 
 class Console:
-    """Commands from stdin, answers to stdout, a line each."""
+    """Reads commands from stdin and writes answers to stdout, one line each."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, plant: Plant) -> None:
         self._loop = loop
@@ -173,7 +173,7 @@ class Console:
         loop.add_reader(sys.stdin.fileno(), self._on_readable)
 
     def say(self, answer: Mapping[str, Any]) -> None:
-        """One line."""
+        """Print one line."""
         sys.stdout.write(json.dumps(answer) + "\n")
         sys.stdout.flush()
 
@@ -208,14 +208,14 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--node", type=lambda text: int(text, 0), default=0x10, help="node id of each bus's first BMU")
     parser.add_argument("--pack", choices=PACKS, default="48v")
-    parser.add_argument("--soc", type=float, help="state of charge at first, %%; -100 … 0 is deep discharge")
-    parser.add_argument("--temperature", type=float, help="of the packs and their surroundings, °C")
-    parser.add_argument("--line", choices=LINES, default="real", help="what the serial lines do to bytes")
-    parser.add_argument("--bus", choices=BUSES, default="perfect", help="what the CAN buses do to frames")
+    parser.add_argument("--soc", type=float, help="initial state of charge, %%; -100 … 0 is deep discharge")
+    parser.add_argument("--temperature", type=float, help="initial temperature of packs and surroundings, °C")
+    parser.add_argument("--line", choices=LINES, default="real", help="the quality of the serial lines")
+    parser.add_argument("--bus", choices=BUSES, default="perfect", help="the quality of the CAN buses")
     parser.add_argument("--layout", choices=LAYOUTS, default="first-high", help="of the BMUs' words")
     parser.add_argument("--bmu", choices=("immediate", "mainloop"), default="immediate", help="when the BMUs answer")
     parser.add_argument("--automatic", action="store_true", help="the chargers' rotary switches are on 5, not on 1")
-    parser.add_argument("--speed", type=float, default=1.0, help="how much faster than real time the batteries live")
+    parser.add_argument("--speed", type=float, default=1.0, help="speed of the batteries relative to real time")
     args = parser.parse_args(argv)
     last = args.node + -(-args.bays // len(args.can or [CAN])) - 1
     if args.bays < 1 or args.node < 1 or last > LAST_NODE_ID:

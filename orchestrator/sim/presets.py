@@ -1,18 +1,18 @@
-"""The packs that an emulated station can have."""
+"""The packs available to an emulated station."""
 
 from collections.abc import Callable, Mapping
 
 from orchestrator.sim.pack import Pack
 
-#: Deeply discharged, as far as this model goes: 2.54 V a cell.
+#: The deepest discharge of this model: 2.54 V per cell.
 BOTTOM_PCT = -100.0
 
 
 def demo() -> Pack:
     """A 13S pack so small that a whole charge takes a minute: 33 V, pulse, continuous, 14 A, taper, full.
 
-    The capacity and the deep discharge are those of a toy; resistance and heat are those of a bicycle's pack, so that
-    14 A neither lift the voltage out of reach nor heat it by more than a degree in the minute.
+    Capacity and deep discharge are toy-sized; resistance and heat are those of an e-bike pack, so that 14 A neither
+    lifts the voltage out of range nor heats the pack by more than a degree in that minute.
     """
     pack = Pack(
         cells=13,
@@ -27,7 +27,7 @@ def demo() -> Pack:
 
 
 def pack_48v() -> Pack:
-    """A 13S pack of 20 Ah at 50 %: it stays in the middle of its charge for as long as a test needs."""
+    """A 13S pack of 20 Ah at 50 %: it stays in mid-charge for as long as a test needs."""
     pack = Pack()
     pack.set_soc(50.0)
     return pack

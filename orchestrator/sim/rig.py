@@ -1,4 +1,4 @@
-"""One bay of the emulated station: a battery and a charger, and both of their lines."""
+"""One bay of the emulated station: a battery, a charger, and both of their lines."""
 
 import asyncio
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from orchestrator.sim.charger_wire import ChargerWire
 from orchestrator.sim.line import Line
 from orchestrator.sim.pack import Readout
 
-#: A model that was advanced this recently is not advanced again for a question.
+#: A model advanced this recently is not advanced again for a query.
 FRESH_S = 0.005
 
 
@@ -25,13 +25,13 @@ class Setup:
     link: Path | None = None  #: a name for the charger's port
     line: Line = field(default_factory=Line)
     layout: Layout = Layout.FIRST_HIGH
-    main_loop: bool = False  #: the BMU answers when its main loop comes round to it
-    speed: float = 1.0  #: model seconds in one real second
+    main_loop: bool = False  #: the BMU answers when its main loop gets to it
+    speed: float = 1.0  #: model seconds per real second
 
 
 @dataclass(frozen=True, slots=True)
 class AsBuilt:
-    """What a fault may change and healing brings back."""
+    """Values that a fault may change and that healing restores."""
 
     control_mode: ControlMode
     ambient_c: float
@@ -53,23 +53,23 @@ class Rig:
         self.wire.open()
 
     def catch_up(self) -> None:
-        """Let the model's time pass until now."""
+        """Advance the model to the present time."""
         now_s = self._loop.time()
         if now_s - self._advanced_s >= FRESH_S:
             self.bay.advance((now_s - self._advanced_s) * self._speed)
             self._advanced_s = now_s
 
     def inject(self, fault: Callable[["Rig"], None]) -> float:
-        """Let a fault happen; returns the moment, from which the first stop frame is waited for."""
+        """Inject a fault; returns the time, from which on the first stop frame is awaited."""
         self.catch_up()
         fault(self)
-        self.bay.advance(0.001)  # what the fault changes is there at once
+        self.bay.advance(0.001)  # so that the fault takes effect at once
         self.wire.counters.mark()
         self.injected_s = self._loop.time()
         return self.injected_s
 
     def later(self, seconds: float, act: Callable[[], object]) -> None:
-        """Let something happen after a while."""
+        """Call `act` after this many seconds."""
         self._loop.call_later(seconds, act)
 
     def close(self) -> None:
@@ -83,5 +83,5 @@ class Rig:
 
 
 def cross_cables(one: Rig, other: Rig) -> None:
-    """Swap the serial cables of two bays: what is ordered for one is done by the charger of the other."""
+    """Swap the serial cables of two bays: the other bay's charger carries out each bay's commands."""
     one.wire.charger, other.wire.charger = other.wire.charger, one.wire.charger

@@ -1,8 +1,8 @@
 """A second CANopen master on the bus: a service tool that reads, writes and commands a node (CiA 301, §7.2.4, §7.2.8).
 
-Written from the document, not from our own client: it reads in segments and in blocks, and asks without waiting for the
-answer to what it asked before, as tools that show many values do. On a `CanWire` it needs an interface that brings
-frames back to their sender (`udp_multicast`, or `receive_own_messages`), or a wire of its own.
+Written from the document, not from our own client: it reads in segments and in blocks, and sends requests without
+waiting for earlier answers, as tools that display many values do. On a `CanWire` it needs an interface that echoes
+frames to their sender (`udp_multicast`, or `receive_own_messages`), or its own wire.
 """
 
 from collections.abc import Sequence
@@ -13,28 +13,28 @@ from orchestrator.sim.timers import Timer, Timers, Wire
 
 Key = tuple[int, int]  #: index and sub-index
 
-#: Every object of the BMU that is a measurement, its heartbeat, its name (longer than 4 bytes) and its identity.
+#: All measurement objects of the BMU, its heartbeat, its name (longer than 4 bytes) and its identity.
 EVERYTHING: tuple[Key, ...] = (
     (0x6000, 0), (0x6001, 0), (0x6002, 0), (0x6003, 0), (0x6004, 0), (0x1017, 0), (0x1008, 0), (0x1018, 1),
 )  # fmt: skip
 PERIOD_S = 0.01
-BLOCK = 127  #: segments in a block, the most that there may be
+BLOCK = 127  #: segments in a block, the maximum
 GUARD, LSS_MASTER = 0x700, 0x7E5
 
 
 @dataclass(slots=True)
 class Seen:
-    """What came of it."""
+    """Counts of requests and results."""
 
     asked: int = 0  #: requests of all kinds, segments not counted
     values: int = 0
-    texts: int = 0  #: longer transfers that were read to their end
+    texts: int = 0  #: completed longer transfers
     written: int = 0
     aborts: int = 0
 
 
 class SecondMaster:
-    """Asks one node. Belongs to the thread of its clock."""
+    """Queries one node. Belongs to the thread of its clock."""
 
     def __init__(self, timers: Timers, wire: Wire, node_id: int) -> None:
         self.seen = Seen()
@@ -47,14 +47,14 @@ class SecondMaster:
         wire.subscribe(0x580 + node_id, self, self._hear)
 
     def close(self) -> None:
-        """It is unplugged."""
+        """Unplug it."""
         self.stop()
         self._wire.unsubscribe(0x580 + self.node_id, self)
 
     def keep_reading(
         self, objects: Sequence[Key] = EVERYTHING, period_s: float = PERIOD_S, *, blocks: bool = False
     ) -> None:
-        """Read them in turn, one each `period_s`, until `stop()`; in blocks where the node offers that."""
+        """Read them in turn, one every `period_s`, until `stop()`; in blocks if the node supports that."""
         self.stop()
         turns = cycle(objects)
 
@@ -65,13 +65,13 @@ class SecondMaster:
         step()
 
     def stop(self) -> None:
-        """No more requests by itself."""
+        """Stop sending periodic requests."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     def read(self, index: int, sub: int = 0, *, block: bool = False) -> None:
-        """Ask for an object."""
+        """Request an object."""
         command = b"\xa4" if block else b"\x40"
         tail = bytes((BLOCK, 0, 0, 0)) if block else bytes(4)
         self._ask(command + _multiplexer(index, sub) + tail)
@@ -86,11 +86,11 @@ class SecondMaster:
         self._wire.send(0x000, bytes((command, self.node_id if node_id is None else node_id)))
 
     def guard(self) -> None:
-        """Ask for the node's state by a remote frame, as masters do that know no heartbeat."""
+        """Request the node's state by a remote frame, as masters without heartbeat support do."""
         self._wire.send_remote(GUARD + self.node_id)
 
     def look_for_unconfigured(self) -> None:
-        """LSS: which nodes have no id yet (CiA 305)."""
+        """LSS: ask which nodes have no id yet (CiA 305)."""
         self._wire.send(LSS_MASTER, b"\x4c" + bytes(7))
 
     def _ask(self, request: bytes) -> None:

@@ -1,1 +1,1 @@
-"""Tools for those who write policies and those who check the core: they run the real `step()`, never a copy of it."""
+"""Tools for writing policies and for checking the core: they run the real `decide()`, never a copy of it."""

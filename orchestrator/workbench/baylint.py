@@ -1,4 +1,4 @@
-"""What a policy can hardly mean at the bay that names it: it speaks of amperes, and the charger has five steps."""
+"""Lints a policy at the bay that uses it: the policy is in amperes, and the charger has five steps."""
 
 from collections.abc import Iterator, Mapping
 
@@ -7,14 +7,14 @@ from orchestrator.config.policy import Band, Policy, Where
 from orchestrator.config.rules import Problems
 from orchestrator.model import ControlMode
 
-#: A pack's capacity is about this much less than what a charge may take at most (`finish.max_ah`, by its own advice).
+#: A pack's capacity is about this factor below the most that a charge may take (`finish.max_ah`, as its help advises).
 MARGIN = 1.1
 
 Steps = tuple[float, ...]
 
 
 def station_lint(values: Mapping[str, object]) -> Problems:
-    """Warnings about each bay's policy with its charger."""
+    """Warnings about each bay's policy in combination with its charger."""
     for path, policy in values.items():
         bay = path.removesuffix(".policy")
         if not isinstance(policy, Policy) or values.get(f"{bay}.charger.control") is not ControlMode.MANUAL:
@@ -27,7 +27,7 @@ def station_lint(values: Mapping[str, object]) -> Problems:
 
 
 def _at_bay(policy: Policy, worst_a: Steps) -> Iterator[str]:
-    """`worst_a` is what may flow on each step that the station allows, lowest first."""
+    """`worst_a` is the most that may flow on each step that the station allows, lowest first."""
     if not worst_a:
         return
     yield from _refused(policy, worst_a)
@@ -46,7 +46,7 @@ def _at_bay(policy: Policy, worst_a: Steps) -> Iterator[str]:
 
 
 def _refused(policy: Policy, worst_a: Steps) -> Iterator[str]:
-    """Where even the lowest step is too much: no charge begins there, or it pauses."""
+    """Rows that even the lowest step exceeds: there no charge begins, and a running one pauses."""
     source, rule = policy.source, policy.precharge
     if rule is not None and worst_a[0] > rule.max_a:
         yield (

@@ -1,4 +1,4 @@
-"""Processes of this machine, for what takes long."""
+"""Local processes for long computations."""
 
 import os
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from orchestrator.errors import UsageError
 def cores(
     jobs: int | None = None, begin: Callable[..., object] | None = None, *arguments: object
 ) -> ProcessPoolExecutor:
-    """So many processes; None: one for each core. Each calls `begin` with the arguments first. Raises UsageError."""
+    """A pool of `jobs` processes; None: one per core. Each first calls `begin(*arguments)`. Raises UsageError."""
     count = len(os.sched_getaffinity(0)) if jobs is None else jobs
     if count < 1:
         raise UsageError(f"--jobs {jobs}: write 1 or more")

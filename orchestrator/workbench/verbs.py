@@ -1,6 +1,6 @@
-"""The verbs for those who tune policies, and for those who ask afterwards. None needs a service or a device.
+"""The verbs for tuning policies and for analysing recordings. None needs a service or a device.
 
-Each imports what it needs when it runs: plots and their like are extras, which a gateway need not have.
+Each imports its dependencies when it runs: plotting and the like are extras, which a gateway need not have.
 """
 
 import argparse
@@ -19,13 +19,13 @@ PICTURES = ("mermaid", "svg", "png")
 def add_workbench_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """`simulate`, `replay` and `diagram`."""
     _add_simulate(verbs)
-    replay = verbs.add_parser("replay", help="take recorded decisions again, with the same policy or with another")
-    replay.add_argument("journal", nargs="+", type=Path, help="a journal's directory, or files of one (may be gzipped)")
-    replay.add_argument("--policy", metavar="FILE", help="what this policy would have decided, and what that changes")
+    replay = verbs.add_parser("replay", help="repeat recorded decisions, with the same policy or another")
+    replay.add_argument("journal", nargs="+", type=Path, help="a journal's directory, or its files (may be gzipped)")
+    replay.add_argument("--policy", metavar="FILE", help="show what this policy would have decided, and the effect")
     replay.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
     replay.set_defaults(run=_replay)
-    diagram = verbs.add_parser("diagram", help="the state machine as a picture")
-    diagram.add_argument("--policy", metavar="FILE", help="as this policy uses it, with its thresholds")
+    diagram = verbs.add_parser("diagram", help="draw the state machine")
+    diagram.add_argument("--policy", metavar="FILE", help="as used by this policy, with its thresholds")
     diagram.add_argument("--format", choices=PICTURES, default=PICTURES[0], help="default: %(default)s, which is text")
     diagram.add_argument("--out", type=Path, metavar="FILE", help="default: standard output")
     diagram.set_defaults(run=_diagram)
@@ -37,11 +37,11 @@ def _add_simulate(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     simulate.add_argument("--scenario", required=True, help="what happens: a shipped name or a file")
     simulate.add_argument(
         "--sweep", action="append", default=[], metavar="KEY=A..B:N",
-        help="one policy with N values of a key instead; may be repeated for every combination",
+        help="try N values of a key in one policy; repeat the option for every combination",
     )  # fmt: skip
-    simulate.add_argument("--jobs", type=int, metavar="N", help="processes for a sweep (default: one for each core)")
-    simulate.add_argument("--dask", metavar="ADDRESS", help="play a sweep on this Dask cluster instead")
-    simulate.add_argument("--out", type=Path, metavar="DIR", help="write a page and a picture there")
+    simulate.add_argument("--jobs", type=int, metavar="N", help="processes for a sweep (default: one per core)")
+    simulate.add_argument("--dask", metavar="ADDRESS", help="run a sweep on this Dask cluster instead")
+    simulate.add_argument("--out", type=Path, metavar="DIR", help="write a page and a picture to this directory")
     simulate.set_defaults(run=_simulate)
 
 
@@ -105,7 +105,7 @@ def _present() -> ModuleType:
 
 
 def _progress(form: str = "{:.0%}") -> Callable[[str, float], None]:
-    """Says on a terminal how far what takes longer than a second has come."""
+    """Show progress on a terminal once a computation takes longer than a second."""
     begin_s = time.monotonic()
 
     def say(what: str, share: float) -> None:
@@ -142,7 +142,7 @@ def _diagram(arguments: argparse.Namespace) -> int:
 
 
 def _give(data: bytes, out: Path | None) -> None:
-    """To a file, or to standard output."""
+    """Write to a file, or to standard output."""
     if out is None:
         sys.stdout.buffer.write(data)
         sys.stdout.flush()
@@ -154,7 +154,7 @@ def _give(data: bytes, out: Path | None) -> None:
 
 
 def missing(what: str, error: ImportError, extra: str = "workbench") -> OrchestratorError:
-    """What to install for something whose libraries a gateway need not have."""
+    """The error that says which extra to install for a verb."""
     return OrchestratorError(
         f"{what} needs the package {error.name}: pip install 'charging-station-orchestrator[{extra}]'"
     )

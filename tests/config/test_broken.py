@@ -1,4 +1,4 @@
-"""Every file in broken/ and, beside it, exactly what is said about it."""
+"""Every file in broken/ and, beside it, the exact findings expected."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Other values in place of what a file says: read, checked and located like what is written."""
+"""Values that replace those of a file are read, checked and located like the ones in the file."""
 
 import pytest
 

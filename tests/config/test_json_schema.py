@@ -19,7 +19,7 @@ GOOD = sorted(ROOT.glob("tests/config/good/*.yaml"))
 BROKEN = ROOT / "tests/config/broken"
 MODELINE = re.compile(r"# yaml-language-server: \$schema=(\S+)\n")
 
-#: Mistakes that can be seen without knowing another key; the others are for `orchestrator check`.
+#: Mistakes visible without knowing another key; the others are for `orchestrator check`.
 SEEN = (
     "booleans", "map-fields", "misplaced-key", "missing-keys", "no-value", "numbers", "other-kind",
     "out-of-bounds", "station-half-a-bay", "station-empty-bays", "unknown-keys", "words", "wrong-shape",
@@ -27,7 +27,7 @@ SEEN = (
 
 
 class Loader(yaml.SafeLoader):
-    """YAML 1.2, as editors read it: `off` and `no` are texts."""
+    """YAML 1.2, as editors read it: `off` and `no` are strings."""
 
 
 Loader.yaml_implicit_resolvers = {

@@ -146,7 +146,7 @@ def _socket(path: Path) -> None:
         listener.bind(str(path))
 
 
-#: What may stand where a file is expected; each of them is there for real.
+#: Things other than a file that may be found at a path; each of them really exists here.
 NO_FILES: dict[str, Callable[[Path], object]] = {
     "a directory": Path.mkdir,
     "a pipe (FIFO)": os.mkfifo,
@@ -178,7 +178,7 @@ def test_what_is_no_file_is_told_where_a_station_names_it() -> None:
 
 
 def test_a_file_that_this_user_may_not_read_is_told_with_the_user() -> None:
-    """Root may read everything: so somebody else is asked, where everybody may come to the file."""
+    """Root can read everything, so another user tries, with a file in a directory open to everyone."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder).chmod(0o755)
         Path(folder, "secret.yaml").touch(0o000)
@@ -197,7 +197,7 @@ def _said_of_a_secret(folder: str) -> str:
 
 def test_a_huge_file_is_not_read_to_its_end() -> None:
     with Path("huge.yaml").open("wb") as file:
-        file.truncate(1 << 40)  # it takes no room: there is nothing in it
+        file.truncate(1 << 40)  # sparse: it takes no disk space
     said = f"huge.yaml:1:1: error: the file has more than {MAX_BYTES} bytes: this is not one of our files"
     assert [str(finding) for finding in check(["huge.yaml"])] == [said]
     assert wiring(Path("huge.yaml")).damaged
@@ -259,7 +259,7 @@ def test_no_more_bays_than_one_gateway_serves() -> None:
 
 
 def test_an_installed_package_finds_its_own_files(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In a wheel the shipped files lie inside the package; in a bare checkout they lie at the top level."""
+    """A wheel has the shipped files inside the package; a bare checkout has them at the top level."""
     for inside in (True, False):
         package = Path("site" if inside else "checkout", "orchestrator").absolute()
         package.mkdir(parents=True)

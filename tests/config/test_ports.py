@@ -1,4 +1,4 @@
-"""An emergency stop finds its ports, whatever else is wrong with the file."""
+"""An emergency stop finds its ports whatever else is wrong with the file."""
 
 from pathlib import Path
 
@@ -60,7 +60,7 @@ def test_a_port_under_a_misspelt_key_is_not_forgotten(tmp_path: Path) -> None:
 
 
 def test_a_port_whose_name_no_file_can_have_is_shown_as_written(tmp_path: Path) -> None:
-    """Asking the system for it would end the emergency stop in mid-work."""
+    """Passing it to the system would abort the emergency stop halfway."""
     file = tmp_path / "x.yaml"
     file.write_text(GOOD.replace("/dev/ttyS1", r'"/dev/\0\ud800"') + 'x:\n  port: "/dev/\0"\n')
     assert set(wiring(file).ports) == {"/dev/ttyS2", r"/dev/\0", r"/dev/\0\ud800"}
@@ -112,7 +112,7 @@ def test_a_contactor_is_found(text: str, found: tuple[str, int, bool], tmp_path:
     ],
 )
 def test_a_contactor_in_doubt_is_left_alone(spoilt: str, tmp_path: Path) -> None:
-    """With the wrong polarity it would be closed."""
+    """With the wrong polarity the stop would close it."""
     assert with_contactor(tmp_path, spoilt) == ()
 
 

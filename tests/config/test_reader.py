@@ -1,4 +1,4 @@
-"""The generic walk: types from hints, every finding at once, and nothing but findings."""
+"""The generic walk: types from type hints, all findings at once, and never an exception."""
 
 import random
 from collections.abc import Mapping
@@ -159,7 +159,7 @@ def test_a_path_is_no_longer_than_linux_allows() -> None:
 
 
 def _all_kinds(text: str) -> None:
-    """Reads `text` as each kind of file; anything but findings is an error of ours."""
+    """Reads `text` as each kind of file; anything but findings is a bug."""
     with TemporaryDirectory() as directory:
         for first in ("", "policy: a\n", "station: a\n", "map: a\n"):
             file = Path(directory, "x.yaml")

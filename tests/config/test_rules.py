@@ -1,4 +1,4 @@
-"""Each rule at its boundary: the last value that is allowed, and the first that is not (told in full in broken/)."""
+"""Each rule at its boundary: the last allowed value and the first refused one (full messages: broken/)."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from orchestrator.protocol.objects import READING_FIELDS, ObjectMap
 
 GOOD = Path(__file__).parent / "good"
 
-#: (file, what is written there, what to write instead, the key that is then wrong or "" for none)
+#: (file, text in it, replacement, the key that is then wrong or "" for none)
 BOUNDARIES = [
     # policy
     ("policy", "voltage_v: [26.0, 55.2]", "voltage_v: [25.99, 55.2]", "pack.voltage_v[0]"),
@@ -157,7 +157,7 @@ def test_a_rule_is_silent_about_what_is_absent_or_wrong_already() -> None:
 
 
 def test_the_rules_name_keys_that_there_are() -> None:
-    """A misspelt key in a table of rules would switch its rule off without a word."""
+    """A misspelt key in a table of rules would silently disable its rule."""
     from orchestrator.config.map_rules import MAP_RULES
     from orchestrator.config.policy_rules import POLICY_RULES
     from orchestrator.config.station_rules import _BAY_RULES, _STATION_RULES

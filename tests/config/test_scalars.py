@@ -1,4 +1,4 @@
-"""One scalar at a time: what is taken, and what is said to one that is not."""
+"""One scalar at a time: what is accepted, and the message for what is not."""
 
 import math
 from enum import Enum

@@ -1,4 +1,4 @@
-"""The files that travel with the program: right, complete, and saying what the README says of them."""
+"""The files shipped with the program: valid, complete, and in agreement with the README."""
 
 import re
 from pathlib import Path
@@ -75,7 +75,7 @@ def test_one_scenario_shows_every_key() -> None:
 
 @pytest.mark.parametrize("name", POLICIES)
 def test_over_voltage_leaves_the_charger_room_above_its_end_voltage(name: str) -> None:
-    """A limit at the end voltage itself would latch at the end of every charge."""
+    """A limit equal to the end voltage would latch at the end of every charge."""
     pack = load_policy(name).pack
     full_v = 3.55 if "lfp" in name else 4.2
     assert pack.voltage_v.high >= pack.cells_in_series * full_v * 1.005

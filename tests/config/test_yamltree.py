@@ -1,4 +1,4 @@
-"""The tree is the same from libyaml and from the pure parser, bounded, and free of YAML's tricks."""
+"""libyaml and the pure Python parser give the same tree: bounded, and without YAML's tricks."""
 
 import random
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A BatteryNode on a bench: frames by hand, time that jumps."""
+"""A BatteryNode on a bench: hand-made frames, simulated time."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,7 @@ from orchestrator.protocol.objects import ObjectMap
 
 TX, RX = "TX", "RX"
 Frame = tuple[int, bytes]
-#: Who sends, on which COB-ID, which bytes.
+#: Sender, COB-ID, bytes.
 Dialogue = Iterable[tuple[str, int, str]]
 
 TABOS = load_map("tabos")
@@ -53,11 +53,11 @@ class Bench:
         return self.node.view[1]
 
     def hear(self, cob_id: int, data: str) -> None:
-        """The node is given a frame."""
+        """Pass a frame to the node."""
         self.node.on_frame(cob_id, bytes.fromhex(data), self.now_s)
 
     def step(self, end_s: float) -> Frame | None:
-        """Let time pass, the node being called as it wishes, until it sends; None, at `end_s`, if it does not."""
+        """Let time pass, calling the node when it asks, until it sends; None if it has not sent by `end_s`."""
         begin = len(self.sent)
         while max(self.node.next_due_s, self.now_s) <= end_s:
             self.now_s = max(self.node.next_due_s, self.now_s)
@@ -69,7 +69,7 @@ class Bench:
         return None
 
     def run(self, seconds: float) -> list[Frame]:
-        """Let this much time pass; what the node sent meanwhile."""
+        """Let this much time pass; returns what the node sent."""
         begin, end_s = len(self.sent), self.now_s + seconds
         while self.step(end_s):
             pass
@@ -82,7 +82,7 @@ class Bench:
         return frame
 
     def play(self, dialogue: Dialogue, latency_s: float = 0.001) -> None:
-        """Go through it: each TX must be what the node sends next, each RX comes `latency_s` later."""
+        """Play it: each TX must be the node's next frame; each RX follows after `latency_s`."""
         for number, (who, cob_id, data) in enumerate(dialogue):
             if who == TX:
                 sent_id, sent = self.next_frame()
@@ -93,7 +93,7 @@ class Bench:
                 self.hear(cob_id, data)
 
     def answer_reads(self, seconds: float, words: dict[int, int], latency_s: float = 0.001) -> None:
-        """Answer every read and write for this long as a healthy BMU would."""
+        """Answer every read and write for this long, like a healthy BMU."""
         end_s = self.now_s + seconds
         while frame := self.step(end_s - latency_s):
             cob_id, data = frame
@@ -106,7 +106,7 @@ class Bench:
         self.now_s = end_s
 
 
-#: A pack at 23.68 V, −0.08 A, 25.0 °C, 90 %, health 100 %, no status bit, its TTF and TTE not available.
-#: What is read back where nobody says otherwise: the heartbeat's period in ms.
+#: A pack at 23.68 V, −0.08 A, 25.0 °C, 90 %, health 100 %, no status bit set, TTF and TTE not available.
+#: What reads return by default: the heartbeat period in ms.
 TIMERS = {0x1017: 500}
 WORDS = {0x6000: 0x0940FFF8, 0x6001: 0x0000FFFF, 0x6002: 0xFFFF5A64, 0x6003: 0x03E807D0, 0x6004: 0x000000FA}

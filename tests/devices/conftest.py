@@ -1,4 +1,4 @@
-"""A pty, a charger on it that shares nothing with the product, and a port that polls it."""
+"""A pty, an independent fake charger on it, and a port that polls it."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ def charger(pty: Pty) -> Iterator[FakeCharger]:
 
 @pytest.fixture
 def bench(pty: Pty, charger: FakeCharger) -> Iterator[Bench]:
-    """A port that only polls, and whose first stop is behind it."""
+    """A port that only polls; its first stop is over."""
     with running(pty.path) as made:
         made.wait_online(order=None)
         yield made

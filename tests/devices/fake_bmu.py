@@ -1,6 +1,6 @@
-"""A BMU made of the manual's bytes and python-can's raw frames; shares nothing with the product.
+"""A BMU made of the manual's bytes and python-can's raw frames; it shares no code with the product.
 
-python fake_bmu.py CHANNEL PORT NODE_ID…      on udp_multicast, until it is killed
+python fake_bmu.py CHANNEL PORT NODE_ID…      on udp_multicast, until killed
 """
 
 import struct
@@ -66,7 +66,7 @@ class FakeBmu:
 
 
 class Bmus(threading.Thread):
-    """Some of them on one bus."""
+    """Several BMUs on one bus."""
 
     def __init__(self, bus: can.BusABC, node_ids: list[int]) -> None:
         super().__init__(daemon=True)

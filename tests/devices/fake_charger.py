@@ -1,6 +1,6 @@
-"""A charger on a pty, written from its document and from nothing of the product: its bytes are its own.
+"""A charger on a pty, written from its protocol document; it shares no code with the product.
 
-It obeys in manual mode like the real one, and its line can be made as bad as real ones are.
+It obeys in manual mode like the real one, and its line can be made as bad as a real line.
 """
 
 import os
@@ -21,7 +21,7 @@ RUN = bytes.fromhex("AF FA 90 05 02 90 01 01 29 AF A0")
 STEP_2 = bytes.fromhex("AF FA 90 05 02 90 02 01 2A AF A0")
 POLL = bytes.fromhex("AF FA 90 05 01 90 13 1F 58 AF A0")
 
-#: A line: the reply → what reaches the product, each part after a pause in seconds.
+#: A line: the reply → the parts that reach the product, each after a pause in seconds.
 Shape = Callable[[bytes, random.Random], list[tuple[float, bytes]]]
 
 
@@ -38,7 +38,7 @@ def delayed(pause_s: float) -> Shape:
 
 
 def always(answer: bytes) -> Shape:
-    """Says this and nothing else."""
+    """Always sends this instead."""
     return lambda _reply, _dice: [(0.0, answer)]
 
 
@@ -47,7 +47,7 @@ def broken(reply: bytes, _: random.Random) -> list[tuple[float, bytes]]:
 
 
 def lossy(share: float) -> Shape:
-    """Loses this share of all replies: one byte, or the whole."""
+    """Damages this share of all replies: one byte is lost, or all of them."""
 
     def lose(reply: bytes, dice: random.Random) -> list[tuple[float, bytes]]:
         if dice.random() >= share:
@@ -59,20 +59,20 @@ def lossy(share: float) -> Shape:
 
 
 def garbage(reply: bytes, dice: random.Random) -> list[tuple[float, bytes]]:
-    """Noise before, between and behind; false starts and ends in it."""
+    """Noise before, between and after, with false start and end bytes in it."""
     noise = dice.choice([dice.randbytes(7), b"\xaf", b"\xaf\xfa\x90", b"\xaf\xa0\xaf\xfa\x00", reply[:9]])
     return [(0.0, noise + reply), (0.001, dice.randbytes(3))]
 
 
 class FakeCharger:
-    """`frames` has all that it received, with the time of each."""
+    """`frames` holds everything it received, with timestamps."""
 
     def __init__(self, pty: Pty, shape: Shape = perfect, *, echo: bool = False) -> None:
         self.pty = pty
         self.shape = shape
         self.echo = echo  #: as an RS-485 adapter that hears itself
-        self.mute = False  #: receives and says nothing
-        self.baud: int | None = None  #: hears only what comes at this speed (a constant of termios); None: everything
+        self.mute = False  #: receives but never answers
+        self.baud: int | None = None  #: understands only this speed (a termios constant); None: any
         self.manual = True
         self.running = self.limit = self.mode = self.precharge = 0
         self.standby = False
@@ -96,12 +96,12 @@ class FakeCharger:
         return len(self.frames) - len(self.orders)
 
     def say(self, data: bytes) -> None:
-        """Send something that nobody asked for."""
+        """Send something unsolicited."""
         os.write(self.pty.master, data)
 
     @contextmanager
     def babbling(self) -> Iterator[None]:
-        """Send noise without a pause, as fast as it is taken."""
+        """Send noise without a pause, as fast as the line takes it."""
         over = Event()
         noise = self._dice.randbytes(4096)
 
@@ -116,7 +116,7 @@ class FakeCharger:
         thread.join()
 
     def stop_reading(self) -> None:
-        """Take nothing off the line any more."""
+        """Stop reading from the line."""
         self._reading.clear()
         self._paused.wait()
 
@@ -143,8 +143,8 @@ class FakeCharger:
                 self._ended.wait(0.01)
 
     def _hear(self) -> bytes:
-        """What a receiver makes of it: at another speed, nothing."""
-        heard = self.baud is None or self.baud == termios.tcgetattr(self.pty.master)[5]  # both ends have one setting
+        """What a receiver understands of it: at another speed, nothing."""
+        heard = self.baud is None or self.baud == termios.tcgetattr(self.pty.master)[5]  # both ends share one setting
         data = os.read(self.pty.master, 4096)
         return data if heard else b""
 

@@ -1,4 +1,4 @@
-"""A charger's port that runs, and what it has reported."""
+"""A running charger port and the reports from it."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ from tests.waiting import wait_until
 
 LIMITS = Limits(voltage_v=58.4, current_a=15.0, temperature_c=Range(0.0, 45.0))
 SET_STEP_2 = Command(Action.SET_LIMIT, 1)
-#: What a busy machine may add to a time.
+#: Allowance for a busy machine.
 SLACK_S = 0.1
 
 
@@ -56,7 +56,7 @@ class Bench:
         return reading
 
     def wait_online(self, order: Command | None = STOP) -> None:
-        """Online, with this standing order: a port that was just opened has one of its own."""
+        """Online, with this standing command: a port just opened starts with its own."""
         wait_until(lambda: self.link.online, what="online")
         self.port.order(order, good())
 
@@ -72,7 +72,7 @@ class Bench:
         wait_until(lambda: time.monotonic() >= asked_s + age_s)
 
     def wait_readings(self, count: int, *, since: int = 0) -> None:
-        """So many different readings were reported, of all reports or those since one."""
+        """The number of distinct readings reported, in total or since a given report."""
         wait_until(lambda: len({reading.t_s for reading, _ in self.seen[since:] if reading}) >= count)
 
 

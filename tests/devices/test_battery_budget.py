@@ -1,4 +1,4 @@
-"""All nodes together stay below 30 % of the bus, and none of them starves."""
+"""All nodes together use less than 30 % of the bus, and none starves."""
 
 from collections import Counter
 from heapq import heappop, heappush
@@ -11,7 +11,7 @@ from tests.devices.bmu_bench import WORDS, config
 
 
 def reserve(budget: BusBudget, seconds: float) -> int:
-    """As many exchanges as can begin in this time."""
+    """Start as many exchanges as possible in this time."""
     count = 0
     while budget.reserve(0.0) < seconds:
         count += 1
@@ -123,7 +123,7 @@ def test_silent_nodes_cost_the_others_next_to_nothing() -> None:
     station.run(2.0)
     dead = station.nodes[4:]
     for node in dead:
-        node.on_frame = lambda *_args: None  # type: ignore[method-assign]  # it hears nothing any more
+        node.on_frame = lambda *_args: None  # type: ignore[method-assign]  # it hears nothing from now on
     station.run(6.0)
     station.exchanges.clear()
     station.run(10.0)

@@ -1,4 +1,4 @@
-"""BMUs on real buses, read by the thread that the service uses: all goes well, and all that can break."""
+"""BMUs on real buses, read by the service's own thread: normal operation and every failure."""
 
 import os
 import random
@@ -31,7 +31,7 @@ FAKE_BMU = Path(__file__).with_name("fake_bmu.py")
 
 
 def no_one() -> None:
-    """Nobody to tell."""
+    """A callback that does nothing."""
 
 
 class Station:
@@ -58,7 +58,7 @@ class Station:
         return self.link(number)
 
     def await_fresh(self, number: int = 0) -> None:
-        """Wait for a value that was asked for after this call."""
+        """Wait for a value requested after this call."""
         now_s = time.monotonic()
         wait_until(
             lambda: (volts := self.reading(number).voltage_v) is not None and volts.t_s >= now_s, what="a fresh value"
@@ -256,7 +256,7 @@ def test_a_bus_that_is_not_there_yet_is_waited_for(tmp_path: Path) -> None:
 
 @contextmanager
 def slcan_bmu(adapter: Pty) -> Iterator[None]:
-    """Answers every read of node 0x10 with the sample's value, in an adapter's own text."""
+    """Answers every read of node 0x10 with the sample's value, in an adapter's text protocol."""
     master, ending = adapter.master, threading.Event()
     os.set_blocking(master, False)
 
@@ -348,7 +348,7 @@ def test_a_bug_in_the_link_takes_all_nodes_offline_and_the_bus_is_built_anew(
 
 
 class HangingPort:
-    """A driver that does not come back."""
+    """A driver whose call never returns."""
 
     name = "can0"
     trouble: Cause | None = None
@@ -380,5 +380,5 @@ def test_a_loop_that_hangs_is_found_out() -> None:
     assert not bus.stalled(STALL_S)
     assert bus.stalled(STALL_S + 0.01)
     port.hanging.set()
-    wait_until(lambda: not bus.stalled(9.0), what="the end of the hang")  # it broke; while it is closed nothing hangs
+    wait_until(lambda: not bus.stalled(9.0), what="the end of the hang")  # it broke; closing it does not hang
     bus.close()

@@ -1,4 +1,4 @@
-"""A BMU and a bus that do anything at all: the node neither raises nor believes a word that is not for it."""
+"""A BMU and a bus that do anything at all: the node never raises and never believes a foreign answer."""
 
 from collections import deque
 
@@ -49,7 +49,7 @@ FATES = st.lists(st.tuples(st.floats(0.0, 1.2), st.sampled_from([1, 1, 1, 0, 2])
 @settings(max_examples=600)
 @given(FATES)
 def test_a_word_is_never_shown_with_the_time_of_another_request(fates: list[tuple[float, int]]) -> None:
-    """Every answer carries the number of its request, in the volts; what is shown must have been asked for then."""
+    """Every answer carries its request's number as the voltage; a reading must match the request of its time."""
     bench, coming, last_s = Bench(), deque[tuple[float, bytes]](), 0.0
     asked_s: dict[int, float] = {}
     for number, (delay_s, copies) in enumerate(fates):

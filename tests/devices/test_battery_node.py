@@ -1,4 +1,4 @@
-"""The dialogue with one BMU, frame by frame, time jumping."""
+"""The dialogue with one BMU, frame by frame, in simulated time."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -11,7 +11,7 @@ from orchestrator.protocol.objects import ObjectMap
 from tests.core.said import cause, say
 from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, REQUEST, RX, TABOS, TX, WORDS, Bench, Dialogue, config
 
-#: protocol/bmu.md, "Golden exchanges"; a whole first round with the sample of §4.1 in it.
+#: protocol/bmu.md, "Golden exchanges": a complete first round with the sample of §4.1.
 FIRST_ROUND: Dialogue = [
     (TX, REQUEST, "40 00 60 00 00 00 00 00"),
     (RX, REPLY, "43 00 60 00 F8 FF 40 09"),
@@ -114,7 +114,7 @@ def test_silence_is_noticed_after_the_limit_and_values_keep_their_age() -> None:
 
 
 def test_a_node_that_falls_silent_is_called_so_at_the_time_that_it_asked_for() -> None:
-    """Whatever the digits of that time: a node that is not, asks for the same moment again and again."""
+    """Whatever the digits of that time: without rounding, the node would ask for the same moment for ever."""
     for answer_s in (1023.3499999999991, *(1000.0 + number / 7 for number in range(200))):
         bench = online()
         bench.node._answer_s = answer_s
@@ -197,7 +197,7 @@ def test_what_is_no_answer_is_dropped_and_counted(answer: str, because: str) -> 
     assert bench.reading == BatteryReading(), because
     assert not bench.link.online
     assert bench.link.bad_frames == 1
-    bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")  # the true answer still counts
+    bench.hear(REPLY, "43 00 60 00 F8 FF 40 09")  # the real answer still counts
     assert bench.reading.voltage_v is not None
 
 
@@ -261,7 +261,7 @@ def test_a_node_that_always_answers_too_late_is_offline_and_told_why() -> None:
 
 
 def two_objects() -> ObjectMap:
-    """Only volts and amps, fast, and the percentages, slow."""
+    """Volts and amps at the fast rate, percentages at the slow one, nothing else."""
     return replace(TABOS, objects=(TABOS.objects[0], TABOS.objects[2]), tpdos=())
 
 
@@ -304,7 +304,7 @@ def test_a_second_node_on_the_id_is_found_out() -> None:
             bench.hear(REPLY, f"43 {request[1:4].hex()} {word}")
     assert not bench.link.online
     assert "answered twice" in say(bench.link.problem)
-    bench.answer_reads(1.0, WORDS)  # the second one was taken off
+    bench.answer_reads(1.0, WORDS)  # the second one was removed
     assert bench.link.online
 
 
@@ -348,7 +348,7 @@ def test_the_heartbeat_is_asked_for_after_the_first_answer() -> None:
     bench.now_s += 0.2
     bench.hear(HEARTBEAT, "05")
     assert bench.link.heartbeat_t_s == bench.now_s
-    assert bench.changes == changes + 1  # the state was news, the second heartbeat is none
+    assert bench.changes == changes + 1  # the state was new; the second heartbeat brings nothing new
 
 
 def test_a_refused_heartbeat_is_no_fault_and_not_asked_for_again() -> None:
@@ -456,7 +456,7 @@ def test_an_emergency_is_shown_in_words_until_it_is_reset(data: str, words: str)
 
 
 def test_an_emergency_is_forgotten_when_the_node_has_left() -> None:
-    """Another battery may come that never resets it, and whose boot-up frame nobody heard."""
+    """The next battery may never reset it, and its boot-up frame may be missed."""
     bench = online()
     bench.hear(EMERGENCY, "10 42 08 01 02 03 04 05")
     bench.run(1.6)

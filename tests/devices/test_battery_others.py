@@ -1,4 +1,4 @@
-"""Others on the bus: masters that use the same BMU, and senders that answer in its name (FAULTS B26, B27, B28)."""
+"""Others on the bus: masters using the same BMU, and senders answering in its name (faults B26, B27, B28)."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ def online(**keys: float | None) -> Bench:
 
 
 def next_read(bench: Bench, index: int | None = None) -> bytes:
-    """Answer until the node has asked for this object, which is left without an answer."""
+    """Answer until the node asks for this object; leave that request unanswered."""
     while True:
         _, data = bench.next_frame()
         if index in (None, data[1] | data[2] << 8):
@@ -104,7 +104,7 @@ def test_a_refusal_that_may_be_ours_counts_once_it_can_only_be_ours() -> None:
     asked_s = bench.now_s
     say(bench, refusal(next_read(bench, TEMPERATURE), 0x06020000))
     assert "0x6004" in text_of(bench.link.abort)
-    assert bench.now_s - asked_s < 0.5  # asked again soon, not with its next turn
+    assert bench.now_s - asked_s < 0.5  # asked again soon, not at its next turn
 
 
 def test_a_confirmation_of_somebody_elses_write_does_not_arm_our_heartbeat() -> None:

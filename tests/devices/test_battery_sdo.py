@@ -1,4 +1,4 @@
-"""No answer is ever taken for one to another request, whatever is lost, late or doubled."""
+"""No answer is ever matched to the wrong request, whatever is lost, late or doubled."""
 
 from collections import deque
 from itertools import count
@@ -12,7 +12,7 @@ from orchestrator.model import Cause
 from orchestrator.protocol.sdo import SdoAbort, SdoMalformed, SdoReply, SdoValue, SdoWritten
 
 TIMEOUT_S = 0.3
-#: The longest delay that a node can have and still not be misunderstood: the time-out and a second of quiet.
+#: The longest delay a node can have without being misunderstood: the time-out plus a second of quiet.
 LATEST_S = 1.3
 VOLTS, STATUS, SOC = (0x6000, 0), (0x6001, 0), (0x6002, 0)
 
@@ -22,7 +22,7 @@ def value(key: Key, number: int = 0) -> SdoValue:
 
 
 def late(*keys: Key) -> tuple[SdoClient, float]:
-    """A client that asked for these, one after the other, in vain."""
+    """A client that asked for these in turn and got no answer."""
     client, now_s = SdoClient(TIMEOUT_S), 0.0
     for key in keys:
         client.ask(key, now_s)
@@ -44,7 +44,7 @@ def test_an_object_is_not_asked_again_before_another_one_was_answered() -> None:
     assert not client.may_ask(VOLTS)
     client.ask(STATUS, now_s)
     assert client.take(value(STATUS), now_s + 0.01) is Verdict.ACCEPTED
-    assert client.may_ask(VOLTS)  # in order: what was asked before STATUS is through
+    assert client.may_ask(VOLTS)  # in order: everything asked before STATUS is done
     assert not client.may_ask(STATUS)  # it may be repeated by the bus
 
 
@@ -110,14 +110,14 @@ def test_after_a_broken_bus_the_answer_may_still_come() -> None:
 
 
 class Wire:
-    """A node that answers in the order of the requests, each after a delay of its own, some never, some twice."""
+    """A node that answers requests in order with individual delays, some never, some twice."""
 
     def __init__(self) -> None:
         self.coming: deque[tuple[float, SdoReply]] = deque()
         self._last_s = 0.0
 
     def ask(self, key: Key, number: int, now_s: float, delay_s: float, copies: int) -> None:
-        # Answers keep their order; none takes longer than the quiet time is made for.
+        # Answers keep their order; no delay exceeds what the quiet time covers.
         self._last_s = min(max(self._last_s, now_s + delay_s), now_s + LATEST_S - 0.001)
         self.coming.extend([(self._last_s, value(key, number))] * copies)
 
@@ -155,4 +155,4 @@ def test_no_value_is_accepted_for_a_request_that_it_does_not_belong_to(
             keys.rotate(-1)
         now_s += step_s
     if objects > 1 and all(fate == (0.005, 1) for fate in fates):
-        assert accepted == len(fates)  # where nothing goes wrong every answer counts
+        assert accepted == len(fates)  # when nothing goes wrong every answer counts

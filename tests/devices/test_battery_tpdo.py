@@ -1,4 +1,4 @@
-"""Readings by TPDO: configured, decoded, compared with SDO reads, and done without when they stay away."""
+"""Readings by TPDO: configured, decoded, checked against SDO reads, and replaced by SDO when they stop."""
 
 import pytest
 
@@ -22,7 +22,7 @@ SET_UP: Dialogue = [
 
 
 def tpdo_bench() -> Bench:
-    """A node whose TPDOs are configured, and that was started."""
+    """A started node with configured TPDOs."""
     bench = Bench(config(tpdo_s=0.1))
     bench.play(SET_UP)
     assert bench.next_frame() == START
@@ -30,7 +30,7 @@ def tpdo_bench() -> Bench:
 
 
 def live(bench: Bench, seconds: float, words: dict[int, int] = WORDS) -> None:
-    """All TPDOs every 100 ms, and SDO answers in between."""
+    """All TPDOs every 100 ms, with SDO answers in between."""
     for _ in range(round(seconds / 0.1)):
         bench.hear(TPDO1, "F8 FF 40 09 FF FF 05 00")
         bench.hear(TPDO2, "64 5A FF FF D0 07 E8 03")
@@ -88,7 +88,7 @@ def test_a_refused_timer_leaves_the_sdo_reads_as_they_were() -> None:
             [(TX, REQUEST, f"2B {index:02X} 18 05 64 00 00 00"), (RX, REPLY, f"80 {index:02X} 18 05 02 00 01 06")]
         )
     bench.answer_reads(2.0, WORDS)
-    assert all(cob_id == REQUEST for cob_id, _ in bench.sent)  # no NMT start either
+    assert all(cob_id == REQUEST for cob_id, _ in bench.sent)  # and no NMT start
     assert sum(data[1] == 0 for _, data in bench.sent) > 30
     assert say(bench.link.abort) == ""
 
@@ -147,7 +147,7 @@ def test_tpdo_and_sdo_that_tell_different_stories_are_both_not_believed() -> Non
     assert bench.link.implausible == {}
     other = WORDS | {0x6000: 0x1388FFF8}  # 50.00 V by SDO, 23.68 V by TPDO
     live(bench, 1.0, other)
-    assert bench.link.implausible == {}  # once is no proof: the value may just have changed
+    assert bench.link.implausible == {}  # once proves nothing: the value may just have changed
     live(bench, 2.0, other)
     assert "a TPDO says 23.68, the SDO read 50" in say(bench.link.implausible["voltage_v"])
     assert "current_a" not in bench.link.implausible

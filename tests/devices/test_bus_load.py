@@ -1,4 +1,4 @@
-"""Whether a bus is fast enough for its BMUs, said before a charge is stopped for it."""
+"""Whether a bus is fast enough for its BMUs, reported before it costs a charge."""
 
 from dataclasses import replace
 

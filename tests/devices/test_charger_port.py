@@ -1,4 +1,4 @@
-"""A charger's port over a real pty: polls, standing orders, and the interlock before them."""
+"""A charger port over a real pty: polls, standing commands, and the interlock before them."""
 
 from orchestrator.model import STOP, Action, Command, ControlMode, Operation, Sent
 from tests.core.said import say
@@ -36,7 +36,7 @@ def test_polls_are_a_slot_apart(bench: Bench, charger: FakeCharger) -> None:
     before = len(charger.frames)
     wait_frames(charger, before + 4)
     times_s = [at_s for at_s, _ in charger.frames[before:]]
-    assert times_s[3] - times_s[0] > 3 * 0.2 - 0.05  # received a little late or early
+    assert times_s[3] - times_s[0] > 3 * 0.2 - 0.05  # received slightly late or early
 
 
 def test_each_reading_is_reported(bench: Bench) -> None:

@@ -1,4 +1,4 @@
-"""Errors of our own in a port's thread, and threads that hang."""
+"""Internal errors in a port's thread, and threads that hang."""
 
 import time
 from threading import Event
@@ -87,7 +87,7 @@ def test_a_thread_that_hangs_or_has_ended_is_told_from_one_that_waits_for_its_po
 ) -> None:
     assert Bench(pty.path, ControlMode.MANUAL).port.stalled(time.monotonic())  # it does not run
     assert not bench.port.stalled(time.monotonic())
-    assert bench.port.stalled(time.monotonic() + 0.8)  # as if no turn had been taken for so long
+    assert bench.port.stalled(time.monotonic() + 0.8)  # as if no turn had been taken for that long
     pty.unplug()
     bench.wait_problem("unplugged")
     assert not bench.port.stalled(time.monotonic() + 0.8)

@@ -1,4 +1,4 @@
-"""Ports that are unplugged, missing, failing, or in somebody else's hands."""
+"""Ports that are unplugged, missing, failing, or used by another program."""
 
 import fcntl
 import os
@@ -81,7 +81,7 @@ def test_opening_is_tried_once_a_second(pty: Pty, charger: FakeCharger) -> None:
     pty.unplug()
     with running(pty.path, open_line=open_line) as bench:
         wait_until(lambda: len(tried_s) == 3)
-        assert len(bench.seen) == 1  # that it is still not there is no news
+        assert len(bench.seen) == 1  # still missing: nothing new to report
         pty.plug()
         bench.wait_online()
         pty.unplug()

@@ -1,4 +1,4 @@
-"""A charger's port on good lines and bad: what it answers, when it is silent, and what it says of it."""
+"""A charger port on good and bad lines: its answers, its silences, and its reports of them."""
 
 import time
 from contextlib import ExitStack
@@ -39,7 +39,7 @@ LINES: dict[str, Shape] = {
 
 
 def test_every_line_that_answers_in_time_gives_its_readings_and_stays_online(tmp_path: Path) -> None:
-    """All at once, to save time: 12 readings each, and an order, with and without an echo of what is sent."""
+    """All at once, to save time: 12 readings each and a command, with and without echo."""
     with ExitStack() as stack:
         benches: dict[str, tuple[Bench, FakeCharger]] = {}
         for number, (name, shape) in enumerate(LINES.items()):
@@ -135,7 +135,7 @@ def test_a_line_that_never_falls_quiet_does_not_hold_up_a_stop(bench: Bench, cha
 
 
 def test_a_line_that_always_has_more_to_read_does_not_hold_up_a_stop() -> None:
-    """Faster than any pty, so that reading never comes to an end."""
+    """Faster than any pty, so reading never ends."""
 
     class Endless:
         def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""How a charger's port stops: at once, again and again, blindly, and at its end."""
+"""How a charger port stops: at once, repeatedly, blind, and when it closes."""
 
 import time
 from pathlib import Path
@@ -15,7 +15,7 @@ from tests.waiting import wait_until
 
 
 def test_a_stop_waits_for_no_slot(bench: Bench, charger: FakeCharger) -> None:
-    """Ordered in the middle of an idle slot. The best of some tries counts, since the machine may be busy."""
+    """Commanded in the middle of an idle slot. The best of several tries counts: the machine may be busy."""
     took_s = []
     for _ in range(3):
         bench.wait_readings(1, since=len(bench.seen))

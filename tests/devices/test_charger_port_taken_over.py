@@ -1,4 +1,4 @@
-"""Ports that another program sets to something else."""
+"""Ports whose settings another program changes."""
 
 import termios
 import time
@@ -19,7 +19,7 @@ from tests.waiting import wait_until
 
 @pytest.fixture
 def hard_of_hearing(pty: Pty, charger: FakeCharger) -> FakeCharger:
-    """A charger that hears what comes at 19200 baud, as every real one does."""
+    """A charger that hears only 19200 baud, like every real one."""
     charger.baud = termios.B19200
     return charger
 
@@ -43,7 +43,7 @@ def test_a_stop_goes_out_at_the_right_speed_whatever_the_port_was_set_to(
 def test_a_line_that_was_set_to_something_else_recovers_by_itself(
     pty: Pty, bench: Bench, hard_of_hearing: FakeCharger
 ) -> None:
-    """With the first poll that nobody answers: no stop is due, and the port is not opened anew."""
+    """At the first unanswered poll: no stop is due, and the port is not reopened."""
     for baud in ("9600", "300"):
         told = len(bench.seen)
         stty(pty.path, baud)

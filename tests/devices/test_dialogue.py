@@ -68,9 +68,9 @@ def test_the_answer_may_come_byte_by_byte(dialogue: Dialogue) -> None:
     "before",
     [
         ASK,  # an echo
-        STOP,  # an echo of the order before
-        frame(0x90, 0x05, 0x02, 0x90, 0x01, 0x01),  # an acknowledgement that no document knows
-        frame(0x90, 0x03, 0x55, 0x90),  # a command that no document knows
+        STOP,  # an echo of the previous command
+        frame(0x90, 0x05, 0x02, 0x90, 0x01, 0x01),  # an acknowledgement in no document
+        frame(0x90, 0x03, 0x55, 0x90),  # a command in no document
         CHECKSUM_ERROR,
         bytes(40),
         b"\xaf\xfa\x90\x13\x03\x90\xaf",
@@ -140,7 +140,7 @@ def test_after_a_miss_another_number_of_values_is_asked_for(dialogue: Dialogue) 
 
 
 def test_a_charger_that_is_always_late_is_never_taken_for_a_prompt_one(dialogue: Dialogue) -> None:
-    """Each answer comes 30 ms into the next request, as fresh as any to look at."""
+    """Each answer comes 30 ms into the next request and looks as fresh as any."""
     dialogue.ask(5.0)
     assert dialogue.give_up(5.12) is None
     for t_s, late in ((5.2, REPLY), (5.4, REPLY_9), (5.6, REPLY_10), (5.8, REPLY)):

@@ -1,4 +1,4 @@
-"""The share of a line's exchanges that went wrong, over a minute."""
+"""The share of failed exchanges on a line, over a minute."""
 
 from orchestrator.devices.line_quality import LEAST, LineQuality
 
@@ -6,7 +6,7 @@ POLL_S = 0.2
 
 
 def poll(quality: LineQuality, begin_s: float, seconds: float, *, every: int = 0) -> float:
-    """Polls for so long, each `every`th of them in vain; when it ended."""
+    """Poll for that long, every `every`th poll failing; returns the end time."""
     for number in range(1, round(seconds / POLL_S) + 1):
         quality.count(begin_s + number * POLL_S, bad=bool(every) and number % every == 0)
     return begin_s + seconds

@@ -1,4 +1,4 @@
-"""Whose turn it is on the line, with jumping time."""
+"""Which frame is next on the line, in simulated time."""
 
 from collections.abc import Mapping
 from itertools import pairwise
@@ -20,7 +20,7 @@ Log = list[tuple[float, Turn]]
 def play(
     schedule: Schedule, start_s: float, end_s: float, orders: Mapping[float, Command | None], poll_s: float = POLL_S
 ) -> Log:
-    """Take every turn when it is due; give the orders at their times, as a control loop would while the port sleeps."""
+    """Take every turn when due; give commands at their times, like a control loop while the port sleeps."""
     log: Log = []
     now_s = start_s
     waiting = sorted(orders.items(), key=lambda item: item[0])
@@ -46,7 +46,7 @@ def opened(control: ControlMode = ControlMode.MANUAL, at_s: float = 0.0) -> Sche
 
 
 def polling(control: ControlMode = ControlMode.MANUAL) -> Schedule:
-    """One that has stopped first and whose last poll was at 1.6 s; the next slot is at 1.8 s."""
+    """A schedule past its first stop, last poll at 1.6 s; the next slot is at 1.8 s."""
     schedule = opened(control)
     log = play(schedule, 0.0, 1.7, {0.1: None})
     assert log[-1] == (1.6, POLL)
@@ -88,7 +88,7 @@ def test_in_automatic_mode_a_stop_is_one_frame() -> None:
 def test_a_silent_charger_is_still_told_to_stop_every_half_second() -> None:
     log = play(polling(), 1.7, 4.3, {1.71: STOP}, poll_s=0.12)
     stops = [at_s for at_s, turn in log if turn is REST]
-    assert stops == [1.71, 2.23, 2.75, 3.27, 3.79]  # a poll that ran to its deadline pushes it by 20 ms
+    assert stops == [1.71, 2.23, 2.75, 3.27, 3.79]  # a poll that ran to its deadline delays it by 20 ms
     assert [turn for _, turn in log].count(POLL) == 5
 
 
@@ -155,7 +155,7 @@ def test_an_order_given_right_after_opening_comes_behind_the_whole_stop() -> Non
 
 
 def test_restarts_in_a_row_are_paced() -> None:
-    """An error of our own that comes again at every stop must not flood the line."""
+    """An internal error that recurs at every stop must not flood the line."""
     schedule = polling()
     at_s = []
     now_s = 5.0
@@ -191,7 +191,7 @@ def test_whatever_is_ordered_when(orders: dict[float, Command | None], control: 
     assert log[0] == (0.0, REST)
     busy_s = {POLL: poll_s, ORDER: ORDER_S, REST: ORDER_S, OPERATION: ORDER_S}
     for (before_s, before), (at_s, turn) in pairwise(log):
-        # Frames never run into each other, and all but the stop keep the recommended 200 ms.
+        # Frames never collide, and all but the stop keep the recommended 200 ms.
         assert at_s - before_s >= (busy_s[before] if turn is REST else SLOT_S) - 0.0015
         if before is REST and control is ControlMode.MANUAL:
             assert turn in (REST, OPERATION)

@@ -1,11 +1,11 @@
-"""The fault catalogue: every fault by its number, in words, and where it is handled if by no row of the table alone."""
+"""The fault catalogue: every fault by number, with its description, and where it is handled besides the fault table."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One fault; the rows of the table that name its number are found by it."""
+    """One fault; rows of the fault table refer to it by number."""
 
     number: str
     about: str
@@ -31,56 +31,57 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("C16", "wrong precharge setting"),
     Entry("C17", "time or charge too much", "a charge that begins above SOC 20 % may take that much less"),
     Entry("C18", "full too early or too late",
-          "too late: the policy's hours and Ah end a charge, whatever the SOC says"),
-    Entry("C19", "undocumented value or transition", "the value is thrown away; mode 8 latches, whatever follows it"),
+          "too late: the policy's hours and Ah end a charge, whatever the SOC"),
+    Entry("C19", "undocumented value or transition", "the value is discarded; mode 8 latches, whatever follows it"),
     Entry("C20", "frozen charger",
-          "only while the BMU's values move: a good supply on a flat cell shows the same digits for long"),
-    Entry("C21", "error frame: length or checksum", "what was not heard is repeated in the next slot"),
+          "only while the BMU's values move: a good supply on a flat cell shows the same digits for a long time"),
+    Entry("C21", "error frame: length or checksum", "the lost frame is repeated in the next slot"),
     Entry("C22", "error frame: command or order"),
     Entry("C23", "charger silent", "five polls without an answer (three if answers come late); stopped blindly"),
     Entry("C24", "noise, partial, late or echoed frames",
-          "`protocol/frame.py`, `devices/dialogue.py`: thrown away and counted; when nothing else comes, as C23"),
+          "`protocol/frame.py`, `devices/dialogue.py`: discarded and counted; if nothing else arrives, as C23"),
     Entry("C25", "port gone, stolen or wrong", "reopened every second, and then stopped first"),
     Entry("C26", "line taken over: another program changed its settings",
           "checked each second, after a missed poll and before every stop, and set up again at once"),
-    Entry("C27", "port locked by a stranger", "`lastresort/port_owner.py`: stopped past the lock; alarm meanwhile"),
-    Entry("C28", "setting goes back by itself", "three returns in a minute, or 2 s of more than the commanded step"),
-    Entry("C29", "current without an order", "in every state: standby counts only where the BMU sees none either"),
+    Entry("C27", "port locked by a foreign program",
+          "`lastresort/port_owner.py`: stopped in spite of the lock; alarm meanwhile"),
+    Entry("C28", "setting reverts by itself", "three reversions in a minute, or 2 s above the commanded step"),
+    Entry("C29", "current without a command", "in every state: standby counts only if the BMU sees no current either"),
     Entry("C30", "runs again after it was verified",
-          "`core/safestop.py`: within 10 s its time counts on from the first stop; UNCONTROLLABLE ends after 10 s of "
+          "`core/safestop.py`: within 10 s its time counts from the first stop; UNCONTROLLABLE ends after 10 s of "
           "standby"),
     Entry("C31", "charger frozen at rest"),
     Entry("B1", "BMU silent"),
-    Entry("B2", "late answer, stale value", "`devices/sdo_client.py` lets no late answer pass for a fresh one"),
+    Entry("B2", "late answer, stale value", "`devices/sdo_client.py`: a late answer never passes for a fresh one"),
     Entry("B3", "SDO abort: object missing"),
     Entry("B4", "SDO abort: not now"),
-    Entry("B5", "malformed SDO answers", "`devices/sdo_client.py`: none is accepted, so that it is silent"),
+    Entry("B5", "malformed SDO answers", "`devices/sdo_client.py`: none is accepted, so the BMU counts as silent"),
     Entry("B6", "heartbeat lost"),
     Entry("B7", "boot-up in mid-charge"),
-    Entry("B8", "not operational", "started again with each heartbeat that says so; only where TPDOs are wanted"),
+    Entry("B8", "not operational", "started again on each heartbeat that says so; only if TPDOs are used"),
     Entry("B9", "status word, EMCY"),
     Entry("B10", "hot"),
-    Entry("B11", "cold", "gently when cool: the policy's `current.temperature_c`"),
+    Entry("B11", "cold", "less current when cool: the policy's `current.temperature_c`"),
     Entry("B12", "thermal runaway"),
     Entry("B13", "temperature sensor invalid or stuck",
-          "a stuck one is not found: see below"),
+          "a stuck one is not detected: see below"),
     Entry("B14", "pack voltage too high or too low"),
     Entry("B15", "volts of charger and BMU differ"),
     Entry("B16", "amps of charger and BMU differ"),
     Entry("B17", "SOC or SOH implausible", "one doubt warns, two together stop"),
-    Entry("B18", "another battery", "a BMU that boots, or that was seen to leave, is qualified from the beginning; its "
+    Entry("B18", "another battery", "a BMU that boots, or whose removal was seen, is qualified from the beginning; its "
           "manual has no identity object, `probe` shows what there is"),
-    Entry("B19", "two nodes with one id, babble", "`devices/node_health.py`: its answers count for none"),
+    Entry("B19", "two nodes with one id, babble", "`devices/node_health.py`: their answers do not count"),
     Entry("B20", "TPDO and SDO differ",
-          "`devices/polled.py`: after two reads, 2 s, neither is believed, as if out of range; until then each of "
-          "them is judged as it comes, so that the worse one stops: sooner than the catalogue's 5 s"),
-    Entry("B21", "bus off, down, no acknowledge", "`link/can.py`; the bus is opened anew every second"),
+          "`devices/polled.py`: after two reads, 2 s, neither is believed, as if out of range; until then each is "
+          "judged as it arrives, so the worse one stops: sooner than the catalogue's 5 s"),
+    Entry("B21", "bus off, down, no acknowledge", "`link/can.py`; the bus is reopened every second"),
     Entry("B22", "receive thread dead",
-          "`devices/bus.py` has no thread but its own; if it ends or hangs, the guardian acts as for G2"),
+          "`devices/bus.py` has only its own thread; if that ends or hangs, the guardian acts as for G2"),
     Entry("B23", "BMU frozen", "only while the charge moves something: see below"),
     Entry("B24", "pack collapsed"),
     Entry("B25", "another kind of pack",
-          "volts a cell, SOC and chemistry must agree; the policy says the chemistry"),
+          "volts per cell, SOC and chemistry must agree; the policy sets the chemistry"),
     Entry("B26", "second, different answer to one request",
           "`devices/sdo_client.py`: that field is implausible at once, whichever answer came first"),
     Entry("B27", "another master on the bus"),
@@ -90,23 +91,23 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("G3", "guardian dead", "`service/guarded.py`: the controller stops and ends; `deploy/`: ExecStopPost"),
     Entry("G4", "SIGTERM, shutdown", "`service/supervisor.py`: stops, verifies for 3 s, ends"),
     Entry("G5", "exception in our own code"),
-    Entry("G6", "steps that come late"),
-    Entry("G7", "clock jump, suspended machine", "ages are monotonic: the wall clock may jump as it likes"),
-    Entry("G8", "disk full, log blocked", "charging goes on, and `status` says it; a lost list of latched faults, "
+    Entry("G6", "late decisions"),
+    Entry("G7", "clock jump, suspended machine", "ages are monotonic: jumps of the wall clock do not matter"),
+    Entry("G8", "disk full, log blocked", "charging continues, and `status` says so; a lost list of latched faults, "
           "`service/store.py`, holds every bay"),
     Entry("G9", "two services", "`link/serial.py` (lock of the port), `service/socketfile.py` (socket), "
           "`service/store.py` (state): the second ends"),
-    Entry("G10", "power lost in mid-charge", "`core/persisted.py`: a charge that nobody ended is not resumed"),
+    Entry("G10", "power lost in mid-charge", "`core/persisted.py`: an interrupted charge is not resumed"),
     Entry("P1", "bad policy", "`config/`: refused with every error's line; `run` does not start"),
-    Entry("P2", "policy changed while charging", "read anew on SIGHUP, taken over by a bay when it stands by"),
+    Entry("P2", "policy changed while charging", "reread on SIGHUP, adopted by a bay in standby"),
     Entry("P3", "policy of another battery or charger", "`config/station_rules.py`: station and policy must agree"),
     Entry("P4", "operator's stop, emergency stop", "`core/operator.py`: from any state; `lastresort/estop.py`: alone"),
-    Entry("P5", "start while latched or unknown", "`core/operator.py`: refused, and the cause named"),
+    Entry("P5", "start while latched or unknown", "`core/operator.py`: refused, with the cause"),
     Entry("P6", "resets without a remedy", "`core/operator.py`: the fourth within an hour is refused, with the time"),
     Entry("P7", "control socket: strangers, floods",
-          "`service/control.py`: owner and root only; stops first, 256 clients at once; who is turned away is said"),
+          "`service/control.py`: owner and root only; stops first, 256 clients at once; rejected users are reported"),
     Entry("P8", "pairing not proved", "`service/starts.py`: charges of one station begin one after another"),
-    Entry("P9", "not kept", "`service/store.py`: what must survive and is not on disk after 2 s lets no charge begin"),
+    Entry("P9", "not persisted", "`service/store.py`: a change not on disk after 2 s lets no charge begin"),
     Entry("P10", "bay without its past", "`service/past.py`: held; a person starts it"),
     Entry("P11", "our own exception, again and again",
           "`core/failed.py`: UNCONTROLLABLE after 3 s, like any stop that is not proved"),

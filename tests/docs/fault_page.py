@@ -12,16 +12,16 @@ from tests.docs.catalogue import CATALOGUE
 HEAD = """\
 # Why did it stop?
 
-Every fault that the service knows, as `status`, log and journal name it. The sentence there has the evidence: what was
-seen, the limit, and the line of the file that sets it. This page is made from the fault table itself.
+Every fault that the service knows, as named in `status`, log and journal. The sentence there gives the evidence: what
+was seen, the limit, and the line of the file that sets it. This page is generated from the fault table.
 
 | effect | what happens |
 | --- | --- |
-| WARN | it is said, nothing else |
-| LIMIT | charging goes on, on the lowest current step |
-| NO_START | a charge that runs goes on, none begins |
-| PAUSE | charging stops, and goes on by itself |
-| STOP | charging stops; how it goes on, says the last column |
+| WARN | it is reported, nothing else |
+| LIMIT | charging continues, on the lowest current step |
+| NO_START | a running charge continues, none begins |
+| PAUSE | charging stops, and resumes by itself |
+| STOP | charging stops; the last column says how it resumes |
 | TRIP | charging stops, and the bay stays stopped until a person resets and then starts it |
 
 What `status` says of a fault is in the tense that is true. While it is there: the evidence as it is now, since when,
@@ -34,33 +34,34 @@ first.
 Of several faults the one with the worst effect is told first, and of those with the same effect the most dangerous one,
 however old it is. The table below is in this order.
 
-No fault waits for its condition to last without a break: the time that it was seen for drains at a quarter of its speed
-while it is away. And no word counts alone where a second witness can be heard: what the charger says and what the BMU
-says are held against each other in every state, and the sentence names the one that is likelier wrong.
+No fault requires its condition to last without interruption: while the condition is absent, its accumulated time
+drains at a quarter of the speed. And no reading counts alone if a second witness can be heard: the charger's readings
+are checked against the BMU's in every state, and the sentence names the device more likely to be wrong.
 
 """
 NUMBERS = """
 ## By the numbers of the catalogue
 
-The faults that this service must handle: C of the charger, B of battery and bus, G of the gateway, P of policies and
-people. The code refers to them as FAULTS C1. A row is named where one sees the fault; the last column says what else is
-done, or where it is handled.
+The faults that this service must handle: C for the charger, B for battery and bus, G for the gateway, P for policies
+and people. The code refers to them as FAULTS C1. The rows are the faults that report it; the last column says what
+else is done, or where it is handled.
 
 """
 STUCK = """
-## A temperature sensor that is stuck
+## A stuck temperature sensor
 
-One that says what cannot be (a value at or beyond its ends, a jump of 5 K in a second, nothing) stops every charge. One
-that goes on saying a plausible temperature is not found, because no rule would tell it from a good one:
+A sensor with an implausible reading (a value at or beyond its range, a jump of 5 K in a second, no value) stops every
+charge. A sensor that keeps reporting a plausible temperature is not detected, because no rule can tell it from a
+good one:
 
-- A pack in a hall that keeps its temperature, charged gently, need not warm by the sensor's 0.1 °C for hours.
-- More current does not change that for sure. The loss in the cells' resistance warms them, but the reaction itself
-  takes up heat in part of the charge, of the same size at moderate currents: the two may cancel for an hour.
-- What the pack's resistance and heat capacity are, from which a rise could be expected, nobody tells us.
+- A gently charged pack in a hall at constant temperature need not warm by the sensor's 0.1 °C for hours.
+- More current does not reliably change that. The loss in the cells' resistance warms them, but during part of the
+  charge the reaction itself absorbs about as much heat at moderate currents: the two may cancel for an hour.
+- The pack's resistance and heat capacity, from which to predict a rise, are unknown.
 
-A rule that stops good charges is switched off by the people who have to live with it. What is left: the BMU's own
-high-temperature bit, its own protection below all of this, and current steps that suit the pack. A BMU of which *every*
-word stands still while a charge goes in is found (`bmu_frozen`).
+People switch off a rule that stops good charges. What remains: the BMU's own high-temperature bit, its own protection
+below all of this, and current steps that suit the pack. A BMU whose words *all* stand still while a charge flows in is
+detected (`bmu_frozen`).
 """
 HOT, WAS_HOT = (
     Cause.of("over_temperature", place="policy.yaml:12", pack_c=pack_c, limit_c=45, again_c=40)
@@ -148,7 +149,7 @@ def _end(row: Row) -> str:
     if row.clear is Clear.AUTO:
         return f"by itself, {row.clean_s:g} s after it has gone"
     gone = f" for {row.clean_s:g} s" if row.clean_s else ""
-    departs = "; also when the battery has left" if row.departs else ""
+    departs = "; also when the battery is removed" if row.departs else ""
     counts = "; until when it counts, `status` says" if row.until else ""
     return ENDS[row.clear].replace("has gone,", f"has gone{gone},") + departs + counts
 

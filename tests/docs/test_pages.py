@@ -1,4 +1,4 @@
-"""Pages that are made from the code are as the code is."""
+"""Generated pages match the code."""
 
 import re
 from pathlib import Path
@@ -29,7 +29,7 @@ def test_the_picture_in_the_readme_is_the_machine() -> None:
     assert f"```mermaid\n{mermaid(diagram())}```" in written, "orchestrator diagram"
 
 
-#: The catalogue, by its numbers.
+#: The numbers of the catalogue.
 NUMBERS = [
     *(f"C{number}" for number in range(1, 32)),
     *(f"B{number}" for number in range(1, 29)),

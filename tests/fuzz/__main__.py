@@ -1,8 +1,8 @@
-"""The long form: `make fuzz ARGS='charger --runs 1000000'`. What finds something is written to a file.
+"""The long form: `make fuzz ARGS='charger --runs 1000000'`. Inputs with findings are written to files.
 
-First atheris looks for inputs that reach new code, which costs ten times the time of the code itself; then those inputs
-are changed, without looking, until the number is reached. `make fuzz ARGS='charger FILE…'` gives files to the target
-again; a directory stands for the files in it.
+First atheris looks for inputs that reach new code, at ten times the cost of the code itself; then those inputs are
+mutated blindly until the number is reached. `make fuzz ARGS='charger FILE…'` gives files to the target again; a
+directory stands for the files in it.
 """
 
 import argparse
@@ -30,13 +30,13 @@ from tests.proof.report import say
 NAMES = ("charger", "bmu", "config", "control", "clients", "kept", "guardian")
 ROOT = Path(__file__).resolve().parent.parent.parent
 WORK = ROOT / "build" / "fuzz"
-#: After this an input hangs, even on a machine that stood still. What computes for ever is noticed sooner (`Watch`).
+#: After this an input counts as hanging, even on a stalled machine. Endless computing is noticed sooner (`Watch`).
 TIMEOUT_S = 600
-#: MiB that the whole process may have; Python, coverage and corpus are in it.
+#: MiB allowed for the whole process, with Python, coverage and corpus.
 RSS_MIB = 512
 
 
-#: What both parts say at their end, in libFuzzer's words or ours.
+#: The last line of either part, libFuzzer's or ours.
 INPUTS, PEAK_MIB = re.compile(r"(?:units|inputs): +(\d+)"), re.compile(r"peak(?:_rss_mb)?: +(\d+)")
 
 
@@ -45,11 +45,11 @@ def the_target(name: str) -> Target:
     return found
 
 
-# --- in a process of its own: one of these ---------------------------------------------------------------------------
+# --- each of these runs in its own process ---------------------------------------------------------------------------
 
 
 def guided(name: str, runs: int, minutes: float, seed: int) -> None:
-    """Inputs by atheris, each one that reaches new code is kept. libFuzzer ends the process."""
+    """Inputs by atheris; each one reaching new code is kept. libFuzzer ends the process."""
     atheris: Any = import_module("atheris")  # only `make fuzz` installs it
     with atheris.instrument_imports(include=["orchestrator"]):
         target = the_target(name)
@@ -70,7 +70,7 @@ def guided(name: str, runs: int, minutes: float, seed: int) -> None:
 
 
 def unguided(name: str, runs: int, minutes: float, seed: int) -> int:
-    """Changed inputs of the corpus, at the product's own speed."""
+    """Mutated inputs of the corpus, at full speed."""
     target, random = the_target(name), Random(seed)
     watch, known = Watch(target), [path.read_bytes() for path in sorted(corpus(name).iterdir())]
     signal.signal(signal.SIGALRM, _waits)
@@ -80,7 +80,7 @@ def unguided(name: str, runs: int, minutes: float, seed: int) -> int:
         signal.alarm(TIMEOUT_S)
         try:
             watch.one(data)
-        except Exception:  # noqa: BLE001 - whatever it is, it is what was looked for
+        except Exception:  # noqa: BLE001 - any exception is a finding
             found = WORK / name / f"crash-{sha1(data).hexdigest()}"
             found.write_bytes(data)
             say(f"{traceback.format_exc()}in {found}")
@@ -96,7 +96,7 @@ def _waits(_number: int, _frame: FrameType | None) -> None:
 
 
 def replay(name: str, paths: Sequence[Path]) -> int:
-    """Each file once more; the first that finds something ends it with its traceback."""
+    """Each file once more; the first with a finding ends the run with its traceback."""
     watch = Watch(the_target(name))
     for path in _files(paths):
         watch.one(path.read_bytes())
@@ -113,12 +113,12 @@ def _files(paths: Sequence[Path]) -> Iterator[Path]:
 
 
 def corpus(name: str) -> Path:
-    """Where the inputs lie that reach something."""
+    """The directory of the inputs worth keeping."""
     return WORK / name / "corpus"
 
 
 def long_form(name: str, runs: int, guided_runs: int, minutes: float, seed: int) -> int:
-    """Both parts for one target, and what its inputs have reached; 1 if something was found."""
+    """Both parts for one target, then its coverage; 1 if something was found."""
     corpus(name).mkdir(parents=True, exist_ok=True)
     for number, data in enumerate(the_target(name).seeds):
         (corpus(name) / f"seed-{number:03}").write_bytes(data)
@@ -134,7 +134,7 @@ def long_form(name: str, runs: int, guided_runs: int, minutes: float, seed: int)
 
 def _part(name: str, how: str, runs: int, minutes: float, seed: int) -> int:
     log, began_s = WORK / name / f"{how}.log", time.monotonic()
-    # libFuzzer ends its process at once, so what the targets write goes with this directory.
+    # libFuzzer ends its process at once; this directory, removed here, takes what the targets write.
     with log.open("wb") as file, TemporaryDirectory(prefix="fuzz-", dir=MEMORY) as directory:
         command = [sys.executable, "-m", "tests.fuzz", name, "--how", how, f"--runs={runs}"]
         command += [f"--minutes={minutes}", f"--seed={seed}"]
@@ -152,7 +152,7 @@ def _part(name: str, how: str, runs: int, minutes: float, seed: int) -> int:
 
 
 def _covered(name: str) -> None:
-    """Lines and branches of the product, by the corpus alone."""
+    """Line and branch coverage of the product by the corpus alone."""
     data = f"--data-file={WORK / name / 'coverage'}"
     coverage, quiet = [sys.executable, "-m", "coverage"], subprocess.DEVNULL
     again = ["--branch", "-m", "tests.fuzz", name, str(corpus(name))]

@@ -1,4 +1,4 @@
-"""The CAN bus: any frames with a BMU's ids, at any time, between what the node asks for."""
+"""The CAN bus: any frames with a BMU's ids, at any time, between the node's requests."""
 
 from orchestrator.config.load import load_map
 from orchestrator.devices.other_masters import MOST_OPEN
@@ -11,20 +11,20 @@ from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, NODE_ID, REPLY, REQUES
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records
 from tests.protocol.vectors import BMU
 
-#: What an event is: a frame on one of some ids, an answer to the newest request, time, trouble with the bus, and bytes
-#: for the parsers that are not the node's.
+#: Events: a frame on one of several ids, an answer to the newest request, time, trouble with the bus, and bytes
+#: for parsers outside the node.
 SDO, HEART, EMCY, ELSE, ANSWER, PAUSE, TROUBLE, PARSE = range(8)
-#: By the first byte of ELSE: a TPDO, a request or an NMT command of another master.
+#: Chosen by the first byte of ELSE: a TPDO, or another master's request or NMT command.
 ELSE_COB_IDS = (0x190, 0x290, 0x390, REQUEST, NMT_COB_ID)
 OTHERS, NMT = b"\3", b"\4"
 COMMANDS = (0x43, 0x43, 0x4B, 0x4F, 0x60, 0x80, 0x41, 0xFF)
-#: Of another master: reads, writes, aborts, segments and blocks.
+#: From another master: reads, writes, aborts, segments and blocks.
 REQUESTS = (
     "4000600000000000", "2b17100088130000", "8000600000000405", "6000000000000000", "a00060007f000000",
     "a300000000000000", "c200600004000000", "0100000000000000", "40081000", "2b00180564000000",
 )  # fmt: skip
 MAPS = (load_map("tabos"), load_map("tabos-lsb"))
-#: By the first byte of an input: heartbeat and TPDO periods, and the map.
+#: Chosen by an input's first byte: heartbeat and TPDO periods, and the map.
 CONFIGS = tuple(
     config(heartbeat_s=heartbeat_s, tpdo_s=tpdo_s, object_map=object_map)
     for heartbeat_s in (None, 0.5)
@@ -32,11 +32,11 @@ CONFIGS = tuple(
     for object_map in MAPS
 )
 MAX_EVENTS = 16
-MAX_TEXT = 300  #: characters of anything that is said of a battery
+MAX_TEXT = 300  #: characters in any message about a battery
 
 
 class Session:
-    """A node on a bench and the time; each event may be hostile."""
+    """A node on a bench, and a clock; each event may be hostile."""
 
     def __init__(self, choice: int) -> None:
         settings = CONFIGS[choice % len(CONFIGS)]
@@ -47,7 +47,7 @@ class Session:
         self._keys = len(self._objects) + 1 + len(settings.map.tpdos)  # all that can be asked for
 
     def event(self, kind: int, content: bytes) -> None:
-        """Whatever happens next on the bus."""
+        """The next event on the bus."""
         bench = self.bench
         if kind == PAUSE:
             bench.run(content[0] / 100 if content else 0.02)
@@ -64,7 +64,7 @@ class Session:
         self._is_honest()
 
     def _answer(self, content: bytes) -> None:
-        """To the newest request, or to the next one: right by its form, but for what the content makes of it."""
+        """An answer to the newest request or the next one: well-formed, except where the content breaks it."""
         self.bench.step(self.bench.now_s + 0.6)
         asked = [data for cob_id, data in self.bench.sent[-1:] if cob_id == REQUEST]
         command = COMMANDS[content[0] % len(COMMANDS)] if content else 0x43
@@ -74,7 +74,7 @@ class Session:
             self._frame(REPLY, bytes((command,)) + data[1:4] + content[1:5].ljust(4, b"\0"))
 
     def _frame(self, cob_id: int, data: bytes) -> None:
-        if cob_id in self.bench.node.cob_ids:  # the bus hands on no other
+        if cob_id in self.bench.node.cob_ids:  # the bus passes on no others
             self.bench.node.on_frame(cob_id, data, self.bench.now_s)
         elif cob_id == NMT_COB_ID:
             self.bench.node.on_nmt(data, self.bench.now_s)
@@ -89,7 +89,7 @@ class Session:
                 assert not isinstance(value, Measurement) or value.value in self._ranges[name]
 
     def _is_honest(self) -> None:
-        """What is shown is in range and of the past; nothing grows; nothing is sent but to this node."""
+        """Readings are in range and in the past; nothing grows; every frame goes to this node."""
         bench, link = self.bench, self.bench.link
         assert len(bench.node._client._answers) <= self._keys
         assert len(bench.node._others._open) <= MOST_OPEN
@@ -115,7 +115,7 @@ class Session:
 
 
 def one(data: bytes) -> None:
-    """Some seconds with one BMU."""
+    """A few seconds with one BMU."""
     session = Session(data[0] if data else 0)
     for number, (kind, content) in enumerate(records(data[1:])):
         session.event(kind, content)

@@ -1,4 +1,4 @@
-"""The charger's line: any bytes in any pieces, between questions and the end of their time."""
+"""The charger's line: any bytes in any pieces, between requests and their deadlines."""
 
 from contextlib import suppress
 
@@ -12,12 +12,12 @@ from tests.fuzz.target import Target, cut_records, kind_of_record, record, recor
 from tests.protocol.reference import frames_in, good_frame_at
 from tests.protocol.vectors import CHARGER
 
-#: What an event is: bytes as they are, the same with all that makes a frame around them, a question, the end of its
-#: time, a status reply, an error frame, an answer to the emergency stop's question, and one to a request of any kinds.
+#: Events: raw bytes, the same bytes framed, a request, its
+#: deadline, a status reply, an error frame, an answer to the emergency stop's poll, and one to a request of any kind.
 HEAR, FRAMED, ASK, GIVE_UP, STATUS, ERROR, STANDBY, KINDS = range(8)
 HEADS = {STATUS: b"\x03\x90", ERROR: b"\x1f", STANDBY: b"\x03\x90", KINDS: b"\x03\x90", FRAMED: b"", HEAR: b""}
 POLL_S = 0.2
-MAX_REASON = 300  #: characters about one broken frame
+MAX_REASON = 300  #: characters in the message about a broken frame
 
 
 def framed(command_order_data: bytes) -> bytes:
@@ -27,7 +27,7 @@ def framed(command_order_data: bytes) -> bytes:
 
 
 class Session:
-    """A dialogue, and beside it a decoder whose whole stream a second one, written from the document, reads again."""
+    """A dialogue, and a decoder whose whole stream is decoded again by one written from the document."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -38,7 +38,7 @@ class Session:
         self.found: list[bytes] = []
 
     def event(self, kind: int, content: bytes) -> None:
-        """Whatever happens next on the line."""
+        """The next event on the line."""
         if kind == ASK:
             self.now_s += POLL_S
             self.asked_s = self.now_s
@@ -79,7 +79,7 @@ class Session:
                 parse_status(frame, (self.kinds[0] | 0x13, self.kinds[1] | 0x1F), self.now_s)
 
     def _is_honest(self, reading: ChargerReading | None) -> None:
-        """A reading is of the time of its question, with a value or a complaint for each field."""
+        """A reading has its request's time, and a value or a complaint for each field."""
         link = self.dialogue
         assert 0 <= link.missing <= MAX_FRAME and link.heard in SILENCE
         if reading is not None:
@@ -89,7 +89,7 @@ class Session:
             self.asked_s = None
 
     def end(self) -> None:
-        """The line has fallen quiet."""
+        """The line has gone quiet."""
         self._parse(self.decoder.flush())
         assert self.found == frames_in(self.stream)
         assert not self.decoder._pending
@@ -99,7 +99,7 @@ class Session:
 
 
 def _standby(stream: bytes) -> bool | None:
-    """The same as `stands_by`, from the document: wherever a good answer begins, the last one counts."""
+    """`stands_by` written from the document: a good answer may begin anywhere, and the last one counts."""
     said, at = None, stream.find(b"\xaf\xfa")
     while at >= 0:
         if good_frame_at(stream, at) == ANSWER_BYTES and stream[at + 4 : at + 6] == b"\x03\x90":
@@ -122,7 +122,7 @@ def one(data: bytes) -> None:
 
 
 def _story(wire: bytes) -> bytes:
-    """Asked, then the bytes of one golden frame, then time is up."""
+    """A request, the bytes of one golden frame, and the deadline."""
     parts = b"".join(record(HEAR, wire[at : at + 31]) for at in range(0, len(wire), 31))
     return record(ASK) + parts + record(GIVE_UP)
 

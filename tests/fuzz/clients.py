@@ -1,6 +1,6 @@
-"""The control socket itself, with a crowd at it: clients that say half of something, hear nothing, leave, or stay.
+"""The control socket itself, with a crowd of clients: half-sent requests, no reading, leaving, or staying.
 
-After each story an honest client asks for the status, and must be answered.
+After each story an honest client asks for the status and must get an answer.
 """
 
 import json
@@ -20,15 +20,15 @@ from tests.fuzz.control import BAYS, LOOP, SUPERVISOR
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records, scratch
 from tests.waiting import wait_until
 
-#: What an event is: another client, bytes from it, a whole request, an end of its words, its end, a look at its answer,
+#: Events: another client, bytes from it, a whole request, a half-close, a close, a read of its answer,
 #: another client's turn, and an honest client in between.
 COME, SAY, ASK, END_WORDS, LEAVE, HEAR, TURN, HONEST = range(8)
 REQUESTS = [json.dumps({"verb": verb}).encode() + b"\n" for verb in ("status", *Request)]
-LONG = b'{"verb": "' + b"x" * client.MAX_REQUEST  # more than a request may have, and no end
+LONG = b'{"verb": "' + b"x" * client.MAX_REQUEST  # longer than a request may be, and without an end
 MAX_CLIENTS = 8
 MAX_EVENTS = 24
-CLIENT_S = 0.005  #: instead of 1 s: how long each of these can hold the others up
-ANSWER_S = 60.0  #: for an honest client, on a machine that may stand still
+CLIENT_S = 0.005  #: instead of 1 s: how long each of these can delay the others
+ANSWER_S = 60.0  #: for an honest client, on a machine that may stall
 
 
 def _handle(request: dict[str, object]) -> reception.Answer | reception.Later:
@@ -42,14 +42,14 @@ SOCKET.start()
 
 
 class Crowd:
-    """Some clients, of which one has its turn."""
+    """Several clients, acting in turn."""
 
     def __init__(self, end: ExitStack) -> None:
         self._end = end
         self._clients: list[socket.socket] = []
 
     def event(self, kind: int, content: bytes) -> None:
-        """Whatever one of them does next; what the service does not let it do, it does not do."""
+        """One client's next action; what the service refuses is skipped."""
         if kind == HONEST:
             is_answered()
         elif kind == COME or not self._clients:
@@ -81,7 +81,7 @@ class Crowd:
 
 
 def is_answered() -> None:
-    """Whoever asks properly hears what every bay does; asks again if it was too slow for the short time here."""
+    """A proper request is answered for every bay; retried if the machine is too slow for the short deadlines here."""
     end_s = monotonic() + ANSWER_S
     while True:
         try:
@@ -94,7 +94,7 @@ def is_answered() -> None:
 
 
 def one(data: bytes) -> None:
-    """One story with its crowd."""
+    """One story with a crowd."""
     before = _descriptors()
     with patch.object(client, "CLIENT_S", CLIENT_S):
         with ExitStack() as end:

@@ -1,4 +1,4 @@
-"""Files that a person wrote: whatever is in them, the answer is a finding that can be printed, or a good record."""
+"""Hand-written files: whatever is in them, the result is a printable finding or a valid record."""
 
 import os
 import re
@@ -17,11 +17,11 @@ from orchestrator.errors import ConfigError, Finding
 from tests.fuzz.target import Target, kind_of_word, scratch
 
 MAX_TEXT = 6000  #: characters of a finding: room for a path of 4096 bytes, and all keys of a record
-#: A token of our files: a comment, a text in quotes, a word or number, one character, an indented line's beginning.
+#: A token of our files: a comment, a quoted string, a word or number, one character, an indentation.
 TOKEN = re.compile(rb"\n *(?:- )?|#[^\n]*|\"[^\"\n]*\"|'[^'\n]*'|[\w./-]+|.", re.DOTALL)
 
 
-#: One of each kind, as short as can be: what is small is quick, and the parts that may be left out are among the words.
+#: One of each kind, as short as possible: small is quick, and the optional parts are among the words.
 STATION = b"""station: s
 can: {can0: {interface: virtual, channel: c}}
 bays:
@@ -70,12 +70,12 @@ for name, text in (("policy.yaml", POLICY), ("map.yaml", MAP)):
     (DIRECTORY / name).write_bytes(text)
 
 
-#: The same bytes are parsed once, whoever reads them.
+#: The same bytes are parsed only once for all readers.
 parse = lru_cache(maxsize=16)(tree.parse)
 
 
 def one(data: bytes) -> None:
-    """`check`, `load_…` and the emergency stop's own reading of one file."""
+    """`check`, `load_…` and the emergency stop's own reader on one file."""
     FILE.write_bytes(data)
     with patch.object(load, "parse", parse), patch.object(ports, "parse", parse):
         _read(data)
@@ -93,7 +93,7 @@ def _read(data: bytes) -> None:
     found = ports.wiring(FILE)
     assert b"\0" not in os.fsencode("".join(found.ports) + found.socket), "no system call takes that"
     for record in loaded:
-        # More may look like a port, as in `port: /dev/my port`; too many are tried, and none is forgotten.
+        # More may look like a port, as in `port: /dev/my port`: trying too many is fine, missing one is not.
         assert not isinstance(record, Station) or {bay.name for bay in record.bays} <= set(found.ports.values())
 
 
@@ -108,7 +108,7 @@ def _loaded(loader: Callable[[Path], object], lines: list[bytes]) -> object:
 
 
 def _is_shown_well(finding: Finding, lines: list[bytes]) -> None:
-    """FILE:LINE:COLUMN: error: one line that any terminal takes, at a place that is there."""
+    """FILE:LINE:COLUMN: error: one line, printable on any terminal, with an existing position."""
     shown = str(finding)
     assert re.match(re.escape(finding.file) + r":[1-9]\d*:[1-9]\d*: error: .", shown), shown
     assert "\n" not in shown and shown.isprintable(), ascii(shown)
@@ -139,5 +139,5 @@ TARGET = Target(
     ["orchestrator/config/*"],
     max_bytes=800,
     limit_s=2.0,
-    blind=0.1,  # most of these are no YAML at all
+    blind=0.1,  # most of these are not YAML
 )  # fmt: skip

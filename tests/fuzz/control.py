@@ -1,4 +1,4 @@
-"""The control socket: any bytes from a client, to the service's own handler, with the answer as it goes back."""
+"""The control socket: any bytes from a client to the service's own handler, and the answer as sent."""
 
 import json
 import re
@@ -16,7 +16,7 @@ from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz.target import Target, kind_of_word, scratch
 
-#: Of an answer: two bays' status, or an error with a name of as many bytes as a request may have, escaped.
+#: The longest answer: two bays' status, or an error quoting a name as long as a request, escaped.
 MAX_ANSWER = 32 * 1024
 BAYS = ("bay-1", "bay-2")
 STATION = """
@@ -35,7 +35,7 @@ BAY = (
 
 
 class Loop:
-    """The control loop and its queue: within one turn a bay takes one step, however often it has news."""
+    """The control loop and its queue: one decision per bay and turn, however many reports arrive."""
 
     def __init__(self, supervisor: Supervisor) -> None:
         self._supervisor = supervisor
@@ -45,17 +45,17 @@ class Loop:
         if number not in self.stepped:
             self.stepped.add(number)
             self._supervisor._bays[number].run(monotonic())
-            self._supervisor._bays[number].answer()  # there is no disk behind it to wait for
+            self._supervisor._bays[number].answer()  # no disk to wait for
 
 
 def _service() -> tuple[Supervisor, Loop]:
-    """A service whose threads do not run: its devices are silent, and its answers are its own."""
+    """A service without running threads: silent devices, real answers."""
     directory = scratch()
     bays = "\n  - ".join(BAY % (name, name, 16 + number) for number, name in enumerate(BAYS))
     (directory / "station.yaml").write_text(STATION.replace("&", bays), encoding="utf-8")
     ours, _theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     supervisor = Supervisor(load_station(directory / "station.yaml"), GuardianLink(ours.detach()))
-    supervisor._store.kept_revision = sys.maxsize  # the disk takes everything at once
+    supervisor._store.kept_revision = sys.maxsize  # the disk is instantaneous
     loop = Loop(supervisor)
     supervisor._handler._wake = loop.put
     return supervisor, loop
@@ -87,7 +87,7 @@ def one(data: bytes) -> None:
 
 
 def _answered(ours: socket.socket, theirs: socket.socket) -> bytes:
-    """What the control socket's turns make of it."""
+    """The answer after the control socket's turns."""
     server = SUPERVISOR._control
     one = client.Client(ours, monotonic())
     server._clients.add(one)

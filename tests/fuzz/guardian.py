@@ -1,4 +1,4 @@
-"""The guardian's messages, from a controller that is dying and says anything, and the ports that it is left with."""
+"""The guardian's messages from a dying controller that may send anything, and the ports it is left with."""
 
 import os
 import socket
@@ -12,12 +12,12 @@ from orchestrator.lastresort import bareport, guardian
 from orchestrator.lastresort.guardian import BEAT, DONE, DROP, MESSAGE, PORT, Guardian
 from tests.fuzz.target import Target, cut_records, kind_of_record, record, records, scratch
 
-#: What an event is: any message without and with a descriptor, a port's name with one, with three and without, a port
-#: that is given up, a heartbeat, the end.
+#: Events: any message with or without a descriptor, a port's name with one, three or no descriptors, a port
+#: given up, a heartbeat, the end.
 RAW, RAW_FD, HOLD, HOLD_3, NAME, GIVE_UP, LIVE, END = range(8)
 BEGINS = {HOLD: PORT, HOLD_3: PORT, NAME: PORT, GIVE_UP: DROP, LIVE: BEAT, END: DONE, RAW: b"", RAW_FD: b""}
 DESCRIPTORS = {RAW_FD: 1, HOLD: 1, HOLD_3: 3}
-#: Names are taken for files of this directory, and none is there.
+#: Names count as files of this empty directory.
 DIRECTORY = bytes(scratch()) + b"/"
 NULL = os.open(os.devnull, os.O_RDWR)
 
@@ -27,7 +27,7 @@ def one(data: bytes) -> None:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     before = _descriptors()
     watched = Guardian(os.getpid(), ours)
-    with ours, theirs, patch.object(guardian, "aside", lambda work: work()):  # no thread each time
+    with ours, theirs, patch.object(guardian, "aside", lambda work: work()):  # without a thread for each run
         for kind, content in records(data):
             _send(theirs, kind, content)
             assert watched._message() or (kind in (RAW, RAW_FD) and not content)

@@ -1,4 +1,4 @@
-"""The files of what outlives the process, after whatever a disk or a person has done to them."""
+"""The files of the persisted state, after whatever a disk or a person has done to them."""
 
 import json
 
@@ -21,7 +21,7 @@ NOW = Stamp(1_800_000_000.0, NOW_S, "this")
 
 
 def one(data: bytes) -> None:
-    """What a service makes of this file when it starts, in either format, and what it writes down and shows of it."""
+    """Start a service on this file, in either format, and check what it writes and shows."""
     for name in (FILE, FIRST_FILE):
         (DIRECTORY / name).write_bytes(data)
         loaded = load(DIRECTORY, PLACES, NOW)
@@ -38,7 +38,7 @@ def one(data: bytes) -> None:
 
 
 def _is_no_free_start(persisted: Persisted, memory: Memory) -> None:
-    """What was latched or held is so again."""
+    """What was latched or held is latched or held again."""
     assert type(memory.operator.paused) is bool and isinstance(memory.operator.hold, Cause | None)
     for name in persisted.faults:
         assert name in memory.faults if name in ROW else memory.operator.hold

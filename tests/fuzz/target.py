@@ -1,7 +1,7 @@
-"""What a fuzz target is, and how its inputs are made: from good ones, changed piece by piece.
+"""Fuzz targets and their inputs: good ones, mutated piece by piece.
 
-An input is bytes, whatever the target makes of them, so that a crash is a file. The same inputs come from hypothesis in
-`make test` and from atheris, which looks at the coverage, in `make fuzz`.
+An input is bytes for every target, so a crash is a file. The same inputs come from hypothesis in `make test` and from
+atheris, guided by coverage, in `make fuzz`.
 """
 
 import re
@@ -12,40 +12,40 @@ from functools import cache
 from pathlib import Path
 from random import Random
 
-#: Of all changes, the share that puts one piece in the place of another of its kind: what is changed stays well-formed.
+#: The share of mutations that replace a piece by another of its kind, so the result stays well-formed.
 ALIKE = 0.75
-TRIES = 4  #: to find a piece that has others of its kind: most characters have none
+TRIES = 4  #: attempts to find a piece with others of its kind: most characters have none
 
 Cut = Callable[[bytes], list[bytes]]
 
-#: Where files are in memory, if there is such a place.
+#: A file system in memory, if there is one.
 MEMORY = "/dev/shm" if Path("/dev/shm").is_dir() else None
 _SCRATCH: list[tempfile.TemporaryDirectory[str]] = []
 
 
 def scratch() -> Path:
-    """A directory that goes with the process."""
+    """A directory removed at the end of the process."""
     _SCRATCH.append(tempfile.TemporaryDirectory(prefix="fuzz-"))
     return Path(_SCRATCH[-1].name)
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """One door through which foreign bytes come in."""
+    """One entry point for foreign bytes."""
 
-    one: Callable[[bytes], None]  #: deals with one input; raises whatever must not happen
-    cut: Cut  #: an input into pieces that mean something each
-    kind: Callable[[bytes], object]  #: of a piece; another of its kind may stand in its place
-    seeds: Sequence[bytes]  #: good inputs to begin with
+    one: Callable[[bytes], None]  #: handles one input; raises on whatever must not happen
+    cut: Cut  #: splits an input into meaningful pieces
+    kind: Callable[[bytes], object]  #: of a piece; another of the same kind may replace it
+    seeds: Sequence[bytes]  #: good inputs to start from
     words: Sequence[bytes]  #: pieces that lead somewhere
     modules: Sequence[str]  #: whose coverage is reported
     max_bytes: int  #: of an input
-    limit_s: float  #: CPU time that an input may take at most, on a slow machine
-    blind: float = 0.3  #: share of inputs that the fuzzer changes without knowing the pieces
+    limit_s: float  #: maximum CPU time per input on a slow machine
+    blind: float = 0.3  #: share of inputs the fuzzer mutates without knowing the pieces
 
 
 def records(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """A story, for what is not one message: a kind (0 … 7) and up to 31 bytes for each event."""
+    """A story, where one message is not enough: a kind (0 … 7) and up to 31 bytes per event."""
     at = 0
     while at < len(data):
         end = at + 1 + (data[at] & 0x1F)
@@ -70,7 +70,7 @@ def kind_of_record(piece: bytes) -> object:
 
 
 def kind_of_word(token: bytes) -> object:
-    """Numbers are alike, names of files are, other words and texts are; each other character is like itself."""
+    """All numbers are one kind, as are file names, and other words and strings; any other character is its own kind."""
     if not re.match(rb"[\w\"'./+-]", token):
         return token[:1]
     if b"/" in token or b".yaml" in token:
@@ -79,7 +79,7 @@ def kind_of_word(token: bytes) -> object:
 
 
 def changed(target: Target, data: bytes, random: Random) -> bytes:
-    """The input with some of its pieces changed."""
+    """The input with some pieces mutated."""
     pieces = target.cut(data) or [b""]
     for _ in range(random.choice((1, 1, 1, 2, 4))):
         _change(target, pieces, random)
@@ -120,7 +120,7 @@ def _cut(cut: Cut, seed: bytes) -> list[bytes]:
 
 @cache
 def _by_kind(target: Target) -> dict[object, list[bytes]]:
-    """Every different piece of its seeds and words, by its kind."""
+    """Every distinct piece of its seeds and words, by kind."""
     found: dict[object, list[bytes]] = {}
     for piece in dict.fromkeys(piece for source in (*target.seeds, *target.words) for piece in target.cut(source)):
         found.setdefault(target.kind(piece), []).append(piece)
@@ -128,7 +128,7 @@ def _by_kind(target: Target) -> dict[object, list[bytes]]:
 
 
 def _damaged(piece: bytes, random: Random) -> bytes:
-    """One byte changed, added or taken away."""
+    """One byte changed, added or removed."""
     at = random.randrange(len(piece) + 1)
     byte = bytes((random.choice((0, 0xFF, 0x7F, 0x80, random.randrange(256))),))
     return piece[:at] + random.choice((byte, b"", byte + piece[at : at + 1])) + piece[at + 1 :]

@@ -1,4 +1,4 @@
-"""Every target in its short form: good inputs and many changed ones, the same each time; and bugs that it must see."""
+"""The short form of every target: good inputs and many mutated ones, reproducibly; and bugs it must find."""
 
 import json
 import os
@@ -39,11 +39,11 @@ Bug = Callable[[Patch], None]
 
 
 EXAMPLES = 1000  #: of each target, about two seconds
-SLOW = {"clients": 100, "kept": 500}  #: fewer of these: they wait for one another, or for a disk
+SLOW = {"clients": 100, "kept": 500}  #: fewer of these: they wait for each other or for a disk
 
 
 def inputs(target: Target) -> st.SearchStrategy[bytes]:
-    """A good one, changed up to three times, by numbers that become fewer for a smaller example; or any bytes."""
+    """A good input mutated up to three times, driven by numbers that shrink to smaller examples; or any bytes."""
     few = st.lists(st.integers(0, 2**32), max_size=3)
 
     def from_seed(seed: bytes, chances: Sequence[int]) -> bytes:
@@ -53,7 +53,7 @@ def inputs(target: Target) -> st.SearchStrategy[bytes]:
 
 
 def play(target: Target, phases: Sequence[Phase] = (Phase.generate, Phase.shrink), examples: int = EXAMPLES) -> None:
-    """The short form; raises what it finds."""
+    """The short form; raises its finding."""
     watch = Watch(target)
     for seed in target.seeds:
         watch.one(seed)
@@ -71,7 +71,7 @@ def test_nothing_is_found(name: str) -> None:
     play(the_target(name), examples=SLOW.get(name, EXAMPLES))
 
 
-#: Target and input: each has found something once.
+#: Target and input: each once found a bug.
 ONCE = (
     ("config", b'%YAML 1.' + b"1" * 5000 + b"\n---\npolicy: p\n"),
     ("config", b'policy: "\\UFFFFFFFF"\n'),
@@ -193,7 +193,7 @@ def any_name(patch: Patch) -> None:
     patch.setattr(bareport, "open_port", lambda name, leave_held: os.open(name, os.O_RDWR))
 
 
-#: Target → what somebody might get wrong there.
+#: Target → a plausible bug there.
 BUGS: dict[str, tuple[Bug, ...]] = {
     "charger": (no_checksum, waits_for_ever, any_error_frame, much_is_standby),
     "bmu": (any_range, remembers_all, short_emergency, asks_for_ever),
@@ -209,7 +209,7 @@ EACH = [(name, bug) for name, bugs in BUGS.items() for bug in bugs]
 @pytest.mark.parametrize(("name", "bug"), EACH, ids=lambda value: getattr(value, "__name__", value))
 def test_a_bug_is_seen(name: str, bug: Bug, monkeypatch: Patch) -> None:
     bug(monkeypatch)
-    with pytest.raises((Exception, ExceptionGroup)):  # whatever a bug comes to
+    with pytest.raises((Exception, ExceptionGroup)):  # any symptom of a bug
         play(replace(the_target(name), limit_s=0.5), [Phase.generate])
 
 

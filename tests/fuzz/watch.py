@@ -1,4 +1,4 @@
-"""What every target is held to: no exception, no long thought, no growing memory."""
+"""Requirements for every target: no exception, no long computation, no growing memory."""
 
 import signal
 from pathlib import Path
@@ -7,23 +7,23 @@ from types import FrameType
 
 from tests.fuzz.target import Target
 
-WARM = 10_000  #: inputs after which all caches are full and every line has been reached that is reached often
+WARM = 10_000  #: inputs until all caches are full and all common lines have been reached
 EVERY = 5_000
-#: More resident memory than after WARM inputs. The fuzzer's own growing corpus is in it, too.
+#: Allowed growth of resident memory after WARM inputs, with the fuzzer's own growing corpus.
 MAX_GROWTH_MIB = 64.0
 MIB = 1 << 20
 
 
 class SlowError(AssertionError):
-    """An input took too long, or would take for ever."""
+    """An input took too long or would never end."""
 
 
 class GrowthError(AssertionError):
-    """Memory is not given back."""
+    """Memory is not released."""
 
 
 class Watch:
-    """Gives inputs to a target, and looks at the time that it computes (not waits) and at the memory."""
+    """Runs inputs on a target and watches its CPU time (not its waiting) and its memory."""
 
     def __init__(self, target: Target, warm: int = WARM, every: int = EVERY) -> None:
         self._target = target
@@ -34,7 +34,7 @@ class Watch:
         signal.signal(signal.SIGVTALRM, self._time_is_up)
 
     def one(self, data: bytes) -> None:
-        """One input; AssertionError or whatever escapes for one that finds something."""
+        """One input; raises AssertionError or whatever escapes for a finding."""
         signal.setitimer(signal.ITIMER_VIRTUAL, self._target.limit_s)
         try:
             self._target.one(data)
@@ -51,7 +51,7 @@ class Watch:
                 raise GrowthError(f"{growth_mib:.0f} MiB more after {self.inputs} inputs than after {self._warm}")
 
     def _time_is_up(self, _number: int, _frame: FrameType | None) -> None:
-        self._late = True  # what is raised here may be caught by what is hanging
+        self._late = True  # the hanging code may catch what is raised here
         raise self._slow()
 
     def _slow(self) -> SlowError:
@@ -59,5 +59,5 @@ class Watch:
 
 
 def resident_mib() -> float:
-    """This process's memory that is in use now."""
+    """The memory this process uses now."""
     return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * getpagesize() / MIB

@@ -1,4 +1,4 @@
-"""Emulated chargers on ptys for the stop of last resort: each of them runs, and goes on until it is stopped."""
+"""Emulated chargers on ptys for the stop of last resort: each runs until stopped."""
 
 import os
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from tests.sim.wires import Port
 
 
 class Bench:
-    """One charger that runs, its port's name, and an open descriptor of it as a guardian would have one."""
+    """One running charger, its port's name, and an open descriptor of it, like a guardian's."""
 
     def __init__(self, background: Background, link: Path, line: str) -> None:
         self._background = background
@@ -25,7 +25,7 @@ class Bench:
         self.plug()
 
     def plug(self) -> None:
-        """Plug the adapter in, and open it."""
+        """Plug the adapter in and open it."""
         self._background.call(self.wire.open)
         self.fd = Port(self.wire.path).fd
 
@@ -38,7 +38,7 @@ class Bench:
 
     @property
     def stops(self) -> int:
-        """Stop frames that it understood."""
+        """Stop frames it understood."""
         return self.wire.counters.stops
 
     def duplicate(self) -> int:

@@ -1,6 +1,6 @@
 """The unchanged controller with one part of it broken on SIGUSR1: `python -m tests.guardian.saboteur MODE FD STATION`.
 
-What is put in place beforehand only looks whether it is time; the rest is the product.
+The hooks installed beforehand only check whether it is time; the rest is the product.
 """
 
 import os
@@ -26,7 +26,7 @@ def hang(*_: object) -> None:
 
 
 def end_thread(*_: object) -> None:
-    """Without a word: `except Exception` does not see it."""
+    """Silently: `except Exception` does not catch it."""
     raise SystemExit
 
 
@@ -36,7 +36,7 @@ def loop(*_: object) -> None:
 
 
 def keep_the_gil(*_: object) -> None:
-    """In C: no other thread of this process gets a turn for ages."""
+    """In C: no other thread of this process runs for ages."""
     re.match(r"(a|a)+$", "a" * 40 + "b")
 
 
@@ -53,12 +53,12 @@ def die(*_: object) -> None:
 
 
 def keep_the_lock(port: ChargerPort, *_: object) -> None:
-    """The lock between the port's thread and the control loop: both wait for it for ever."""
+    """The lock between the port's thread and the control loop: both wait for ever."""
     port._lock.acquire()
     hang()
 
 
-#: Mode → what is spoilt, and what happens there instead.
+#: Mode → the function replaced, and its replacement.
 MODES: dict[str, tuple[Any, str, Callable[..., None]]] = {
     "port_hangs": (ChargerPort, "_once", hang),
     "port_dies": (ChargerPort, "_once", end_thread),
@@ -91,6 +91,6 @@ def spoil(owner: Any, name: str, instead: Callable[..., None]) -> None:
 if __name__ == "__main__":
     mode, fd, station = sys.argv[1:]
     spoil(*MODES[mode])
-    control.STALL_S = 0.5  # a client is given 30 s otherwise
+    control.STALL_S = 0.5  # the default for a client is 30 s
     signal.signal(signal.SIGUSR1, lambda *_: ARMED.set())
     sys.exit(controller.main(int(fd), station))

@@ -1,4 +1,4 @@
-"""`orchestrator estop` as it is used in an emergency: from anywhere, on any terminal, beside anything that hangs."""
+"""`orchestrator estop` in an emergency: from anywhere, on any terminal, next to anything that hangs."""
 
 import json
 import os
@@ -51,7 +51,7 @@ def test_without_arguments_the_file_in_this_folder_counts(tmp_path: Path) -> Non
         assert done.stderr == f"station file: {file}\n{NOBODY}\n"
 
 
-#: An emergency stop that sees only these processes: others on this machine may be somebody else's tests.
+#: An emergency stop that sees only these processes: others on this machine may belong to other tests.
 AMONG = """
 import sys
 from orchestrator.lastresort import estop, inhand
@@ -62,7 +62,7 @@ sys.exit(estop.main([]))
 
 
 def test_else_those_of_the_services_that_run(tmp_path: Path) -> None:
-    """Found by their command lines, relative to their own folders."""
+    """Found by their command lines, relative to their own directories."""
     if Path(inhand.PLACES[1]).exists():
         pytest.skip("there is an installed one on this machine")
     with running_chargers(tmp_path, 2) as benches, ExitStack() as stack:
@@ -81,7 +81,7 @@ def test_else_those_of_the_services_that_run(tmp_path: Path) -> None:
 
 @contextmanager
 def running(file: Path) -> Iterator["subprocess.Popen[bytes]"]:
-    """What looks like a service, with this station file in its own folder."""
+    """A process that looks like a service, with this station file in its own directory."""
     service = subprocess.Popen(
         ["orchestrator", "-c", "print(flush=True); input()", "run", file.name], executable=sys.executable,
         cwd=file.parent, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -323,7 +323,7 @@ def test_a_file_of_the_working_directory_is_not_imported_by_the_controller(tmp_p
 
 
 def test_one_port_whose_open_hangs_delays_no_other(tmp_path: Path) -> None:
-    """The whole program, with a kernel that does not come back from one open()."""
+    """The whole program, with a kernel that never returns from one open()."""
     program = """
 import os, sys, time
 good, stuck = os.open, os.path.realpath(sys.argv[1])
@@ -355,7 +355,7 @@ sys.exit(main(["--port", *sys.argv[1:]]))
 
 # --- several services ------------------------------------------------------------------------------------------------
 
-#: What looks like a service: it holds a port, listens, and answers every stop, or nothing at all.
+#: A process that looks like a service: it holds a port, listens, and answers every stop, or nothing.
 SERVES = """
 import json, os, socket, sys
 port, path, bay, answers = sys.argv[1:5]
@@ -391,7 +391,7 @@ def serving(port: str, path: Path, bay: str, answers: str = "yes") -> Iterator[N
 
 @pytest.mark.parametrize("answers", ["yes", "no"])
 def test_every_service_that_holds_one_of_the_ports_is_told(tmp_path: Path, answers: str) -> None:
-    """One that could not be told may start its charger again."""
+    """A service that was not reached may start its charger again."""
     left, right = tmp_path / "left", tmp_path / "right"
     with (
         running_chargers(tmp_path, 2) as (one, other),
@@ -435,7 +435,7 @@ def test_a_file_that_was_cut_off_may_have_named_more(tmp_path: Path, rest: str) 
         done = estop(str(file), cwd=tmp_path)
         assert not bench.runs
         assert done.returncode == 1
-        shown = bench.name if "'" in rest else f"left ({bench.name})"  # what is no YAML gives no names
+        shown = bench.name if "'" in rest else f"left ({bench.name})"  # without YAML there are no names
         assert done.stdout.splitlines()[-2:] == [
             f"{shown}: standby verified",
             f"{file} is damaged: {LOST}",
@@ -444,7 +444,7 @@ def test_a_file_that_was_cut_off_may_have_named_more(tmp_path: Path, rest: str) 
 
 @pytest.mark.parametrize("by", ["--socket", "ORCHESTRATOR_SOCKET"])
 def test_a_file_that_has_lost_every_port_leads_to_the_service(tmp_path: Path, by: str) -> None:
-    """Which knows its chargers, and stops them all."""
+    """The service knows its chargers and stops them all."""
     file, path = tmp_path / "station.yaml", str(tmp_path / "s")
     file.write_text("station: depot-1\nbays:\n  - {na")
     with answering(tmp_path / "s", {"bays": []}) as asked:

@@ -27,7 +27,7 @@ def estop(*args: str, **env: str) -> "subprocess.CompletedProcess[str]":
 
 @pytest.fixture(name="station", scope="module")
 def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
-    """Four bays that charge. The tests follow one after the other, each with a bay of its own at first."""
+    """Four charging bays. The tests run in order, and each starts with its own bay."""
     with whole_station(tmp_path_factory.mktemp("estop"), 4) as (plant, service):
         service.start()
         charging((plant, service))
@@ -35,7 +35,7 @@ def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
 
 
 def charging(station: Station, *bays: int) -> None:
-    """Bring these bays to where the service knows that they charge; or all of them."""
+    """Get these bays (default: all) charging, with the service aware of it."""
     _, service = station
     names = [f"bay-{bay}" for bay in bays or (1, 2, 3, 4)]
     service.wait({"IDLE", "HELD", "CHARGING"}, names)
@@ -54,7 +54,7 @@ def held(*names: str) -> str:
 
 
 def test_with_a_port_only_that_bay_is_held(station: Station) -> None:
-    """Nobody named the socket: it is found by the lock on the port."""
+    """No socket is named: it is found through the lock on the port."""
     plant, service = station
     port = port_of(station, 1)
     assert control_sockets([os.devnull]) == []
@@ -70,11 +70,14 @@ def test_a_service_that_nobody_told_leaves_a_stopped_charger_alone(station: Stat
     os.write(port, STOP_FRAME)
     os.close(port)
     (fault,) = service.wait("HELD", ["bay-2"])["bay-2"]["faults"]
-    assert fault["id"] in ("stopped_by_itself", "early_full")  # by what it shows in standby; both wait for an operator
+    assert fault["id"] in (
+        "stopped_by_itself",
+        "early_full",
+    )  # depending on its values in standby; both wait for an operator
 
 
 def test_a_bay_in_the_first_moment_of_a_charge_is_held_as_well(station: Station) -> None:
-    """Its charger has not run yet: to the service, a stop alone would look like a charger that does not start."""
+    """Its charger has not run yet: to the service, a stop alone would look like a charger that fails to start."""
     _, service = station
     service.ask("stop", "bay-3")
     service.wait("HELD", ["bay-3"])
@@ -96,7 +99,7 @@ def test_a_charger_that_disobeys_the_service_as_well_is_not_verified(station: St
 
 
 def test_what_was_stopped_stays_so_and_nobody_is_alarmed(station: Station) -> None:
-    """Longer than a bay needs to qualify. The service has gone on reading its chargers all the time."""
+    """Longer than a bay needs to qualify. The service keeps reading its chargers all the time."""
     plant, service = station
     since_s = max(bay["charger"]["t_s"] for bay in service.status().values())
     wait_until(lambda: min(bay["charger"]["t_s"] for bay in service.status().values()) > since_s + 3, what="polls")
@@ -115,7 +118,7 @@ def test_with_its_station_file_every_bay_is_held(station: Station) -> None:
     assert done.stdout.splitlines() == [*standby, DONE.strip()]
     assert done.stderr == held("bay-1", "bay-2", "bay-3", "bay-4")
     bays = service.wait("HELD", ["bay-1", "bay-2", "bay-3", "bay-4"]).values()
-    # On a busy machine it may have seen its charger stop before it was told why; a person starts it all the same.
+    # On a busy machine it may see its charger stop before it is told why; a person starts it all the same.
     assert all(bay["reason"].endswith(f": orchestrator start {bay['name']}") for bay in bays)
     assert not any(plant.state(bay)["operation"] for bay in (1, 2, 3, 4))
 

@@ -1,4 +1,4 @@
-"""When the guardian acts, and when not. Each test is its controller."""
+"""When the guardian acts and when it does not. Each test plays the controller."""
 
 import os
 import select
@@ -80,7 +80,7 @@ def test_without_a_port_the_controllers_end_is_its_own(tmp_path: Path, controlle
 
 @pytest.mark.parametrize(("controller", "status"), [(ENDS_WITH_3, 3), ("pass", ACTED)])
 def test_with_a_port_no_end_is_a_good_one(tmp_path: Path, controller: str, status: int) -> None:
-    """A controller that leaves without a word has not stopped its chargers, whatever its exit status says."""
+    """A controller that ends silently has not stopped its chargers, whatever its exit status."""
     with running_chargers(tmp_path) as (bench,), watched(tmp_path, controller=controller) as guardian:
         guardian.hand_over(bench.name, bench.fd)
         wait_until(lambda: state_of(guardian.controller) == "Z")
@@ -139,7 +139,7 @@ def test_a_charger_that_does_not_obey_does_not_keep_the_service_from_starting_an
 
 
 def test_it_starts_a_controller_that_nobody_can_freeze_and_ends_with_its_status(tmp_path: Path) -> None:
-    """Whoever started it may ignore the end of children, which the kernel then buries at once, or block signals."""
+    """Its parent may ignore SIGCHLD, so the kernel reaps children at once, or block signals."""
     guards = "import signal, sys; from orchestrator.lastresort import guardian; "
     guards += "signal.signal(signal.SIGCHLD, signal.SIG_IGN); "
     guards += "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM]); "
@@ -165,7 +165,7 @@ sys.exit(3)
 
 
 def test_a_controller_that_does_not_die_is_not_waited_for() -> None:
-    """As one that hangs in a driver: SIGKILL does not end it before the driver returns."""
+    """Like a process hanging in a driver: SIGKILL takes effect only when the driver returns."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     child = subprocess.Popen([sys.executable, "-c", WAITS], preexec_fn=die_with_parent)
     with ours, theirs, child:

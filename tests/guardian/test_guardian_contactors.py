@@ -1,4 +1,4 @@
-"""Contactors that the guardian opens when nothing else is left."""
+"""Contactors the guardian opens when nothing else is left."""
 
 import os
 import struct
@@ -14,12 +14,12 @@ from tests.guardian.chargers import running_chargers
 from tests.guardian.watched import END_S, watched
 from tests.waiting import wait_until
 
-#: A charger that obeys has no current any more.
+#: A charger that has obeyed has no current.
 OBEYED_S = 0.2
 
 
 class Contactor:
-    """A pipe in the place of a line."""
+    """A pipe in place of a line."""
 
     def __init__(self) -> None:
         self.reader, self.writer = os.pipe()
@@ -27,7 +27,7 @@ class Contactor:
         self.opened_s: float | None = None  #: when it was first opened
 
     def opened(self) -> int:
-        """How often it was opened since this was last asked; nothing else was done to it."""
+        """How often it was opened since the last call; asserts that nothing else was done to it."""
         try:
             asked = list(struct.iter_unpack("=dI16s", os.read(self.reader, 4096)))
         except BlockingIOError:
@@ -49,7 +49,7 @@ def contactor() -> Iterator[Contactor]:
 
 
 def test_a_contactor_opens_after_the_charger_has_had_its_stop(tmp_path: Path, contactor: Contactor) -> None:
-    """Without load where the stop was obeyed: a contactor that breaks a current may weld."""
+    """Without load where the stop was obeyed: a contactor breaking a current may weld."""
     with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
         guardian.hand_over(bench.name, bench.fd)
         guardian.send(CONTACTOR + b"bay-1", contactor.writer)

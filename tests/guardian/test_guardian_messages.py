@@ -1,4 +1,4 @@
-"""What the controller tells the guardian, and what becomes of the ports that it names."""
+"""The controller's messages to the guardian, and what it does with the ports they name."""
 
 import fcntl
 import os
@@ -26,7 +26,7 @@ def test_ports_that_come_and_go_leave_nothing_behind(tmp_path: Path) -> None:
         for turn in range(1000):
             bench = benches[turn % 2]
             guardian.hand_over(bench.name, bench.fd)
-            if turn % 3:  # else it is handed over again without having been dropped
+            if turn % 3:  # otherwise it is handed over again without having been dropped
                 guardian.send(DROP + bench.name.encode())
             if turn % 100 == 0:
                 guardian.beat()
@@ -60,7 +60,7 @@ def locked(fd: int) -> bool:
 
 
 def test_a_port_whose_close_hangs_keeps_nobody_from_watching(tmp_path: Path) -> None:
-    """Nor does it when the others have to be stopped in the end."""
+    """Nor when the others have to be stopped in the end."""
     with running_chargers(tmp_path, 2) as (stuck, good), watched(tmp_path, hangs=("close", stuck.name)) as guardian:
         for bench in (stuck, good):
             guardian.hand_over(bench.name, bench.fd)
@@ -104,7 +104,7 @@ def test_a_port_that_was_closed_when_the_controller_died_is_stopped_all_the_same
     with running_chargers(tmp_path, 2) as (closed, sent_in_vain), watched(tmp_path) as guardian:
         guardian.hand_over(closed.name, closed.fd)
         guardian.send(DROP + closed.name.encode())
-        guardian.hand_over(sent_in_vain.name)  # as the kernel hands it over when the guardian has no descriptor left
+        guardian.hand_over(sent_in_vain.name)  # as the kernel delivers it when the guardian has no descriptors left
         guardian.beat()
         guardian.link.close()
         assert guardian.ended() == ACTED
@@ -161,7 +161,7 @@ def test_strange_messages_are_no_harm(tmp_path: Path) -> None:
 
 def test_a_controller_that_reads_no_answers_holds_nothing_up(tmp_path: Path) -> None:
     with watched(tmp_path) as guardian:
-        for _ in range(1000):  # far more than the socket takes
+        for _ in range(1000):  # far more than fits into the socket
             guardian.send(BEAT)
         guardian.settle()
         guardian.link.setblocking(False)
@@ -173,7 +173,7 @@ def test_a_controller_that_reads_no_answers_holds_nothing_up(tmp_path: Path) -> 
 
 
 def test_the_last_words_of_a_controller_that_died_are_heard(tmp_path: Path) -> None:
-    """It died with answers unread: the kernel's first word is "connection reset", and what it had sent comes after."""
+    """It died with unread answers: the kernel first reports "connection reset", then delivers its messages."""
     with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
         guardian.beat()
         guardian.send(BEAT)
@@ -187,7 +187,7 @@ def test_the_last_words_of_a_controller_that_died_are_heard(tmp_path: Path) -> N
 
 
 def sleep_through(guardian: Watched, seconds: float) -> None:
-    """The guardian is not let run for so long."""
+    """The guardian is suspended for that long."""
     guardian.freeze()
     slept_s = time.monotonic()
     wait_until(lambda: time.monotonic() > slept_s + seconds)
@@ -208,7 +208,7 @@ def test_a_guardian_that_slept_looks_at_its_messages_before_it_judges(tmp_path: 
 def test_a_machine_that_stood_still_is_no_hang_once(tmp_path: Path) -> None:
     with running_chargers(tmp_path) as (bench,), watched(tmp_path) as guardian:
         guardian.hand_over(bench.name, bench.fd)
-        for _ in range(2):  # each heartbeat gives the next excuse
+        for _ in range(2):  # each heartbeat extends the deadline
             guardian.beat()
             sleep_through(guardian, 0.7)
             guardian.thaw()

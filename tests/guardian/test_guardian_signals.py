@@ -1,4 +1,4 @@
-"""Who may end the guardian, and who hears of it: signals, terminals, logs, systemd."""
+"""Who may end the guardian, and who is told: signals, terminals, logs, systemd."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ from tests.waiting import wait_until
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGQUIT])
 def test_whoever_wants_it_to_end_ends_the_controller_first(tmp_path: Path, number: signal.Signals) -> None:
     with running_chargers(tmp_path) as (bench,), watched(tmp_path, controller=ENDS_WITH_4_WHEN_TOLD) as guardian:
-        guardian.waits_for("\n")  # the controller is ready to be told
+        guardian.waits_for("\n")  # the controller is ready for the signal
         guardian.hand_over(bench.name, bench.fd)
         guardian.send(DONE)
         guardian.settle()
@@ -31,9 +31,9 @@ def test_whoever_wants_it_to_end_ends_the_controller_first(tmp_path: Path, numbe
 def test_a_hang_up_without_a_terminal_is_passed_on_and_ends_nothing(tmp_path: Path) -> None:
     with watched(tmp_path, "SILENCE_S=20", "END_S=0.1", controller=SAYS_WHEN_HUNG_UP) as guardian:
         guardian.waits_for("\n")
-        guardian.process.send_signal(signal.SIGHUP)  # too early: it reads everything anew anyway
+        guardian.process.send_signal(signal.SIGHUP)  # too early: it reads everything again anyway
         guardian.beat()
-        guardian.beat()  # the first one has been dealt with
+        guardian.beat()  # the first one has been handled
         guardian.process.send_signal(signal.SIGHUP)
         guardian.waits_for("hung up")
         guardian.beat()
@@ -102,7 +102,7 @@ def systemd(directory: Path) -> Iterator[socket.socket]:
 
 
 def heard(manager: socket.socket) -> list[str]:
-    """Everything that was notified and not heard yet."""
+    """All notifications not read yet."""
     said = []
     manager.setblocking(False)
     with suppress(BlockingIOError):
@@ -118,7 +118,7 @@ def test_systemd_hears_that_it_is_ready_that_it_lives_and_what_it_does(tmp_path:
             guardian.hand_over(bench.name, bench.fd)
             for _ in range(5):
                 guardian.beat()
-            assert heard(manager) == ["READY=1", "WATCHDOG=1"]  # not with each beat
+            assert heard(manager) == ["READY=1", "WATCHDOG=1"]  # not with every heartbeat
             guardian.process.send_signal(signal.SIGTERM)
             assert manager.recv(99) == b"STOPPING=1"
             guardian.link.close()
@@ -136,7 +136,7 @@ def test_a_watchdog_is_fed_while_the_controller_beats(tmp_path: Path) -> None:
         ready, *fed = heard(manager)
         assert ready == "READY=1"
         assert set(fed) == {"WATCHDOG=1"}
-        assert len(fed) >= 2  # the last one may still be on its way, and it may be fed once more meanwhile
+        assert len(fed) >= 2  # the last one may still be on its way, and one more may be sent meanwhile
 
 
 def test_a_watchdog_is_fed_for_as_long_as_chargers_are_being_stopped(tmp_path: Path) -> None:
@@ -154,7 +154,7 @@ def test_a_systemd_that_does_not_listen_holds_nothing_up(tmp_path: Path) -> None
     with systemd(tmp_path), running_chargers(tmp_path) as (bench,):
         with watched(tmp_path, "WATCHDOG_S=0", notify=str(tmp_path / "notify")) as guardian:
             guardian.hand_over(bench.name, bench.fd)
-            for _ in range(2000):  # far more than the socket takes
+            for _ in range(2000):  # far more than fits into the socket
                 guardian.beat()
             guardian.link.close()
             assert guardian.ended() == ACTED

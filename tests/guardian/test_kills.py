@@ -1,4 +1,4 @@
-"""Everything that a controller or its guardian can die of, while its charger runs: it ends stopped and verified."""
+"""Everything a controller or its guardian can die of while its charger runs: it ends stopped and verified."""
 
 import json
 import os
@@ -27,19 +27,19 @@ from orchestrator.lastresort import guardian
 guardian.VERIFY_S = 1.0
 sys.exit(guardian.guard(sys.argv[2:], ("-m", "tests.guardian.saboteur", sys.argv[1])))
 """
-#: Started with neither input nor output, as by a program that has closed its own.
+#: Started without input or output, as by a program that has closed its own.
 WITHOUT_STREAMS = """
 import os, sys
 os.closerange(0, 3)
 os.execv(sys.executable, [sys.executable, "-m", "orchestrator", "run", sys.argv[1]])
 """
-#: No unit test of timing (`make bench` measures that): only that nobody waited for somebody's time-out.
+#: Not a timing test (`make bench` measures that): it only shows that nobody waited for a time-out.
 SOON_S = 3.0
 
 
 @dataclass(frozen=True)
 class Case:
-    """One way to die: the signal that the controller gets, and what the guardian says of it."""
+    """One way to die: the signal sent to the controller, and the guardian's message about it."""
 
     name: str
     number: signal.Signals
@@ -61,7 +61,7 @@ CASES = (
         }.items()
     ),
 )
-#: So many services are started before they are needed.
+#: Number of services started ahead of need.
 AHEAD = 4
 OTHERS = (
     "half a frame",
@@ -73,7 +73,7 @@ OTHERS = (
     "a second one",
     "a terminal",
 )
-#: How those are started that are not started as usual.
+#: Start options of services with unusual ones.
 RUNS: Mapping[str, Sequence[str]] = {
     **{case.name: ("-c", GUARD, case.mode) for case in CASES if case.mode},
     "without streams": ("-c", WITHOUT_STREAMS),
@@ -83,7 +83,7 @@ BAYS = {name: number for number, name in enumerate([*(case.name for case in CASE
 
 @dataclass(frozen=True)
 class Charging:
-    """A service whose one charger is running."""
+    """A service with one running charger."""
 
     plant: PlantProcess
     service: Service
@@ -98,7 +98,7 @@ class Charging:
         return bool(self.plant.state(self.bay)["operation"])
 
     def watch(self) -> float:
-        """From now on, look out for the first stop; returns the moment."""
+        """Watch for the first stop from now on; returns the time."""
         return self.plant.inject("heal", self.bay)
 
     def check_stopped(self, since_s: float) -> None:
@@ -108,14 +108,14 @@ class Charging:
 
 
 class Services:
-    """A service for each test, with a bay and a bus of its own. Some are started ahead: they need 3 s to charge."""
+    """A service per test, each with its own bay and bus. Some are started ahead: they need 3 s to charge."""
 
     def __init__(self, directory: Path, plant: PlantProcess, cans: Sequence[Mapping[str, object]]) -> None:
         self._directory, self._plant, self._cans = directory, plant, cans
         self._started: dict[str, Charging] = {}
 
     def take(self, name: str) -> Charging:
-        """The one of this name, once its charger runs."""
+        """The service of this name, once its charger runs."""
         names = list(BAYS)
         for near in names[names.index(name) :][:AHEAD]:
             if near not in self._started:
@@ -185,7 +185,7 @@ def test_half_a_frame_of_the_dying_controller_is_no_harm(services: Services) -> 
 
 
 def test_what_it_says_without_a_standard_error_does_not_go_to_a_charger(services: Services) -> None:
-    """A file that is opened gets the lowest free number: a serial port would be "standard error"."""
+    """An opened file gets the lowest free number: a serial port would be "standard error"."""
     one = services.take("without streams")
     since_s = one.watch()
     for pid in (one.service.guardian, one.service.controller):
@@ -218,7 +218,7 @@ def test_a_guardian_that_hangs_is_none(services: Services) -> None:
 
 
 def test_when_both_are_killed_only_an_emergency_stop_is_left(services: Services) -> None:
-    """Which is why the systemd unit has one as its ExecStopPost."""
+    """This is why the systemd unit has one as its ExecStopPost."""
     one = services.take("both killed")
     since_s = one.watch()
     one.service.kill_all()
@@ -240,7 +240,7 @@ def test_an_orderly_end_leaves_nothing_to_the_guardian(services: Services) -> No
 
 
 def test_a_second_service_stops_nothing(services: Services, tmp_path: Path) -> None:
-    """Neither with the same station file nor with another one, neither at its start nor when it is killed."""
+    """With the same station file or another one, both at its start and when it is killed."""
     one = services.take("a second one")
     one.watch()
     second = orchestrator("run", str(one.service.file))
@@ -248,7 +248,7 @@ def test_a_second_service_stops_nothing(services: Services, tmp_path: Path) -> N
     assert second.stderr.startswith(f"orchestrator: another service answers on {one.service.socket}: stop it first")
     assert len(second.stderr.splitlines()) == 1
     document = json.loads(one.service.file.read_text())
-    document["can"]["can0"] = udp_keys()  # two masters on one BMU are noticed, and are another matter
+    document["can"]["can0"] = udp_keys()  # two masters on one BMU are noticed: a separate subject
     third = Service(tmp_path, document)
     try:
         third.start().wait("OFFLINE")
@@ -264,7 +264,7 @@ def test_a_second_service_stops_nothing(services: Services, tmp_path: Path) -> N
 
 
 def test_a_terminal_that_suspends_is_no_way_round_and_a_hang_up_reads_the_policies_anew(services: Services) -> None:
-    """Ctrl-Z freezes nobody; SIGHUP without a terminal ends nobody, however many get it."""
+    """Ctrl-Z stops neither; SIGHUP without a terminal ends neither, whoever gets it."""
     one = services.take("a terminal")
     os.killpg(one.service.guardian, signal.SIGTSTP)
     assert one.service.bay()["state"] == "CHARGING"

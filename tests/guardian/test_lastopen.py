@@ -1,4 +1,4 @@
-"""Contactors on bare descriptors: numbers and structures are those of the kernel's header; what becomes of errors."""
+"""Contactors on bare descriptors: numbers and structures match the kernel's header; errors are handled."""
 
 import errno
 import os
@@ -14,12 +14,12 @@ from orchestrator.lastresort import lastopen
 from orchestrator.lastresort.lastopen import GET_LINE, HELD, OPEN, OPENED, REQUEST, SET_VALUES, request
 
 SOURCE = Path(__file__).with_name("gpio_abi.c")
-#: A C compiler, where there are one and the kernel's header.
+#: A C compiler, if there is one, with the kernel's header.
 COMPILERS = [path for path in (shutil.which("cc"),) if path and Path("/usr/include/linux/gpio.h").exists()]
 
 
 class Kernel:
-    """Takes the ioctls, and answers with `error`, if there is one, or with a descriptor for a line."""
+    """Takes the ioctls; answers with `error`, if set, or with a descriptor for a line."""
 
     def __init__(self, error: int = 0) -> None:
         self.asked: list[tuple[int, bytes]] = []

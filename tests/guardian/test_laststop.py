@@ -1,4 +1,4 @@
-"""The stop of last resort on emulated chargers: what it writes, what it believes, and what it does not wait for."""
+"""The stop of last resort on emulated chargers: its writes, the answers it believes, and its waiting."""
 
 import fcntl
 import os
@@ -41,7 +41,7 @@ from tests.link.ptys import plugged
 from tests.link.strangers import holding, stty
 from tests.waiting import wait_until
 
-#: Every frame that a dying controller may have been writing.
+#: Every frame a dying controller may have been writing.
 FRAMES = (
     STATUS_REQUEST,
     encode(Command(Action.RUN)),
@@ -58,7 +58,7 @@ def test_every_charger_is_stopped_and_verified(tmp_path: Path) -> None:
 
 
 def test_a_round_ends_when_its_chargers_have_had_time_to_obey(tmp_path: Path) -> None:
-    """Whoever opens contactors at its end breaks no current where the stop was obeyed, and does not wait otherwise."""
+    """Contactors opened at its end break no current where the stop was obeyed; elsewhere nothing waits."""
     with running_chargers(tmp_path, 2) as (good, deaf):
         deaf.charger.ignores_stop = True
         seen: list[tuple[bool, bool]] = []
@@ -76,7 +76,7 @@ def test_a_round_ends_when_its_chargers_have_had_time_to_obey(tmp_path: Path) ->
 
 
 def test_every_frame_has_its_time(tmp_path: Path) -> None:
-    """On the wire one after the other, and a charger has time to obey before it is asked."""
+    """They follow each other on the wire, and a charger has time to obey before the poll."""
     frames = ((STOP_FRAME, 0.0), (STOP_FRAME, 0.02), (OPERATION_STOP_FRAME, 0.04), (QUESTION, ASK_S))
     with plugged(tmp_path / "port") as pty:
         began_s = time.monotonic()
@@ -111,15 +111,15 @@ def test_on_every_kind_of_line(tmp_path: Path, line: str) -> None:
         assert not bench.runs
 
 
-#: What a round puts on the wire.
+#: The bytes of one round.
 ROUND = b"".join(frame for _, frame in STOPS) + QUESTION
 
 
 @pytest.mark.parametrize(("longest", "rounds"), [(38, 1), (262, 10)])
 def test_half_a_frame_does_not_spoil_the_stop(longest: int, rounds: int) -> None:
-    """Whatever a charger's decoder has of a frame: it understands one of the two stops.
+    """Whatever partial frame a charger's decoder holds, it understands one of the two stops.
 
-    One that believes any length at all swallows up to 256 bytes; the rounds go on for longer than that.
+    A decoder that believes any length swallows up to 256 bytes; the rounds go on for longer than that.
     """
     assert VERIFY_S / ROUND_S >= 10
     for frame in FRAMES:
@@ -130,7 +130,7 @@ def test_half_a_frame_does_not_spoil_the_stop(longest: int, rounds: int) -> None
 
 
 def naive_decoder(stream: bytes, longest: int) -> list[bytes]:
-    """The good frames that a decoder finds which throws a bad frame away with what it swallowed of the next ones."""
+    """The good frames found by a decoder that discards a bad frame together with the frames it swallowed."""
     good, at = [], 0
     while (at := stream.find(b"\xaf\xfa", at)) >= 0 and at + 4 <= len(stream):
         size = stream[at + 3] + 6
@@ -150,7 +150,7 @@ def test_half_a_frame_on_the_wire(tmp_path: Path) -> None:
 
 
 def test_an_answer_from_before_the_question_proves_nothing(tmp_path: Path) -> None:
-    """The dying controller's last answers lie unread in the port, and say that all is well."""
+    """The dying controller's last answers lie unread in the port and claim that all is well."""
     with running_chargers(tmp_path) as (bench,):
         bench.wire.lies[Kind.OPERATION] = 0
         os.write(bench.fd, STATUS_REQUEST + QUESTION)
@@ -162,7 +162,7 @@ def test_an_answer_from_before_the_question_proves_nothing(tmp_path: Path) -> No
 
 
 def waiting(fd: int) -> int:
-    """Bytes that came in and were not read."""
+    """Received bytes not yet read."""
     answer = bytearray(4)
     fcntl.ioctl(fd, 0x541B, answer)  # FIONREAD
     return int.from_bytes(answer, "little")
@@ -187,7 +187,7 @@ def test_a_late_obedience_is_waited_for(tmp_path: Path) -> None:
 
 
 def test_a_line_that_takes_nothing_is_not_waited_for(tmp_path: Path) -> None:
-    """What it had not taken is dropped: an order from before the stop must not come out minutes later."""
+    """Unsent output is dropped: a command from before the stop must not go out minutes later."""
     with plugged(tmp_path / "stalled") as pty, running_chargers(tmp_path) as (bench,):
         filled = pty.fill()
         began_s = time.monotonic()
@@ -202,7 +202,7 @@ def test_a_line_that_takes_nothing_is_not_waited_for(tmp_path: Path) -> None:
 
 
 def test_a_line_that_takes_nothing_at_all_says_so() -> None:
-    """A tty that is flushed takes something again, if its driver lives."""
+    """A flushed tty accepts output again if its driver is alive."""
     ours, theirs = socket.socketpair()
     ours.setblocking(False)
     with theirs:
@@ -225,7 +225,7 @@ def test_a_port_that_fails_is_opened_anew(tmp_path: Path) -> None:
 
 
 def test_a_line_that_ends_says_so() -> None:
-    """A tty that was hung up reads as an end of file, and may still take what is written."""
+    """A tty after a hangup reads end of file, and may still accept writes."""
     ours, theirs = socket.socketpair()
     with theirs:
         theirs.shutdown(socket.SHUT_WR)
@@ -270,7 +270,7 @@ def test_a_file_that_is_no_port_is_not_written_to(tmp_path: Path) -> None:
 
 
 def test_two_who_stop_the_same_charger_both_get_their_proof(tmp_path: Path) -> None:
-    """The guardian and an `estop`, say: each answer goes to one of them, as a whole."""
+    """The guardian and an `estop`, for example: each answer goes entirely to one of them."""
     with running_chargers(tmp_path) as (bench,):
         told: list[dict[str, str]] = []
         both = [
@@ -285,7 +285,7 @@ def test_two_who_stop_the_same_charger_both_get_their_proof(tmp_path: Path) -> N
 
 
 def test_what_another_process_reads_is_not_read_here(tmp_path: Path) -> None:
-    """Two samples of it are needed as well."""
+    """This also takes two samples."""
     asked: list[float] = []
 
     def witness(name: str, since_s: float) -> tuple[float, str]:
@@ -323,7 +323,7 @@ def test_the_first_stop_is_out_when_it_returns(tmp_path: Path) -> None:
 
 
 def test_it_goes_on_without_a_thread_to_be_had(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stopped by whoever is there, and verified once there are threads again."""
+    """Stopped by the threads there are, and verified once threads can start again."""
 
     def none_left(*_: object) -> None:
         raise RuntimeError("can't start new thread")
@@ -342,7 +342,7 @@ def test_it_goes_on_without_a_thread_to_be_had(tmp_path: Path, monkeypatch: pyte
 
 @contextmanager
 def hanging(patch: pytest.MonkeyPatch, module: Any, call: str, port: str) -> Iterator[None]:
-    """This call of the kernel does not return for this port, as with an adapter whose firmware is dead."""
+    """This system call never returns for this port, as with an adapter with dead firmware."""
     goes_on, good = threading.Event(), getattr(module, call)
     device = os.path.realpath(port)
 
@@ -372,7 +372,7 @@ def hanging(patch: pytest.MonkeyPatch, module: Any, call: str, port: str) -> Ite
 def test_a_driver_that_hangs_delays_no_other_port(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: Any, call: str, *, opened: bool
 ) -> None:
-    """Wherever it does, whether the port is open or not, and wherever it stands in the list."""
+    """In any call, with the port open or not, and at any place in the list."""
     with running_chargers(tmp_path, 3) as benches, hanging(monkeypatch, module, call, benches[1].name):
         began_s = time.monotonic()
         told = stop_all({bench.name: bench.duplicate() if opened else None for bench in benches}, 3 * ROUND_S)
@@ -392,7 +392,7 @@ def test_a_hundred_ports_are_stopped_at_once(tmp_path: Path) -> None:
         stopping.stop({pty.path: os.open(pty.path, os.O_RDWR | os.O_NOCTTY) for pty in ptys})
         assert all(pty.drain().startswith(STOP_FRAME) for pty in ptys)
         took_s = max(line._stopped_s for line in stopping._lines.values()) - stopping._began_s
-        assert took_s < 0.1  # 2 ms on a machine that has nothing else to do
+        assert took_s < 0.1  # 2 ms on an idle machine
         stopping.finish(0.1)
 
 
@@ -413,7 +413,7 @@ def test_however_many_hang_the_others_are_stopped(monkeypatch: pytest.MonkeyPatc
         stopping.stop(descriptors)
         wait_until(lambda: sum(line.tried.is_set() for line in stopping._lines.values()) == len(ptys) - stuck)
         took_s = max(line._stopped_s for line in stopping._lines.values()) - stopping._began_s
-        assert took_s < 0.5  # it is the machine's load that counts here: 8 ms with one that hangs, 35 ms with 64
+        assert took_s < 0.5  # the machine's load matters here: 8 ms with one hanging port, 35 ms with 64
         assert all(pty.drain().startswith(STOP_FRAME) for pty in ptys[stuck:])
         goes_on.set()
         stopping.finish(0.1)
@@ -434,7 +434,7 @@ def test_a_port_that_was_set_to_another_speed_is_stopped(tmp_path: Path, *, open
 
 @pytest.mark.parametrize("opened", [True, False])
 def test_a_port_that_was_left_without_a_line_discipline_is_stopped(tmp_path: Path, *, opened: bool) -> None:
-    """With N_NULL a serial port does not even say that it is one."""
+    """With N_NULL a serial port does not even identify as one."""
     with running_chargers(tmp_path) as (bench,):
         fd = bench.duplicate() if opened else None
         without_discipline(bench.fd)
@@ -470,7 +470,7 @@ def without_discipline(fd: int) -> None:
 
 @pytest.mark.parametrize("opened", [True, False])
 def test_output_that_was_suspended_goes_on(tmp_path: Path, *, opened: bool) -> None:
-    """As by Ctrl-S, or an XOFF that came in while somebody had flow control on."""
+    """As after Ctrl-S, or an XOFF received while flow control was on."""
     with running_chargers(tmp_path) as (bench,):
         termios.tcflow(bench.fd, termios.TCOOFF)
         assert stop_all({bench.name: bench.duplicate() if opened else None}, 3.0) == {bench.name: ""}

@@ -1,4 +1,4 @@
-"""What the processes of last resort import, with all that comes in by it: the standard library, little of ours."""
+"""Imports of the last-resort processes, direct and indirect: the standard library and little of ours."""
 
 import ast
 import subprocess
@@ -17,7 +17,7 @@ LAST_PORT = PORT | {"protocol", "protocol.standby", "lastresort.lastport"}
 LINE = LAST_PORT | {"lastresort.descriptors", "lastresort.lastline"}
 STOP = LINE | {"lastresort.laststop"}
 ALONE = ("port_owner", "line_settings", "notify", "lastopen", "descriptors", "contactors", "estop_options")
-#: Module → all of the product that is imported with it.
+#: Module → all product modules imported with it.
 LEAN: dict[str, set[str]] = {
     "protocol.standby": {"", "protocol", "protocol.standby"},
     **{f"lastresort.{name}": ROOM | {f"lastresort.{name}"} for name in ALONE},
@@ -32,7 +32,7 @@ MODULES = {module.name: module for module in product()}
 
 
 def at_import(module: Module) -> Iterator[str]:
-    """What is imported as soon as the module is: not what its functions import when they are called."""
+    """The module's import-time imports, without those its functions make when called."""
     body = ast.parse(module.source).body
     for top in body:
         within = [top] if isinstance(top, ast.Import | ast.ImportFrom) else []
@@ -46,7 +46,7 @@ def at_import(module: Module) -> Iterator[str]:
 
 
 def closure(name: str) -> tuple[set[str], set[str]]:
-    """All modules of the product, and all other libraries, that come in with one."""
+    """All product modules and all other libraries imported with this one."""
     ours: set[str] = set()
     others: set[str] = set()
     waiting = [name]
@@ -85,7 +85,7 @@ def test_it_is_imported_where_no_other_library_exists(name: str) -> None:
 
 
 def test_an_emergency_stop_needs_no_other_library(tmp_path: Path) -> None:
-    """To its end, with the service that it looks for."""
+    """A complete run, with the service it looks for."""
     with running_chargers(tmp_path) as (bench,):
         argv = [sys.executable, "-S", "-m", PACKAGE, "estop", "--port", bench.name]
         done = subprocess.run(argv, cwd=ROOT.parent, capture_output=True, text=True, check=False, timeout=30)

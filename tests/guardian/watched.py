@@ -1,4 +1,4 @@
-"""A guardian in a process of its own, with a controller made by hand: a test holds the other end of its connection."""
+"""A guardian in a separate process, with the test as its controller, at the other end of its connection."""
 
 import array
 import fcntl
@@ -17,8 +17,8 @@ from orchestrator.lastresort.guardian import ALIVE, BEAT, PORT
 from tests.waiting import wait_until
 from tests.whole.station import die_with_parent
 
-#: Arguments: the connection, the controller's code, then constants of the guardian, as END_S=0.3. There is no GPIO line
-#: on most machines: a test hands over a pipe, and what the guardian would ask of the kernel comes out at its other end.
+#: Arguments: the connection, the controller's code, then guardian constants such as END_S=0.3. Most machines have no
+#: GPIO line: a test passes a pipe, and the guardian's requests to the kernel come out at its other end.
 LAUNCH = """
 import os, socket, struct, sys, termios, time
 from orchestrator.lastresort import guardian, lastopen
@@ -58,12 +58,12 @@ SAYS_WHEN_HUNG_UP = (
     "import signal; signal.signal(1, lambda *_: print('hung up', flush=True)); print(flush=True)\n"
     "while True: signal.pause()"
 )
-#: The guardian is done with whatever it has to do by then, on a busy machine, too.
+#: By then the guardian has finished anything it does, even on a busy machine.
 END_S = 20.0
 
 
 class Watched:
-    """A guardian, and the connection over which it expects a controller."""
+    """A guardian, and the connection on which it expects a controller."""
 
     def __init__(self, process: "subprocess.Popen[bytes]", link: socket.socket, log: Path) -> None:
         self.process, self.link = process, link
@@ -77,12 +77,12 @@ class Watched:
         self.send(PORT + name.encode(), fd)
 
     def settle(self) -> None:
-        """Returns when all that was sent has been taken, without a heartbeat that would put the deadline off."""
+        """Returns when all messages have been taken, without a heartbeat, which would extend the deadline."""
         wait_until(lambda: not unread_bytes(self.link))
         wait_until(lambda: state_of(self.process.pid) in "SZ")
 
     def beat(self) -> None:
-        """One heartbeat; returns when it was answered, so that all that was sent before has been taken."""
+        """One heartbeat; returns when it is answered, so everything sent before has been taken."""
         self.send(BEAT)
         assert self.link.recv(16) == ALIVE
 
@@ -119,19 +119,19 @@ def die_with_parent_in(terminal: int) -> None:
 
 
 def unread_bytes(link: socket.socket) -> int:
-    """What was sent and not received yet, as the kernel accounts for it."""
+    """Bytes sent and not yet received, as counted by the kernel."""
     return int.from_bytes(fcntl.ioctl(link, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
 
 
 def children_of(pid: int) -> list[int]:
-    """Those that live, or are not buried yet."""
+    """Those alive or not yet reaped."""
     with suppress(FileNotFoundError, ProcessLookupError):
         return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     return []
 
 
 def state_of(pid: int) -> str:
-    """A process's state as the kernel names it, "Z" (dead, not buried) also when it is buried already."""
+    """A process's state as named by the kernel; "Z" (zombie) also if already reaped."""
     with suppress(FileNotFoundError, ProcessLookupError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     return "Z"
@@ -147,7 +147,7 @@ def watched(
     terminal: int | None = None,
     hangs: tuple[str, str] = ("", ""),
 ) -> Iterator[Watched]:
-    """`hangs`: this call of the kernel never returns for this port; it is what adapters do whose firmware is dead."""
+    """`hangs`: this system call never returns for this port, as with adapters with dead firmware."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.settimeout(END_S)
     log = directory / "guardian.log"
@@ -170,5 +170,5 @@ def watched(
             left = children_of(process.pid)
             process.kill()
             process.wait()
-            for child in left:  # it knows of no guardian, and would wait for ever
+            for child in left:  # it knows no guardian, and would wait for ever
                 os.kill(child, signal.SIGKILL)

@@ -1,7 +1,7 @@
 """Run tests in a guest with a real SocketCAN and with systemd: `python -m tests.guest [PYTEST'S ARGUMENTS]`.
 
-The guest is a User Mode Linux: no rights and no virtual machine are needed, it sees this machine's files and keeps its
-own writing to itself. Timing inside is coarse: nothing below 50 ms means anything there.
+The guest is a User Mode Linux: it needs no privileges and no virtual machine, sees this machine's files and keeps its
+own writes to itself. Timing inside is coarse: nothing below 50 ms means anything.
 """
 
 import json
@@ -17,11 +17,11 @@ from tests.guest.kernel import CACHE, Kernel, MissingError, find
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 OUT = ROOT / "run" / "guest"
-#: What is installed in the guest, which has no network, by the machine's own Python: the technician's.
+#: Installed in the guest, which has no network, by the system's own Python, as a technician would.
 WHEELS = CACHE / "wheels"
 PYTHON = "/usr/bin/python3"
 LIST = ROOT / "requirements" / "runtime.txt"
-#: A guest that has not ended by then hangs; what a test hangs in, pytest's own time-out shows.
+#: A guest still running by then hangs; where a test hangs is shown by pytest's own time-out.
 LIMIT_S = 2400
 MEMORY = "1G"
 PYTEST = ("-m", "pytest", "-p", "no:cacheprovider", "--color=no", "--timeout=300", "-v")
@@ -30,7 +30,7 @@ NOTHING = 125
 
 
 def boot(kernel: Kernel, command: Sequence[str], out: Path) -> int:
-    """Run a command as root in a guest of its own; its exit status, NOTHING where it has none."""
+    """Run a command as root in a fresh guest; returns its exit status, or NOTHING without one."""
     out.mkdir(parents=True, exist_ok=True)
     status = out / "status"
     status.unlink(missing_ok=True)

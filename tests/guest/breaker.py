@@ -1,4 +1,4 @@
-"""`python -m tests.guest.breaker WHAT FD STATION`: the unchanged controller, in which something breaks on SIGUSR1.
+"""`python -m tests.guest.breaker WHAT FD STATION`: the unchanged controller, with one break on SIGUSR1.
 
 WHAT is a name in BREAKS.
 """

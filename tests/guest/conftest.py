@@ -1,4 +1,4 @@
-"""These tests need the guest (`make test-guest`); elsewhere there is nothing to collect."""
+"""These tests need the guest (`make test-guest`); elsewhere none is collected."""
 
 import os
 from pathlib import Path

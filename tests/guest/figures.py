@@ -1,4 +1,4 @@
-"""What was measured in the guest, as a table: printed at the end, and left where the host finds it."""
+"""The measurements in the guest as a table, printed at the end and left where the host finds it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Figure:
-    """What was done in mid-charge, when the charger got its stop, and when that was over (None: it is not).
+    """The event in mid-charge, when the charger got its stop, and when that was over (None: it is not).
 
     Over: it charges again, or, `held`, the service is back and waits for its operator with the charger verified.
     """

@@ -1,8 +1,8 @@
 """The guest's first process, until systemd takes over: `python first.py FOLDER`.
 
-The guest sees the host's files read-only. Over them lies a layer in memory that takes whatever is written, so that the
-guest has a whole system of its own, /etc and /opt included, and the host keeps what it has. FOLDER is the one place
-that the host sees, too: its `job.json` says what to do, `status` is the answer; it is /mnt in the guest.
+The guest sees the host's files read-only, below a layer in memory that takes all writes. So the guest has a complete
+system, /etc and /opt included, and the host stays unchanged. FOLDER is the one place shared with the host: its
+`job.json` is the job, `status` is the answer; it is /mnt in the guest.
 """
 
 import ctypes
@@ -16,9 +16,9 @@ LIBC = ctypes.CDLL(None, use_errno=True)
 FINIT_MODULE = 313  #: the system call, on x86_64
 MS_MOVE = 0x2000
 UNITS = Path("/etc/systemd/system")
-#: What systemd would start before anything else, and what a guest without disks, clocks and networks does without.
+#: Units systemd would start first; a guest without disks, clocks and networks needs none of them.
 EARLY = ("sysinit.target.wants", "sockets.target.wants", "local-fs.target.wants", "timers.target.wants")
-#: Of these, what is needed: the log that `journalctl` shows.
+#: The ones it does need: the log for `journalctl`.
 KEPT = ("systemd-journald.service", "systemd-journald.socket")
 
 TARGET = """\
@@ -72,7 +72,7 @@ def lay_over() -> None:
 
 
 def write_units(job: dict[str, str]) -> None:
-    """Nothing of what the host has set up is started: only ours, and what systemd cannot do without."""
+    """Start none of the host's services: only ours, and what systemd itself needs."""
     shutil.rmtree(UNITS)
     UNITS.mkdir()
     for folder in EARLY:

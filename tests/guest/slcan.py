@@ -1,7 +1,7 @@
-"""A serial CAN adapter that can be pulled out.
+"""A serial CAN adapter that can be unplugged.
 
-The kernel's slcan driver and the emulated BMU are on a pty each. Between the two stands a relay, which is the adapter:
-it hands on the lines that both sides speak, and says what an adapter says by itself.
+The kernel's slcan driver and the emulated BMU each have a pty. The relay between them plays the adapter: it passes
+lines between both sides and sends an adapter's own messages.
 """
 
 import fcntl
@@ -18,13 +18,13 @@ from tests.guest.stage import switch
 
 N_SLCAN = 17  #: the line discipline (linux/tty.h)
 SIOCGIFNAME = 0x8910
-#: What an adapter says of its controller: s, the state's letter, three digits of receive and transmit errors each.
+#: An adapter's report on its controller: s, the state's letter, three digits each of receive and transmit errors.
 BUS_OFF = b"sb000255\r"
 ACTIVE = b"sa000000\r"
 
 
 class Adapter:
-    """`interface` is the kernel's name for it; `theirs` is how python-can reaches the other side."""
+    """`interface` is its kernel name; `theirs` is python-can's channel to the other side."""
 
     def __init__(self, background: Background) -> None:
         self._background = background
@@ -39,7 +39,7 @@ class Adapter:
         return {"interface": "slcan", "channel": path, "bitrate": 250000, "sleep_after_open": 0, "timeout": 0.01}
 
     def plug(self) -> None:
-        """Attach the driver and bring the interface up, as slcand does; the bit rate is the adapter's own affair."""
+        """Attach the driver and bring the interface up, as slcand does; the bit rate is left to the adapter."""
         self._near, self._near_tty = _pty()
         fcntl.ioctl(self._near_tty, termios.TIOCSETD, struct.pack("i", N_SLCAN))
         self.interface = fcntl.ioctl(self._near_tty, SIOCGIFNAME, bytes(16)).partition(b"\0")[0].decode()
@@ -47,7 +47,7 @@ class Adapter:
         switch(self.interface, up=True)
 
     def unplug(self) -> None:
-        """The interface is gone afterwards."""
+        """Remove the interface."""
         if self._near >= 0:
             self._background.call(self._hold_back)
             os.close(self._near)
@@ -55,7 +55,7 @@ class Adapter:
             self._near = -1
 
     def say(self, line: bytes) -> None:
-        """Let the adapter tell the kernel something."""
+        """Send a message of the adapter to the kernel."""
         os.write(self._near, line)
 
     def close(self) -> None:
@@ -80,7 +80,7 @@ def _pty() -> tuple[int, int]:
 
 
 def _copy(source: int, target: int) -> None:
-    with suppress(OSError):  # a line that nobody reads keeps nothing
+    with suppress(OSError):  # a line without a reader buffers nothing
         os.write(target, os.read(source, 4096))
 
 

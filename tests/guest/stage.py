@@ -1,4 +1,4 @@
-"""A station in mid-charge on a CAN interface of the kernel, and what may be done to it."""
+"""A station in mid-charge on a kernel CAN interface, and ways to disturb it."""
 
 import fcntl
 import json
@@ -21,11 +21,11 @@ SIOCSIFFLAGS, IFF_UP = 0x8914, 0x1  #: linux/sockios.h, linux/if.h
 RUN = ("-m", "orchestrator", "run")
 #: The guest has one slow processor.
 CHARGING_S = 60.0
-#: Who looks more often slows down what he looks at.
+#: Polling more often slows down what is polled.
 LOOK_S = 0.1
-#: 10 s without the fault, 10 s of backoff, then the bay qualifies anew.
+#: 10 s without the fault, 10 s of backoff, then the bay qualifies again.
 AGAIN_S = 60.0
-#: A pack so cold that a charge is on the lowest step, where a warm one's is on the highest.
+#: A pack cold enough for the lowest current step; a warm one charges on the highest.
 COLD_C = 5.0
 TOP_STEP, LOWEST_STEP = 4, 0
 
@@ -36,7 +36,7 @@ def ip(*words: str) -> None:
 
 
 def switch(name: str, *, up: bool) -> None:
-    """`ip link set NAME up|down` without the 0.3 s that a program needs to start in the guest."""
+    """`ip link set NAME up|down` without the 0.3 s a program needs to start in the guest."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as any_socket:
         request = struct.pack("16sh14x", name.encode(), IFF_UP if up else 0)
         fcntl.ioctl(any_socket, SIOCSIFFLAGS, request)
@@ -61,7 +61,7 @@ class Scene:
     service: Service
 
     def until(self, condition: Callable[[dict[str, Any]], object], what: str, timeout_s: float = 10.0) -> None:
-        """Wait until it is true of the charger and its pack as they are."""
+        """Wait until it is true of the real charger and pack."""
         wait_until(lambda: condition(self.plant.state()), timeout_s, what, LOOK_S)
 
     def charges(self) -> None:
@@ -71,8 +71,8 @@ class Scene:
         assert self.plant.state()["current_limit"] == TOP_STEP
 
     def stopped_by(self, happen: Callable[[], object]) -> float:
-        """Let it happen, and wait for the charger's standby; the seconds until the first stop byte reached it."""
-        self.plant.inject("heal")  # from now on, the first stop is looked for
+        """Trigger it and wait for the charger's standby; returns the seconds until its first stop byte."""
+        self.plant.inject("heal")  # watch for the first stop from here on
         happened_s = time.monotonic()
         happen()
         self.until(lambda truth: truth["first_stop_s"], "a stop")
@@ -80,10 +80,10 @@ class Scene:
         return float(self.plant.state()["first_stop_s"]) - happened_s
 
     def charges_again(self, mend: Callable[[], object] | None = None) -> float:
-        """Mend what was broken (None: it mends itself), and wait for the next charge; the seconds until then.
+        """Repair the break (None: it heals itself) and wait for the next charge; returns the seconds until then.
 
-        That may know nothing but what is read from then on: before it is mended the pack becomes cold, so that an order
-        by an old temperature would be seen.
+        The next charge must use fresh readings only: the pack is made cold before the repair, so a command
+        based on an old temperature would show.
         """
         guardian, seen = self.service.guardian, len(self.service.path_of("bay-1"))
         if mend is not None:
@@ -103,7 +103,7 @@ class Scene:
         return again_s
 
     def steps_ordered(self, since_s: float) -> set[int]:
-        """The current steps of the decisions since then, as the journal has them."""
+        """The current steps decided since then, from the journal."""
         decisions = self.service.journal("bay-1", "decision")
         return {line["step"]["index"] for line in decisions if line["step"] and line["t"] >= since_s}
 

@@ -1,4 +1,4 @@
-"""Serial adapters that come back under another name, and what may break inside of the running service."""
+"""Serial adapters that return under another name, and breaks inside the running service."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from tests.guest.stage import LOOK_S, note, socketcan, station, vcan
 from tests.waiting import wait_until
 
 AT_ONCE_S = 0.5
-#: A port that is gone is opened again every second.
+#: A missing port is retried every second.
 REOPENED_S = 2.0
 GUARD = """
 import sys
@@ -21,7 +21,7 @@ sys.exit(guard(sys.argv[2:], ("-m", "tests.guest.breaker", sys.argv[1])))
 
 
 def test_a_serial_adapter_that_comes_back_under_another_number(tmp_path: Path) -> None:
-    """While it is away no stop reaches its charger, which goes on; the first thing that it hears then is a stop."""
+    """While it is away no stop reaches its charger, which runs on; the first frame it then receives is a stop."""
     with vcan("vcan0"), station(tmp_path, socketcan("vcan0")) as scene:
         scene.charges()
         link, plant, service = tmp_path / "bay-1", scene.plant, scene.service
@@ -59,7 +59,7 @@ def test_the_service_mends_what_breaks_in_it(tmp_path: Path, what: str, reason: 
 
 
 def test_a_thread_that_ends_stops_the_heartbeats(tmp_path: Path) -> None:
-    """It cannot be mended: the guardian stops the chargers and ends, for systemd to start anew."""
+    """It cannot be repaired: the guardian stops the chargers and ends, and systemd restarts the service."""
     what = "CAN threads end"
     with vcan("vcan0"), station(tmp_path, socketcan("vcan0"), run=("-c", GUARD, what)) as scene:
         scene.charges()

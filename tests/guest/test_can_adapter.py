@@ -1,4 +1,4 @@
-"""A serial CAN adapter under the kernel's slcan driver: its controller goes bus-off, and it is pulled out."""
+"""A serial CAN adapter under the kernel's slcan driver: its controller goes bus-off, and it is unplugged."""
 
 from pathlib import Path
 

@@ -1,11 +1,11 @@
-"""A charge over the kernel's own CAN, and an interface that goes and comes in the middle of it."""
+"""A charge over the kernel's own CAN, and an interface that goes down and up during it."""
 
 from pathlib import Path
 
 from tests.guest.stage import LOOK_S, note, socketcan, station, switch, vcan
 from tests.waiting import wait_until
 
-#: The kernel says at once that an interface is down; the rest is the guest's slow processor.
+#: The kernel reports at once that an interface is down; the rest is the guest's slow processor.
 AT_ONCE_S = 0.5
 
 

@@ -1,4 +1,4 @@
-"""The shipped unit under systemd, installed by the page: its drill, and whatever guardian and controller may die of."""
+"""The shipped unit under systemd, installed by the page: its drill, and every death of guardian and controller."""
 
 import os
 import re
@@ -16,19 +16,19 @@ from tests.guest.stage import AGAIN_S, CHARGING_S, LOOK_S, Scene, note
 from tests.waiting import wait_until
 
 UNIT = "/etc/systemd/system/orchestrator.service"
-#: What the technician's shell does when he logs in.
+#: Run by the technician's shell at login.
 LOGIN = ". /etc/profile.d/orchestrator.sh"
-#: Whom a signal is sent to: their process ids, from the scene.
+#: Receivers of a signal: their process ids, from the scene.
 WHOM: dict[str, Callable[[Scene], list[int]]] = {
     "controller": lambda bay: [bay.service.controller],
     "guardian": lambda bay: [bay.service.guardian],
     "guardian and controller": lambda bay: [bay.service.guardian, bay.service.controller],
 }
-#: What the guest's slow processor adds, and until its `estop` has started (1.7 s where the host has other work, too).
+#: Time added by the guest's slow processor, and by the start of its `estop` (1.7 s if the host has other work).
 SLACK_S = 1.0
 START_S = 2.5
-#: (signal, whom) → the seconds allowed until the stop. By the design: the guardian's 0.5 s for a controller that hangs,
-#: the controller's 2 s for such a guardian, systemd's 3 s (WatchdogSec) for both; then, where nobody is left, `estop`.
+#: (signal, receiver) → the seconds allowed until the stop. By design: the guardian's 0.5 s for a hanging controller,
+#: the controller's 2 s for a hanging guardian, systemd's 3 s (WatchdogSec) for both; if nobody is left, then `estop`.
 ALLOWED_S = {
     (signal.SIGKILL, "controller"): 0.0,
     (signal.SIGKILL, "guardian"): START_S,
@@ -84,20 +84,20 @@ def test_the_drill_of_the_page(bay: Scene, command: str) -> None:
 
 
 def charge(bay: Scene) -> None:
-    """What the operator says, and a charge."""
+    """The operator's start, and a charge."""
     comes_to(bay, r".")
     wait_until(lambda: not bay.service.ask("start", "bay-1")["bay-1"], AGAIN_S, "a start that is accepted", LOOK_S)
     charging(bay)
 
 
 def held(bay: Scene) -> None:
-    """The service is there (again), has verified the charger's standby, and waits for its operator."""
+    """The service is up (again), has verified the charger's standby, and waits for its operator."""
     comes_to(bay, r"^HELD: .*: orchestrator start bay-1$")
     assert bay.plant.state()["operation"] == 0
 
 
 def goes_on(bay: Scene) -> float:
-    """An orderly end is no operator's stop: what it charged, the next run charges again; the seconds until then."""
+    """A clean end is not an operator's stop: the next run resumes the charges; returns the seconds until then."""
     assert page.run("systemctl show --property Result --value orchestrator").strip() == "success"
     started_s = time.monotonic()
     page.run("sudo systemctl start orchestrator")
@@ -106,13 +106,13 @@ def goes_on(bay: Scene) -> float:
 
 
 def charging(bay: Scene) -> None:
-    """The service is there (again), and charges."""
+    """The service is up (again) and charges."""
     comes_to(bay, r"^CHARGING: ")
     bay.until(lambda truth: truth["current_a"] > 1, "a current")
 
 
 def comes_to(bay: Scene, wanted: str) -> None:
-    """Wait for such a state and reason, also of a service that is only just starting."""
+    """Wait for this state and reason, even of a service just starting."""
     wait_until(lambda: re.search(wanted, said(bay)), CHARGING_S, f"a bay that says {wanted}", LOOK_S)
 
 

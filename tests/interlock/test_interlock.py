@@ -1,4 +1,4 @@
-"""The interlock is tried with everything; only what is listed here passes. It imports nothing of the core."""
+"""The interlock is tried with everything; only what is listed here passes. It imports nothing from the core."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -33,7 +33,7 @@ MANUAL = ChargerConfig(port="p", control=ControlMode.MANUAL, steps_a=(2.0, 5.0, 
 AUTOMATIC = replace(MANUAL, control=ControlMode.AUTOMATIC)
 GOOD = Grant(expires_s=NOW_S + 0.5, voltage_v=50.0, temperature_c=20.0, current_limit=2)
 
-#: Every command with a value from well below to well above what any of them takes.
+#: Every command with values from well below to well above its range.
 EVERY = [Command(action, value) for action in Action for value in range(-2, 260)]
 
 STOPS = {Command(Action.STOP, value) for value in range(-2, 260)}
@@ -49,7 +49,7 @@ SETS = {
 def passing(
     evidence: Grant | None, charger: ChargerConfig = MANUAL, limits: Limits = LIMITS, now_s: float = NOW_S
 ) -> set[Command]:
-    """Of all commands, those that may go out."""
+    """The commands permitted, out of all."""
     verdicts = {command: permit(command, evidence, now_s, charger, limits) for command in EVERY}
     return {command for command, why in verdicts.items() if why is None}
 
@@ -65,7 +65,7 @@ def test_in_automatic_mode_only_stop_and_resume_pass() -> None:
     assert passing(GOOD, AUTOMATIC) == STOPS | {RESUME}
 
 
-#: Evidence with which nothing but a stop may go out.
+#: Evidence that permits nothing but a stop.
 WORTHLESS: Mapping[str, Grant | None] = {
     "none": None,
     "expired now": replace(GOOD, expires_s=NOW_S),
@@ -242,7 +242,7 @@ def test_what_is_not_a_number_gives_no_grant(place: int, value: float) -> None:
 
 
 def test_the_evidence_may_be_bad_news() -> None:
-    """A grant is what was read. What may be done with it is for `permit` and the station's limits to say."""
+    """A grant records what was read. Its use is up to `permit` and the station's limits."""
     hot = replace(BATTERY, temperature_c=Measurement(80.0, NOW_S))
     found = grant(replace(FRESH, battery=hot), NOW_S)
     assert found is not None

@@ -1,4 +1,4 @@
-"""A serial port made of a pty, under a stable name, that can be unplugged, plugged in again and stalled."""
+"""A serial port made of a pty with a stable name; it can be unplugged, plugged in again and stalled."""
 
 import os
 import select
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 class Pty:
-    """The device's end is `master`; the product opens `path`, a symbolic link as below /dev/serial/by-path."""
+    """The device's end is `master`; the product opens `path`, a symbolic link as in /dev/serial/by-path."""
 
     def __init__(self, link: Path) -> None:
         self._link = link
@@ -19,7 +19,7 @@ class Pty:
         self.plug()
 
     def plug(self) -> None:
-        # The pty's other end stays open here, so that the master never reads EIO while the product has it closed.
+        # The pty's other end stays open here, so the master never reads EIO while the product has it closed.
         self.master, self._ours = os.openpty()
         tty.setraw(self._ours)
         self._link.symlink_to(os.ttyname(self._ours))
@@ -32,22 +32,22 @@ class Pty:
             self._ours = None
 
     def fill(self) -> int:
-        """Write towards the device, which does not read, until nothing more goes in."""
+        """Write towards the device, which does not read, until the buffer is full."""
         assert self._ours is not None
         os.set_blocking(self._ours, False)
         writable = select.poll()
         writable.register(self._ours, select.POLLOUT)
         filled = 0
-        while writable.poll(100):  # the kernel hands on what was written a little later, and so makes room again
+        while writable.poll(100):  # the kernel passes writes on a little later, which makes room again
             with suppress(BlockingIOError):
                 filled += os.write(self._ours, bytes(4096))
-        with suppress(BlockingIOError):  # "writable" begins with room for more than a frame
+        with suppress(BlockingIOError):  # "writable" means room for more than a frame
             while True:
                 filled += os.write(self._ours, bytes(1))
         return filled
 
     def drain(self) -> bytes:
-        """Everything that has reached the device's end and was not read there."""
+        """Everything at the device's end not yet read."""
         everything = b""
         os.set_blocking(self.master, False)
         with suppress(BlockingIOError):

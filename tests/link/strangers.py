@@ -20,7 +20,7 @@ sys.stdin.read()
 
 @contextmanager
 def holding(port: str, how: str = "flock", name: str = sys.executable) -> Iterator["subprocess.Popen[bytes]"]:
-    """A program that has the port open, and locked by "flock" or "TIOCEXCL"; `name` is how it was called."""
+    """A program with the port open and locked by "flock" or "TIOCEXCL"; `name` is its command name."""
     process = subprocess.Popen(
         [name, "-c", _HOLD, port, how], executable=sys.executable, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
@@ -33,7 +33,7 @@ def holding(port: str, how: str = "flock", name: str = sys.executable) -> Iterat
 
 
 def stty(port: str, *words: str) -> None:
-    """As a person would, or a program that opens the port for itself."""
+    """Like a person, or a program that opens the port itself."""
     subprocess.run(["stty", "-F", port, *words], check=True, capture_output=True)
 
 

@@ -40,7 +40,7 @@ def opened(settings: dict[str, object]) -> tuple[CanBus, Frames]:
 
 
 def listen(bus: CanBus, condition: Callable[[], object], what: str) -> None:
-    """Receive until it is true."""
+    """Receive until the condition is true."""
 
     def step() -> object:
         bus.receive(0.02)
@@ -56,7 +56,7 @@ def channel() -> str:
 
 @pytest.fixture
 def pair(channel: str) -> Iterator[tuple[CanBus, Frames, can.BusABC]]:
-    """Our bus and the other end of it, on python-can's virtual interface."""
+    """Our bus and its other end, on python-can's virtual interface."""
     bus, heard = opened({"interface": "virtual", "channel": channel})
     with can.Bus(interface="virtual", channel=channel) as other:
         yield bus, heard, other
@@ -64,7 +64,7 @@ def pair(channel: str) -> Iterator[tuple[CanBus, Frames, can.BusABC]]:
 
 
 def unreadable(bus: CanBus) -> list[Exception]:
-    """What the driver cannot read from now on."""
+    """Make the driver's reads fail from now on."""
     came: list[Exception] = []
     good = bus._unreadable
 
@@ -99,7 +99,7 @@ def test_foreign_frames_do_not_disturb(pair: Pair) -> None:
     other.send(message(0x590, b"", is_remote_frame=True))
     other.send(message(0x123, b"abc"))
     other.send(message(0x470, b"\x70"))  # the BMU's older protocol
-    other.send(message(0x7E4, bytes(8)))  # LSS, which canopen would keep for ever
+    other.send(message(0x7E4, bytes(8)))  # LSS, which canopen would store for ever
     for _ in range(5):
         bus.receive(1.0)
     assert heard == []
@@ -144,7 +144,7 @@ def test_what_a_callback_raises_is_not_swallowed(pair: Pair) -> None:
 
     bus.subscribe(0x591, broken)
     bus.close()
-    bus.open()  # what is subscribed holds for the next bus, too
+    bus.open()  # subscriptions hold for the next bus too
     other.send(message(0x591, ANSWER))
     with pytest.raises(ZeroDivisionError, match="a bug"):
         bus.receive(1.0)
@@ -214,7 +214,7 @@ def test_an_error_passive_controller_is_noticed(pair: Pair) -> None:
     other.send(message(0x004, bytes.fromhex("00 20 00 00 00 00 80 00"), is_error_frame=True))
     bus.receive(1.0)
     assert bus.trouble == Cause(can_text.PASSIVE)
-    other.send(message(0x008, bytes(8), is_error_frame=True))  # passing noise says nothing
+    other.send(message(0x008, bytes(8), is_error_frame=True))  # passing noise is not reported
     bus.receive(1.0)
     assert bus.trouble == Cause(can_text.PASSIVE)
     other.send(message(0x004, bytes.fromhex("00 40 00 00 00 00 00 00"), is_error_frame=True))
@@ -271,7 +271,7 @@ def test_a_full_transmit_queue_is_an_absent_bmu_not_a_broken_bus(
     def send(*_args: object) -> None:
         raise full
 
-    monkeypatch.setattr(bus._bus, "send", send)  # no bus without a wire can have it for real
+    monkeypatch.setattr(bus._bus, "send", send)  # impossible on a bus without a wire
     bus.send(0x610, READ)
     assert "nobody acknowledges" in say(bus.trouble)
     other.send(message(0x590, ANSWER))
@@ -300,7 +300,7 @@ def test_a_driver_that_cannot_even_forget_its_noise_breaks_the_bus(pair: Pair, m
         raise can.CanOperationError("Could not flush", 5)
 
     monkeypatch.setattr(bus._bus, "recv", recv)
-    monkeypatch.setattr(bus._bus, "flush", flush, raising=False)  # an adapter that is pulled out just then
+    monkeypatch.setattr(bus._bus, "flush", flush, raising=False)  # an adapter unplugged at that moment
     with raises(LinkError, match="Input/output error"):
         bus.receive(0.0)
 
@@ -435,7 +435,7 @@ def slcan(adapter: Pty) -> tuple[CanBus, Frames]:
 
 
 def read_line(adapter: Pty, wanted: bytes) -> None:
-    """Read what the adapter is told until `wanted` is in it."""
+    """Read the adapter's input until it contains `wanted`."""
     seen = b""
 
     def arrived() -> bool:
@@ -495,13 +495,13 @@ def test_an_unplugged_adapter_leaves_no_file_open(adapter: Pty) -> None:
     with pytest.raises(LinkError):
         for _ in range(MAX_GARBAGE):
             bus.receive(0.0)
-    bus.close()  # while an old file is open, the kernel gives the adapter another name when it returns
+    bus.close()  # while an old file is open, the kernel gives a returning adapter another name
     assert len(list(Path("/proc/self/fd").iterdir())) == before - 2  # the pty's own two
 
 
 def test_a_stalled_adapter_does_not_stall_the_thread(adapter: Pty) -> None:
     bus, _ = slcan(adapter)
     with raises(LinkError, match="slcan"):
-        for _ in range(2000):  # nobody reads: the pty takes some 4 kB
+        for _ in range(2000):  # without a reader the pty takes about 4 kB
             bus.send(0x610, READ)
     bus.close()

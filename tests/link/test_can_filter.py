@@ -1,4 +1,4 @@
-"""What the kernel is asked to keep back, and who is asked at all."""
+"""The kernel's receive filters, and the interfaces that get one."""
 
 import can
 import pytest
@@ -11,7 +11,7 @@ REMOTE = 0x4000_0000
 
 
 def passes(chosen: list[Filter], can_id: int) -> bool:
-    """As the kernel does it (net/can/af_can.c), with its flags in the upper bits of the id."""
+    """As in the kernel (net/can/af_can.c), with its flags in the upper bits of the id."""
     extended = 0x8000_0000
     return any((can_id ^ one["can_id"]) & (one["can_mask"] | extended) == 0 for one in chosen)
 
@@ -34,7 +34,7 @@ def test_what_the_kernel_has_no_room_for_is_told_by_function_code() -> None:
 
 
 class Driver(can.BusABC):
-    """A SocketCAN interface without a wire: this machine may have none. It notes the filters that the kernel gets."""
+    """A SocketCAN interface without a wire, since this machine may have none. It records the kernel's filters."""
 
     def __init__(self) -> None:
         self.chosen: list[object] = []
@@ -67,9 +67,9 @@ def test_socketcan_gets_them(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("settings", "filtered"),
     [
-        (SOCKETCAN | {"can_filters": [{"can_id": 0x590, "can_mask": 0x7FF}]}, True),  # the station file knows better
-        (SOCKETCAN, False),  # a probe looks for whoever is there
-        ({"interface": "slcan", "channel": "/dev/ttyACM0", "bitrate": 250_000}, True),  # python-can would do it itself
+        (SOCKETCAN | {"can_filters": [{"can_id": 0x590, "can_mask": 0x7FF}]}, True),  # the station file has priority
+        (SOCKETCAN, False),  # a probe looks for any node
+        ({"interface": "slcan", "channel": "/dev/ttyACM0", "bitrate": 250_000}, True),  # python-can would filter itself
     ],
     ids=["station file", "probe", "software"],
 )

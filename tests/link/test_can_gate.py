@@ -8,7 +8,7 @@ from orchestrator.link.can_gate import refusal
 
 NODES = (0x10, 0x11)
 
-#: All that may ever be written to node 0x10, reads apart: written out once more, by hand.
+#: Everything that may ever be sent to node 0x10, except reads: written out again by hand.
 NMT = {bytes((command, node)) for command in (0x01, 0x02, 0x80, 0x81, 0x82) for node in NODES}
 TIMERS = {(0x1017, 0): range(100, 2001)} | {(0x1800 + i, 5): range(50, 1001) for i in range(3)}
 

@@ -1,4 +1,4 @@
-"""What the technician reads when a CAN bus does not work."""
+"""Messages to the technician when a CAN bus does not work."""
 
 import errno
 import socket
@@ -14,7 +14,7 @@ SETTINGS = {"interface": "socketcan", "channel": "can3", "bitrate": 125_000}
 
 
 def raised(error: Exception, cause: Exception | None = None) -> Exception:
-    """As if it had been raised from `cause`."""
+    """As if raised from `cause`."""
     error.__cause__ = cause
     return error
 

@@ -1,4 +1,4 @@
-"""The serial port over real ptys: what it does, and the sentence for everything that can go wrong."""
+"""The serial port over real ptys: its function, and the sentence for everything that can go wrong."""
 
 import errno
 import fcntl
@@ -252,7 +252,7 @@ def test_a_look_at_the_settings_costs_a_stop_next_to_nothing(line: SerialLine) -
 
 
 def test_a_stop_tool_that_takes_no_lock_can_write_to_a_port_that_is_in_use(pty: Pty, line: SerialLine) -> None:
-    tool = os.open(pty.path, os.O_WRONLY | os.O_NOCTTY)  # would be EBUSY with TIOCEXCL, but for root
+    tool = os.open(pty.path, os.O_WRONLY | os.O_NOCTTY)  # would be EBUSY with TIOCEXCL, except for root
     os.write(tool, b"stop")
     os.close(tool)
     assert os.read(pty.master, 16) == b"stop"
@@ -329,7 +329,7 @@ def test_a_stalled_line_is_told_without_burning_the_processor(pty: Pty, line: Se
 
 
 def test_an_order_that_a_stalled_line_kept_does_not_come_out_later(pty: Pty, line: SerialLine) -> None:
-    line.write(bytes(8192))  # the device's end of the pty has room for the first 4096 of these: they count as sent
+    line.write(bytes(8192))  # the device's end of the pty takes the first 4096 of these: they count as sent
     line.write(b"old order")
     filled = pty.fill()
     with raises(LinkError, match="stalled"):
@@ -348,7 +348,7 @@ def test_a_port_that_is_gone_has_no_settings(pty: Pty, line: SerialLine) -> None
 
 def test_a_port_that_is_gone_has_no_output_to_forget(pty: Pty, line: SerialLine) -> None:
     pty.unplug()
-    line._forget_output()  # between a time-out and this, an adapter can be pulled
+    line._forget_output()  # between a time-out and this, an adapter can be unplugged
 
 
 def test_every_use_after_close_is_a_link_error(line: SerialLine) -> None:
@@ -372,7 +372,7 @@ def test_whatever_pyserial_raises_is_translated(
     def fails(*_: object) -> None:
         raise raised
 
-    monkeypatch.setattr(serial.Serial, "fileno", fails)  # these come of races that no test can win reliably
+    monkeypatch.setattr(serial.Serial, "fileno", fails)  # from races no test can win reliably
     with raises(LinkError, match="unplugged"):
         line.write(b"x")
 
@@ -392,7 +392,7 @@ def _seconds(work: Callable[[], object]) -> float:
 
 @contextmanager
 def without_privileges(pty: Pty) -> Iterator[str]:
-    """Root may open what is one program's alone, so be somebody else who may use this device."""
+    """Root may open an exclusive device, so become another user with access to it."""
     device = os.path.realpath(pty.path)
     Path(device).chmod(0o666)
     with somebody_else():

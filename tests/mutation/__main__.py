@@ -1,9 +1,9 @@
-"""Break the product in every small way, one at a time, and see that a test notices: `python -m tests.mutation`.
+"""Break the product in every small way, one at a time, and check that a test notices: `python -m tests.mutation`.
 
-mutmut makes the mutants and tries them; pyproject.toml says of what, and with which tests. What it finds goes to
-docs/mutation.md, in which the reasons of those that live are kept by hand. Arguments choose some mutants, as
-`orchestrator.protocol.frame.*`; without any, those are tried that are new or whose function has changed. Each is tried
-with the quick tests; those that live without a reason are tried once more, with the slow ones.
+mutmut makes and tries the mutants; pyproject.toml sets the modules and tests. The results go to docs/mutation.md, where
+people write the reasons for survivors. Arguments select mutants, such as `orchestrator.protocol.frame.*`; the default
+is new mutants and those of changed functions. Each is tried with the quick tests; survivors without a reason are tried
+again with the slow ones.
 """
 
 import json
@@ -22,7 +22,7 @@ PAGE = ROOT / "docs" / "mutation.md"
 
 
 def main(patterns: Sequence[str]) -> int:
-    """Try them and write the page; 1 if too many live, or one without a reason, or some were not tried."""
+    """Try them and write the page; 1 if too many survive, one survives without a reason, or some were not tried."""
     known = reasons(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
     _mutmut("run", "--max-children", "1", *patterns)
     if living := [mutant.name for mutant in _unexplained(_mutants(), known)]:
@@ -46,7 +46,7 @@ def _unexplained(mutants: Iterable[Mutant], known: Reasons) -> list[Mutant]:
 
 
 def _mutants() -> Iterator[Mutant]:
-    """All that were tried, by module and in the order of the source."""
+    """All mutants tried, by module and in source order."""
     for file in sorted(MUTANTS.rglob("*.py.meta")):
         module = str(file.relative_to(MUTANTS)).removesuffix(".meta")
         meta = json.loads(file.read_text(encoding="utf-8"))

@@ -1,30 +1,30 @@
-"""A mutant, as mutmut's files and its `show` tell of it."""
+"""A mutant, read from mutmut's files and its `show`."""
 
 import re
 from dataclasses import dataclass, replace
 from typing import Self
 
-#: mutmut's exit codes: 1 and 3 are pytest's, the rest stand for a processor or a clock that ran out.
+#: mutmut's exit codes: 1 and 3 are pytest's, the others mean that CPU time or time ran out.
 KILLED = (1, 3)
 TIMED_OUT = (-24, 24, 36, 152, 255)
-#: Set in the environment of mutmut, it stands for a trial with the slow tests instead of the quick ones.
+#: Set in mutmut's environment for a trial with the slow tests instead of the quick ones.
 SLOW_TESTS = "MUTATION_SLOW_TESTS"
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """One small change of one function, and what became of it."""
+    """One small change of one function, and its result."""
 
     module: str  #: "orchestrator/protocol/frame.py"
-    name: str  #: as mutmut calls it; the numbers change with the function
-    exit_code: int | None  #: None where it was not tried yet
+    name: str  #: mutmut's name; the numbers change with the function
+    exit_code: int | None  #: None if not tried yet
     seconds: float
     was: str = ""
     became: str = ""
 
     @property
     def tried(self) -> bool:
-        """Its tests have been run, as far as there are any."""
+        """Its tests, if any, have been run."""
         return self.exit_code is not None
 
     @property
@@ -34,12 +34,12 @@ class Mutant:
 
     @property
     def timed_out(self) -> bool:
-        """The tests did not come to an end, which a person would notice, too."""
+        """The tests did not end, which a person would notice too."""
         return self.exit_code in TIMED_OUT
 
     @property
     def lives(self) -> bool:
-        """No test noticed it, or none reaches it."""
+        """No test noticed or reaches it."""
         return self.tried and not self.killed and not self.timed_out
 
     @property
@@ -50,11 +50,11 @@ class Mutant:
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """What it is known by from one run to the next."""
+        """Its identity across runs."""
         return self.module, self.function, self.was, self.became
 
     def shown(self, diff: str) -> Self:
-        """With the lines that were changed, out of a unified diff."""
+        """With its changed lines, from a unified diff."""
         lines = [line for line in diff.splitlines() if line[:1] in ("-", "+") and line[:3] not in ("---", "+++")]
         was, became = (" ".join(line[1:].strip() for line in lines if line[0] == sign) for sign in "-+")
         return replace(self, was=was, became=became)

@@ -1,4 +1,4 @@
-"""docs/mutation.md: the score of each module, and a table of the mutants that live, with the reasons written there."""
+"""docs/mutation.md: the score of each module, and a table of the surviving mutants, with the reasons written there."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -12,27 +12,27 @@ Reasons = Mapping[tuple[str, str, str, str], str]
 HEAD = """\
 # Would a test notice?
 
-`make mutation` breaks the product in every small way that [mutmut](https://mutmut.readthedocs.io) knows, one at a time
-(a `<` to `<=`, an `and` to `or`, a number by one, an argument to None, a text to another), and runs the tests that
-reach the broken function, the quick ones first. A mutant that no test notices lives: either a test is missing, or the
-change changes nothing. At least 95 % must die, and each one that lives needs a reason below. What is mutated are the
-bodies of functions and methods, not the tables and constants of a module, nor functions with a decorator (a property,
-say).
+`make mutation` breaks the product in every small way that [mutmut](https://mutmut.readthedocs.io) knows, one at a
+time (a `<` to `<=`, an `and` to `or`, a number by one, an argument to None, a changed text), and runs the tests that
+reach the broken function, the quick ones first. A mutant that no test notices survives: either a test is missing, or
+the change has no effect. At least 95 % must be killed, and each survivor needs a reason below. Only the bodies of
+functions and methods are mutated, not a module's tables and constants, nor functions with a decorator (a property,
+for example).
 
 `make mutation ARGS='orchestrator.protocol.frame.*'` tries some again. The command writes this page and keeps the
-reasons; `?` stands where there is none yet. A mutant that times out counts as killed: it hung the test.
+reasons; `?` marks a missing one. A mutant that times out counts as killed: it hung the test.
 """
 
 
 def score(mutants: Sequence[Mutant]) -> float:
-    """How many of those that were tried were killed, in percent."""
+    """The share of tried mutants that were killed, in percent."""
     tried = [mutant for mutant in mutants if mutant.tried]
     return 100 * sum(not mutant.lives for mutant in tried) / max(1, len(tried))
 
 
 def page(mutants: Sequence[Mutant], known: Reasons) -> str:
     """The whole page."""
-    lines = [HEAD, *_scores(mutants), "", "## The ones that live", "", *_living(mutants, known)]
+    lines = [HEAD, *_scores(mutants), "", "## Survivors", "", *_living(mutants, known)]
     return "\n".join(lines) + "\n"
 
 
@@ -52,7 +52,7 @@ def _score_row(title: str, mutants: Sequence[Mutant]) -> str:
 
 
 def _living(mutants: Iterable[Mutant], known: Reasons) -> Iterator[str]:
-    yield "| module | function | was | became | why it lives |"
+    yield "| module | function | was | became | why it survives |"
     yield "| --- | --- | --- | --- | --- |"
     for key in dict.fromkeys(mutant.key for mutant in mutants if mutant.lives):
         yield "| " + " | ".join([*(_code(cell) for cell in key), known.get(key, "?")]) + " |"
@@ -63,7 +63,7 @@ def _code(text: str) -> str:
 
 
 def reasons(text: str) -> Reasons:
-    """Those that somebody wrote into the page."""
+    """The reasons that people wrote into the page."""
     rows = (re.split(r" (?<!\\)\| ", line[2:-2]) for line in text.splitlines() if line.startswith("| ``"))
     found = {tuple(cell[3:-3].replace("\\|", "|") for cell in cells[:4]): cells[4] for cells in rows}
     return {(key[0], key[1], key[2], key[3]): why for key, why in found.items() if why != "?"}

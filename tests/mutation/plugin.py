@@ -1,14 +1,14 @@
-"""What the tests do otherwise while they try mutants: `pytest -p tests.mutation.plugin`, as mutmut calls it.
+"""How tests run differently on mutants: `pytest -p tests.mutation.plugin`, as called by mutmut.
 
-- Hypothesis does not shrink an example that fails, which takes longer than all else, and tries the same examples for
+- Hypothesis does not shrink failing examples, the slowest part by far, and tries the same examples for
   each mutant.
-- The first test that fails ends a mutant's trial. So those come first that ended the last ones, then the quick ones.
-  Slow tests have a trial of their own, of the mutants that lived: `SLOW_TESTS` in the environment.
-- A test's id is plain ASCII. mutmut collects again and again in one process, pytest escapes an id's other characters
-  anew each time, and then finds no such test; what mutmut makes of that is a mutant that was killed.
-- A function that has mutants is run as it stands during a trial, not through mutmut's detour, which asks at each call
+- The first failing test ends a mutant's trial. So the tests that ended recent trials come first, then the quick ones.
+  Slow tests run in a separate trial, on the survivors: `SLOW_TESTS` in the environment.
+- Test ids are plain ASCII. mutmut collects repeatedly in one process, pytest escapes other characters in ids
+  again each time and then finds no such test, and mutmut counts that as a killed mutant.
+- A function with mutants runs directly during a trial, not through mutmut's trampoline, which looks up at each call
   which mutant is on trial: the core's tests would take three times as long.
-- Where a test runs the product in a process of its own, mutmut cannot see what it reaches. A table says it.
+- Where a test runs the product in a separate process, mutmut cannot see its coverage. A table lists it.
 """
 
 import json
@@ -46,23 +46,23 @@ def _plain(val: str | bytes, config: pytest.Config | None) -> str:
 
 collecting._ascii_escaped_by_config = _plain
 
-#: File of tests → the module that they start as a process.
+#: Test file → the module its tests start as a process.
 ELSEWHERE: Mapping[str, str] = {
     f"tests/guardian/test_guardian{part}.py": "orchestrator/lastresort/guardian.py"
     for part in ("", "_contactors", "_messages", "_signals")
 }
-#: What takes longer is a slow test, measured with mutmut's detours in the code.
+#: A longer test is slow, measured with mutmut's trampolines in the code.
 QUICK_S = 0.3
-#: What takes longer waits for something that a mutant keeps from coming.
+#: A longer one waits for something the mutant prevents.
 HANGS_S = 20.0
 STATS, KILLERS = Path("mutmut-stats.json"), Path("killers.txt")
-#: Each function that has mutants, as its module knows it, and these; mutmut's detours for them, in the same order.
+#: Each function with mutants, by its module's name, and the mutants; mutmut's trampolines for them, in the same order.
 STANDING: list[tuple[FunctionType, Mapping[str, FunctionType]]] = []
 DETOURS: list[Callable[..., Any]] = []
 
 
 def _wrap(mutants: Mapping[str, FunctionType], is_classmethod: bool = False) -> Callable[[Any], Any]:
-    """In the place of mutmut's own: a plain function that takes its detour, until `_stand` gives it a body."""
+    """Replaces mutmut's own: a plain function that uses the trampoline until `_stand` gives it a body."""
     detour_of = trampoline.wrap_in_trampoline_slowly(mutants, is_classmethod)
 
     def wrap(function: FunctionType) -> Any:
@@ -82,13 +82,13 @@ def _wrap(mutants: Mapping[str, FunctionType], is_classmethod: bool = False) -> 
 
 
 def _on_trial() -> str:
-    """The name of the mutant whose trial this process is; "" where it only learns which tests there are."""
+    """The name of the mutant on trial in this process; "" while it only collects tests."""
     name = os.environ.get("MUTANT_UNDER_TEST", "")
     return name if "__mutmut_" in name else ""
 
 
 def _stand(mutant: str) -> None:
-    """Give each function its own body, and one of them that of the mutant."""
+    """Give each function its own body, and the mutated one the mutant's."""
     module, _, name = mutant.rpartition(".")
     for function, mutants in STANDING:
         chosen = mutants.get(name) if function.__module__ == module else None

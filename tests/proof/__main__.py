@@ -1,11 +1,11 @@
-"""The campaign: every proof on the whole service in virtual time, in its long form, one after the other.
+"""The campaign: every proof on the whole service in virtual time, in its long form, one after another.
 
     python -m tests.proof                 grid, scripts, calls, environment
-    python -m tests.proof core            only this one, which takes longer than those together
+    python -m tests.proof core            only this one, which takes longer than those four together
     python -m tests.proof seeds           only this one: which proof finds which bug, into docs/proofs.md
 
-Each has a main of its own, with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`,
-`environment`, `exploring`, `seeds`.
+Each has its own main with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`, `environment`, `exploring`,
+`seeds`.
 """
 
 import argparse
@@ -31,13 +31,13 @@ USUAL = ("grid", "scripts", "calls", "environment")
 
 
 def cpu_s() -> float:
-    """What this process and those that it has waited for have used of a core."""
+    """The CPU time of this process and of the children it has waited for."""
     used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Those parts, in this order; 1 if any of them found something."""
+    """The given parts in order; 1 if any found something."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
     chosen = parser.parse_args(argv).parts or USUAL

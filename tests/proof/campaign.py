@@ -1,8 +1,8 @@
-"""The campaign: random fault scripts on the whole service in virtual time, replayable, failures shrunk to their core.
+"""The campaign: random fault scripts on the whole service in virtual time; failures replayable and shrunk.
 
 python -m tests.proof.campaign                    1,000 scripts on all processors
-python -m tests.proof.campaign --seed 1249 -v     one of them again, with what was injected
-python -m tests.proof.campaign --script FILE      a script that was printed (JSON)
+python -m tests.proof.campaign --seed 1249 -v     one of them again, with the injected faults
+python -m tests.proof.campaign --script FILE      a printed script (JSON)
 """
 
 import argparse
@@ -19,11 +19,11 @@ from tests.proof.play import Injected, Played, play
 from tests.proof.report import say
 from tests.proof.script import SEE_S, Script, shrink
 
-#: A failure is made smaller with at most this many plays.
+#: At most this many plays to shrink a failure.
 SHRINK_PLAYS = 400
-#: What was there for less than this need not have shown itself.
+#: A shorter fault need not have shown.
 SHOWN_S = SEE_S - 0.5
-#: Nobody has to notice these: they are harmless until something else happens, or look like a healthy bay.
+#: These need not be noticed: harmless until something else happens, or indistinguishable from a healthy bay.
 WHY_UNSEEN = {
     "frozen_temperature": "a temperature that stays is what a healthy pack shows",
     "ignore_stop": "shows when a stop is due",
@@ -42,7 +42,7 @@ def play_seed(seed: int) -> Played:
 
 
 def campaign(seeds: Iterable[int], workers: int) -> list[Played]:
-    """Every script; on one processor in this process, so that a debugger can follow."""
+    """Every script; on one processor in this process, for debuggers."""
     if workers == 1:
         return [play_seed(seed) for seed in seeds]
     with multiprocessing.get_context("fork").Pool(workers) as pool:
@@ -57,12 +57,12 @@ def smallest(script: Script) -> Script:
 
 
 def kinds(played: Played) -> set[str]:
-    """Which invariants were broken: "t = 1.00 s, bay 0, hot: …" is "hot"."""
+    """The broken invariants: "t = 1.00 s, bay 0, hot: …" is "hot"."""
     return {line.split(", ", 2)[2].split(":")[0] for line in played.violations}
 
 
 def table(injected: Iterable[Injected]) -> list[str]:
-    """What was injected while the charger ran, and what came of it."""
+    """The faults injected while the charger ran, and their outcome."""
     by_name: dict[str, list[Injected]] = defaultdict(list)
     for one in injected:
         by_name[one.name].append(one)
@@ -77,7 +77,7 @@ def seen(one: Injected) -> bool:
 
 
 def unseen(one: Injected) -> bool:
-    """It was there for long enough, the charger ran on, and nobody noticed."""
+    """It lasted long enough, the charger ran on, and nothing noticed."""
     return not (seen(one) or one.verified) and (one.lasted_s or 0.0) >= SHOWN_S
 
 
@@ -95,7 +95,7 @@ def _row(name: str, rows: list[Injected]) -> str:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play, tell, and shrink what failed; 1 if anything did."""
+    """Play, report and shrink failures; 1 if there were any."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--scripts", type=int, default=1000, help="how many (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first seed (default: %(default)s)")

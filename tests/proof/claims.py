@@ -1,4 +1,4 @@
-"""What a status must say, or must not: held against the plant, which the service knows by its witnesses only."""
+"""What a status must and must not say, checked against the plant, which the service sees only through its devices."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -14,18 +14,18 @@ from orchestrator.workbench.replay.recording import read
 if TYPE_CHECKING:
     from tests.proof.judge import Charger, Judge
 
-#: What another program does to a port is told within this.
+#: Another program's use of a port is reported within this.
 TOLD_S = 3.0
-#: A charger that may run, and is not heard, is an alarm this long after the start.
+#: A charger that may run and is not heard raises an alarm this long after the start.
 UNHEARD_S = 6.0
-#: Who stands by with less than this is not full; with more than that it is not deeply discharged.
+#: Below the first a pack in standby is not full; above the second it is not deeply discharged.
 FULL_SOC, DEEP_SOC = 0.86, 0.3
-#: What no status may say of a charger that has stood by for so long, and has said so.
+#: No status may say this of a charger that has been in standby, and reported it, for that long.
 DISOBEYS, STOOD_S = frozenset({"uncontrollable", "will_not_stop"}), 1.5
 LINE_FAULTS = frozenset({"line_taken_over", "line_changed"})
-#: The charges of a station begin this far apart.
+#: Minimum time between charge starts of a station.
 APART_S = 1.0
-#: A plug that loses its contact again and again makes a charge begin no more often than this within a script.
+#: A plug with a bad contact causes at most this many charge starts per script.
 LOOSE_STARTS = 4
 
 Finding = tuple[str, str]  #: the invariant, what was seen
@@ -33,16 +33,16 @@ Finding = tuple[str, str]  #: the invariant, what was seen
 
 @dataclass(slots=True)
 class Told:
-    """What is remembered of one charger from status to status."""
+    """The data on one charger remembered between statuses."""
 
-    line_s: float = 0.0  #: when a change of its line was last told
-    locked_s: float | None = None  #: since when a stranger has its port
+    line_s: float = 0.0  #: when a change of its line was last reported
+    locked_s: float | None = None  #: since when a foreign program uses its port
     ran_s: float = 0.0  #: when RUN was last written to its port
-    starts: list[float] = field(default_factory=list)  #: when a frame has switched it on
+    starts: list[float] = field(default_factory=list)  #: when a frame switched it on
 
 
 def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterator[Finding]:
-    """What is wrong with what the status says of a bay."""
+    """The errors in a bay's status."""
     now_s, told, shown = judge.time.now_s, charger.told, f"{bay['state']}: {bay['reason']}"
     ids = set(_ids(bay["cause"]))
     if bay["state"] == "UNCONTROLLABLE" and bay["cause"]["id"] not in CUT_THE_MAINS:
@@ -56,7 +56,7 @@ def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterat
     if LINE_FAULTS & {fault["id"] for fault in bay["faults"]}:
         told.line_s = now_s
     tty, up_s = charger.rig.tty, judge.booted_s + TOLD_S
-    ours_alone = not any(one.what == "estop" for one in judge.script.hazards)  # that sets a port up as well
+    ours_alone = not any(one.what == "estop" for one in judge.script.hazards)  # which also configures a port
     reached = (
         ours_alone and tty.present and charger.deaf_s < tty.changed_s - TOLD_S and tty.lock is not charger.rig.wire
     )
@@ -79,7 +79,7 @@ def claims(judge: "Judge", charger: "Charger", bay: Mapping[str, Any]) -> Iterat
 
 
 def _ids(cause: Any) -> Iterator[str]:
-    """The ids of a cause in the status and of those in it."""
+    """The ids of a cause in the status and of its nested causes."""
     if isinstance(cause, list):
         yield from (id_ for one in cause for id_ in _ids(one))
     elif isinstance(cause, dict):
@@ -100,14 +100,14 @@ def starts(judge: "Judge", charger: "Charger") -> Iterator[Finding]:
 
 
 def record(judge: "Judge") -> Iterator[Finding]:
-    """What was recorded over all lives is decided again as it was."""
+    """The replayed decisions of all lives match the recording."""
     with TemporaryDirectory(prefix="record") as directory:
         for path, inode in judge.gateway.disk.names.items():
             if path.endswith(".jsonl"):
                 Path(directory, Path(path).name).write_bytes(bytes(inode.data))
         try:
             taken = [(bay, one) for bay, steps in read([Path(directory)]).bays.items() for one in again(steps)]
-        except Exception as error:  # noqa: BLE001 - whatever a power cut has left, it can be read
+        except Exception as error:  # noqa: BLE001 - whatever a power cut leaves must be readable
             yield "record", f"it cannot be read: {error!r}"
             return
     for bay, one in taken:
@@ -116,20 +116,20 @@ def record(judge: "Judge") -> Iterator[Finding]:
 
 
 def _runs_on(judge: "Judge", charger: "Charger") -> bool:
-    """We have had it run in a former life, and it has not understood a stop since. A bad disk may have lost that."""
+    """We switched it on in a former life, and it has received no stop since. A bad disk may have lost that."""
     ours = charger.stopped_s < charger.told.ran_s < (judge.booted_s or 0.0)
     bad_disk = any(one.what == "slow" and ":disk" in one.detail for one in judge.script.hazards)
     return charger.flows and ours and not bad_disk
 
 
 def _stands(charger: "Charger", now_s: float) -> bool:
-    """It has not run for a moment since then."""
+    """It has not run at all since then."""
     still_s = charger.rig.bay.charger.still_s
     return bool(charger.stood_s) and now_s - charger.stood_s > STOOD_S and still_s > STOOD_S and not charger.flows
 
 
 def _says(charger: "Charger") -> bool:
-    """The charger can be heard, and tells the truth of its current."""
+    """The charger is heard and reports its true current."""
     wire = charger.rig.wire
     return not ({Kind.OPERATION, Kind.CURRENT} & {*wire.lies, *wire.liars} or wire.mute_tx or wire.mute_rx)
 

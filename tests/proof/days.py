@@ -1,8 +1,8 @@
-"""Days of a bay's life in virtual time, on a line and a bus that lose 1 % of all frames and damage 0.1 %.
+"""Days of a bay's life in virtual time, on a line and a bus losing 1 % of all frames and damaging 0.1 %.
 
-From morning to evening batteries come, are charged, stay for a while and leave, some in mid-charge; a few times a day
-something breaks, is mended, and the bay is reset and started. At night the last battery rests. What the truth knows is
-held against the service as in every other script (`play.py`); what it does not explain is counted here.
+From morning to evening, batteries arrive, charge, stay for a while and leave, some in mid-charge; a few times a day
+something breaks, is repaired, and the bay is reset and started. At night the last battery rests. The true state is
+checked against the service as in every other script (`play.py`); events it does not explain are counted here.
 """
 
 import gc
@@ -26,22 +26,22 @@ from tests.proof.virtual_service import World
 DAY_S, HOUR_S, MINUTE_S = 86400.0, 3600.0, 60.0
 #: The station's day; the rest is night.
 OPENS_S, CLOSES_S = 6 * HOUR_S, 21 * HOUR_S
-#: The truth is looked at this often; every budget is longer.
+#: Interval of the checks; every budget is longer.
 LOOK_S = 0.5
-#: How often the BMU is read: the longest interval of the other proofs, six times the default, so that 30 days take less
-#: than a night. Values get older when a frame is lost, so a false stop is more likely than with the default.
+#: Read interval of the BMU: the longest of the other proofs, six times the default, so that 30 days take less
+#: than a night. A lost frame makes values older than with the default, so false stops are more likely.
 SWEEP_S = 0.3
-#: What follows so soon after a fault was taken away, or a battery came, is due to it; and after one that has warmed or
+#: Events this soon after a fault is removed, or a battery arrives, are due to it; and after one that warmed or
 #: cooled the pack: its rate of warming is judged over three minutes.
 DUE_S, WARMTH_DUE_S = 10.0, 200.0
-#: So long after a fault was mended somebody resets the bay, and starts it.
+#: This long after a repair, somebody resets and starts the bay.
 RESET_S, START_S = 20.0, 25.0
 
 Due = tuple[float, float, str]  #: from, to, because of
 
 
 def script_of(seed: int, days: int) -> Script:
-    """A life; the same seed, the same one."""
+    """A life, reproducible from its seed."""
     dice = Random(seed)
     happenings: list[Happening] = []
     for day in range(days):
@@ -54,7 +54,7 @@ def script_of(seed: int, days: int) -> Script:
 
 
 def _stay(dice: Random, t_s: float, happenings: list[Happening]) -> float:
-    """The battery that is there leaves, another one comes; returns when that one leaves."""
+    """The present battery leaves and the next one arrives; returns when that one leaves."""
     happenings.append(Happening(t_s, 0, "battery_removed"))
     t_s += dice.uniform(0.5, 40) * MINUTE_S
     happenings.append(Happening(t_s, 0, ARRIVES, dice.choice((-50.0, 5.0, 20.0, 35.0, 60.0, 85.0))))
@@ -69,7 +69,7 @@ def _stay(dice: Random, t_s: float, happenings: list[Happening]) -> float:
 
 
 def _break(dice: Random, t_s: float, happenings: list[Happening]) -> None:
-    """Something breaks; it is mended within three minutes, before the battery leaves, and the bay reset and started."""
+    """Something breaks and is repaired within three minutes, before the battery leaves; reset and start follow."""
     name = dice.choice(INJECTIONS)
     happenings.append(Happening(t_s, 0, name, dice.choice((None, *STRENGTHS.get(name, ())))))
     mended_s = t_s + dice.uniform(0.1, 3) * MINUTE_S
@@ -79,7 +79,7 @@ def _break(dice: Random, t_s: float, happenings: list[Happening]) -> None:
 
 
 def due(script: Script) -> list[Due]:
-    """When something is wrong, or has just been."""
+    """Times when something is or has just been wrong."""
     spans: list[Due] = []
     began_s, names = 0.0, ["the beginning"]
     for one in script.happenings:
@@ -97,7 +97,7 @@ def due(script: Script) -> list[Due]:
 
 @dataclass(slots=True)
 class Lived:
-    """What came of it."""
+    """The results."""
 
     days: int
     charges: int = 0
@@ -114,7 +114,7 @@ class Lived:
 
 
 class Days:
-    """A life on a world."""
+    """A life in a world."""
 
     def __init__(self, script: Script, on: World, *, tell: bool) -> None:
         self._script, self._world, self._tell = script, on, tell
@@ -189,7 +189,7 @@ def _rss_mib() -> float:
 
 
 def live(seed: int, days: int, *, tell: bool = True) -> Lived:
-    """So many days in a row, in this process."""
+    """That many consecutive days, in this process."""
     script = script_of(seed, days)
     with stage(script, BUSES["poor"]) as made:
         return Days(script, made, tell=tell).run()

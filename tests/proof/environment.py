@@ -1,9 +1,9 @@
-"""The environment's campaign: whatever else is on machine, line, bus and disk, over lives of the gateway.
+"""The environment's campaign: anything else on machine, line, bus and disk, over lives of the gateway.
 
 python -m tests.proof.environment                    every scene, then 1,000 random scripts, on all processors
-python -m tests.proof.environment --seed 104 -v      one of them again, with what the service said
+python -m tests.proof.environment --seed 104 -v      one of them again, with the service's output
 python -m tests.proof.environment --scene NAME -v    a scene again
-python -m tests.proof.environment --script FILE      a script that was printed (JSON)
+python -m tests.proof.environment --script FILE      a printed script (JSON)
 """
 
 import argparse
@@ -23,15 +23,15 @@ from tests.proof.lives import Lived, live
 from tests.proof.report import say
 from tests.proof.scenes import SCENES
 
-#: A failure is made smaller with at most this many plays.
+#: At most this many plays to shrink a failure.
 SHRINK_PLAYS = 120
 RUNS = 1000
-#: Of this many kinds of findings one is shown, with its smallest script.
+#: At most this many kinds of findings are shown, each with its smallest script.
 SHOWN = 8
 
 
 def quiet() -> None:
-    """A driver that is left by a killed process complains to the log when it is collected."""
+    """A driver left by a killed process logs a complaint when it is garbage-collected."""
     logging.getLogger("can").setLevel(logging.CRITICAL)
 
 
@@ -44,7 +44,7 @@ def play(name: str | int) -> tuple[str, Lived]:
 
 
 def campaign(names: Iterable[str | int], workers: int, until_s: float) -> Iterator[tuple[str, Lived]]:
-    """Each script, as it is played; no more begin after `until_s` (monotonic)."""
+    """Each script as it is played; none starts after `until_s` (monotonic)."""
 
     def in_time() -> Iterator[str | int]:
         for name in names:
@@ -62,7 +62,7 @@ def campaign(names: Iterable[str | int], workers: int, until_s: float) -> Iterat
 
 
 def smallest(script: Script) -> Script:
-    """The smallest script on the way down that breaks one of the same invariants."""
+    """The smallest script found by shrinking that breaks one of the same invariants."""
     wrong, plays = live(script).kinds, 0
     again = True
     while again:
@@ -78,7 +78,7 @@ def smallest(script: Script) -> Script:
 
 
 def show(name: str, lived: Lived) -> None:
-    """What was found, how to see it again, and the smallest script that shows it."""
+    """The findings, how to reproduce them, and the smallest script with one."""
     kind, which = name.split(" ", 1)
     say(f"\n{name}: python -m tests.proof.environment --{kind} {which!r} -v\n  " + "\n  ".join(lived.wrong))
     small = smallest(lived.script)
@@ -87,7 +87,7 @@ def show(name: str, lived: Lived) -> None:
 
 @dataclass(slots=True)
 class Tally:
-    """What came of many scripts."""
+    """The results of many scripts."""
 
     played: int = 0
     charged: int = 0
@@ -105,7 +105,7 @@ class Tally:
 
 
 def one(script: Script, name: str, *, verbose: bool) -> int:
-    """A single script, with all that was said."""
+    """A single script, with all output."""
     lived = live(script)
     say("\n".join([script.to_json(), *(lived.said if verbose else ())]))
     say("\n".join((f"{name}:", *lived.wrong)) if lived.wrong else f"{name}: nothing found")
@@ -134,7 +134,7 @@ def many(names: Iterable[str | int], options: argparse.Namespace) -> int:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Play, tell, and shrink what failed; 1 if anything did."""
+    """Play, report and shrink failures; 1 if there were any."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--runs", type=int, default=RUNS, help="random scripts (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="the first seed (default: %(default)s)")

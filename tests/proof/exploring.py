@@ -1,4 +1,4 @@
-"""The checker of `orchestrator.workbench` on the design's bay, with all input classes or the fewer of a quick test."""
+"""The checker of `orchestrator.workbench` on the standard test bay, with all input classes or a quick test's few."""
 
 import argparse
 import sys
@@ -17,9 +17,9 @@ from orchestrator.workbench.prove.properties import PROPERTIES
 from tests.proof.report import say
 from tests.proof.virtual_service import station
 
-#: Shipped policies for the 48 V station of the tests; the other two need other limits only.
+#: Shipped policies for the tests' 48 V station; the other two only need other limits.
 POLICIES = ("li-ion-48v", "lfp-48v", "long-life-48v", "li-ion-24v")
-#: What the quick form leaves out: the neighbours of every bound. The jumps that it keeps lead past every kind of timer.
+#: Left out of the quick form: the neighbours of every bound. Its jumps still pass every kind of timer.
 NEIGHBOURS = ("just above", "just below")
 QUICK_JUMPS_S = {ControlMode.MANUAL: (3.1, 70.1, 1200.1, 108000.1), ControlMode.AUTOMATIC: (3.1, 108000.1)}
 SMALL_CHARGERS = (
@@ -32,7 +32,7 @@ SMALL_BATTERIES = (
     "hotter than the station allows", "measured differently", "deeply discharged",
     "another current than the charger's",
 )  # fmt: skip
-#: The table leads there, and nothing can: none, since a service that has just started may know of a full battery, too.
+#: Unreachable states of the table: none, since even a service that has just started may know of a full battery.
 NEVER: dict[tuple[State, State], str] = {}
 
 
@@ -42,7 +42,7 @@ def rules(policy: str = "li-ion-48v", control: ControlMode = ControlMode.MANUAL,
 
 
 def quick(of: Rules) -> StationInputs:
-    """Fewer neighbours and jumps; no class is left out that is one of its kind."""
+    """Fewer neighbours and jumps; every kind of class keeps at least one."""
     whole = StationInputs.of(of)
     batteries = {name: shown for name, shown in whole.batteries.items() if not any(w in name for w in NEIGHBOURS)}
     below = {name: shown for name, shown in whole.batteries.items() if "just below" in name and "_v" in name}
@@ -50,7 +50,7 @@ def quick(of: Rules) -> StationInputs:
 
 
 def small(of: Rules) -> StationInputs:
-    """One class of each kind: enough to come everywhere, and to show a bug that is there."""
+    """One class of each kind: enough to reach everything and to show an existing bug."""
     whole = quick(of)
     chargers = {name: whole.chargers[name] for name in SMALL_CHARGERS}
     batteries = {
@@ -65,7 +65,7 @@ def walk_on(inputs: StationInputs) -> Walk:
 
 
 def changes_of_table() -> set[tuple[State, State]]:
-    """Every change of state that the machine's table has."""
+    """Every transition in the machine's table."""
     pairs = {(source, target) for _, sources, target in TABLE if target for source in sources}
     return {(source, target) for source, target in pairs if source is not target}
 

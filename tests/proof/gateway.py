@@ -1,8 +1,8 @@
-"""A whole station over many lives of its gateway, in virtual time: chargers and batteries go on, processes come and go.
+"""A whole station over many lives of its gateway, in virtual time: devices stay, processes come and go.
 
-Nothing of the product is replaced but what it stands on: the kernel, the CAN driver below `link/can.py`, and the
-control socket (requests reach the handler behind it, in a thread of the service). The guardian is the real one, with
-the controller that it starts; `estop` is the real one; what they keep is on a disk that keeps what a disk would.
+Only the product's foundations are replaced: the kernel, the CAN driver below `link/can.py`, and the control socket
+(requests reach the handler behind it, in a service thread). The guardian is the real one, with the controller it
+starts; `estop` is the real one; their files are on an emulated disk with realistic losses.
 """
 
 import json
@@ -42,15 +42,15 @@ PYTHON = ("/usr/bin/python3", "-P", "-m")
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10
 JOURNAL, SOCKET, CHIP = f"{ROOT}journal", f"{ROOT}socket", f"{ROOT}gpiochip"
-#: What is changed in the shipped policy for a bay whose charges are to be seen to their end.
+#: Changes to the shipped policy for a bay whose charges run to their end.
 SMALL = {"max_ah: 44 ": f"max_ah: {SMALL_AH} ", "within_min: 5 ": f"within_min: {SMALL_RISE_S / 60} "}
-#: What is asked of a control socket is answered within this, or not at all.
+#: A control socket answers within this or not at all.
 ANSWER_S, POLL_S = 5.0, 0.002
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One bay of the station file: its name, and which port and which node it names (0, 1, …)."""
+    """One bay of the station file: its name, and its port and node (0, 1, …)."""
 
     name: str
     port: int
@@ -96,7 +96,7 @@ def _loaded(path: str, _text: str) -> Station:
 
 
 class Door:
-    """The control socket: whoever finds it may ask."""
+    """The control socket: anyone who finds it may use it."""
 
     def __init__(self, gateway: "Gateway", _path: Any, handler: Callable[..., Any], *_: Any, **__: Any) -> None:
         self._gateway, self.handler = gateway, handler
@@ -119,7 +119,7 @@ class Door:
 
 @dataclass(slots=True)
 class Asked:
-    """A person's request, and what was answered: bay → "" is yes; None while nothing was."""
+    """A person's request and its answers: bay → "" is yes; None without an answer so far."""
 
     request: dict[str, Any]
     asked_s: float
@@ -130,7 +130,7 @@ class Asked:
 
 @dataclass(slots=True)
 class Said:
-    """A line that a process said."""
+    """A line printed by a process."""
 
     t_s: float
     process: str
@@ -139,7 +139,7 @@ class Said:
 
 @dataclass(slots=True)
 class Ended:
-    """A process that has ended by itself."""
+    """A process that ended by itself."""
 
     t_s: float
     name: str
@@ -147,7 +147,7 @@ class Ended:
 
 
 class Gateway:
-    """The station and its gateway. What changes it is for callbacks and for the main runner, not for its threads."""
+    """The station and its gateway. Only callbacks and the main runner change it, not its threads."""
 
     def __init__(
         self,
@@ -167,7 +167,7 @@ class Gateway:
         self.doors: list[Door] = []
         self.said: list[Said] = []
         self.ended: list[Ended] = []
-        self.service: Process | None = None  #: the guardian of the present life
+        self.service: Process | None = None  #: the guardian of the current life
         self.controller: Process | None = None
         self.on_end: Callable[[Process], None] = lambda _: None
         self.boots = 1
@@ -175,7 +175,7 @@ class Gateway:
         self._dice = Random(seed)
         self._lines: dict[int, str] = {}
         self._stack = ExitStack()
-        self._stack.callback(set_scheduler, get_scheduler())  # the emulated BMUs put this world's in its place
+        self._stack.callback(set_scheduler, get_scheduler())  # the emulated BMUs replace it by this world's
         self.bus = BusWire(self.time, self.kernel.calls)
         self.rigs = [
             VirtualRig(self.time, self.bus, self.kernel.add(port_name(number)), FIRST_NODE + number, nature)
@@ -217,7 +217,7 @@ class Gateway:
         return Path(_directory().name) / "station.yaml"
 
     def write_station(self) -> None:
-        """The file, and the small policy beside it."""
+        """The file, with the small policy beside it."""
         text = (shipped_dir() / "policies" / "li-ion-48v.yaml").read_text(encoding="utf-8")
         for usual, small in SMALL.items():
             text = text.replace(usual, small)
@@ -238,7 +238,7 @@ class Gateway:
         return self.service
 
     def estop(self, *words: str) -> Process:
-        """`orchestrator estop` on the station file, or as it is told."""
+        """`orchestrator estop` on the station file, or with the given arguments."""
         options = list(words) or [str(self.station_file)]
         return self._start("estop", (*PYTHON, "orchestrator", "estop", *options), lambda: estop.main(options))
 
@@ -264,7 +264,7 @@ class Gateway:
             process.signal(number)
 
     def cut_power(self, how: str = "") -> str:
-        """The gateway has no power any more; the chargers have. What the disk had written by then."""
+        """The gateway loses power; the chargers keep it. Returns what the disk had written by then."""
         for process in list(self.processes.all.values()):
             if not process.dead:
                 process.status = process.status if process.status is not None else -9
@@ -297,7 +297,7 @@ class Gateway:
         return next((door for door in reversed(self.doors) if door.is_open), None)
 
     def ask(self, request: dict[str, Any], on_answer: Callable[[Asked], None] = lambda _: None) -> Asked:
-        """A person, or a watch, asks the service; the answer comes when it comes."""
+        """A person, or a watch, sends a request; the answer comes later."""
         asked = Asked(request, self.time.now_s)
         door = self.door
         if door is None:

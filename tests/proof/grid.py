@@ -1,9 +1,9 @@
-"""The exhaustive grid: every state × every row of the fault table × what the line is just doing.
+"""The exhaustive grid: every state × every row of the fault table × the current activity of the line.
 
-A bay is brought into the state, on the whole service in virtual time; then, at a moment at which the line is idle, has
-a request in flight, or has half of a reply, the row's condition becomes true for as long as the row needs. A row whose
-effect stops must end in verified standby, its stop written as soon as the line is free; any other must leave the bay
-where the operator's stop ends it in verified standby.
+A bay is brought into the state, on the whole service in virtual time. Then, while the line is idle, has a request in
+flight, or has half of a reply, the row's condition becomes true for as long as the row needs. A row with a stopping
+effect must end in verified standby, its stop written as soon as the line is free; any other must leave the bay in a
+state from which the operator's stop leads to verified standby.
 """
 
 from collections.abc import Callable, Iterator
@@ -29,20 +29,20 @@ from tests.proof.virtual_service import World, station, world
 
 
 class Phase(StrEnum):
-    """What the line is doing when the fault comes."""
+    """The line's activity when the fault occurs."""
 
     IDLE = "idle line"
     IN_FLIGHT = "request in flight"
     HALF = "reply half received"
 
 
-#: From the step that orders a stop to its first byte: at most the rest of a transaction, the reply's deadline.
+#: From the decision to stop to its first byte: at most the rest of a transaction, the reply's deadline.
 STOP_WITHIN_S = {Phase.IDLE: 0.01, Phase.IN_FLIGHT: 0.125, Phase.HALF: 0.125}
-#: A frame's time on the wire, and the gap behind it.
+#: A frame's time on the wire, and the gap after it.
 FRAME_S = 0.01
 #: A status request, and half a reply to it.
 POLL, HALF_REPLY = 0x01, 14
-#: A stop is proved within this; then the operator's is given as much. Who has not obeyed is believed only later.
+#: A stop is verified within this; the operator's gets the same time. A charger that disobeyed is believed later.
 SETTLE_S = 3.5
 BELIEVED_S = safestop.LASTS_S + SETTLE_S
 REACH_S = 30.0
@@ -50,7 +50,7 @@ REACH_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """How a bay comes into a state: its pack, and what befalls it in which state on the way."""
+    """How a bay gets into a state: its pack, and events in given states on the way."""
 
     soc_pct: float | None = 50.0  #: None: the toy pack, deeply discharged
     acts: tuple[tuple[State, str], ...] = ()
@@ -71,7 +71,7 @@ class Situation:
         return Nature(pack, line="bytewise", speed=self.speed)
 
 
-#: Not an act: go on when the charger runs.
+#: Not an action: continue when the charger runs.
 RUNS = "until it runs"
 
 S = State
@@ -92,11 +92,11 @@ SITUATIONS: dict[State, Situation] = {
 }
 
 
-#: These may be over before a row has lasted for long enough.
+#: These may be over before a row has lasted long enough.
 PASSING = frozenset({S.STARTING, S.STOPPING, S.QUALIFYING})
-#: By whether the row is looked for in the state.
+#: By whether the row applies in the state.
 NOT_RAISED = {True: "state left before it lasted", False: "not looked for there"}
-#: The toy pack is full before a row has lasted for longer than this.
+#: The toy pack is full before a row lasts longer than this.
 TOY_S = 20.0
 
 
@@ -114,7 +114,7 @@ class Cell:
 
 @dataclass(slots=True)
 class Used:
-    """Rows of tables that were used, over many cells."""
+    """Table rows used, over many cells."""
 
     rows: set[str] = field(default_factory=set)
     changes: set[tuple[State, State]] = field(default_factory=set)
@@ -122,15 +122,15 @@ class Used:
 
 @dataclass(slots=True)
 class Ended:
-    """How a cell ended."""
+    """The result of a cell."""
 
     word: str = ""
-    stop_s: float | None = None  #: from the step that ordered a stop to its first byte, where none was ordered before
+    stop_s: float | None = None  #: from the decision to stop to its first byte, if none was commanded before
     wrong: list[str] = field(default_factory=list)
 
 
 class Run:
-    """One cell, played."""
+    """One run of a cell."""
 
     def __init__(self, cell: Cell, on: World, used: Used) -> None:
         self.cell, self.world, self.time, self.used = cell, on, on.time, used
@@ -140,8 +140,8 @@ class Run:
         self.forced = ""
         self._acts = list(SITUATIONS[cell.state].acts)
         self._armed = self._injected = False
-        self._ordered = False  # the step before had the charger stopped
-        self._standing = False  # a stop had been ordered before the fault was raised
+        self._ordered = False  # the previous decision stopped the charger
+        self._standing = False  # a stop was commanded before the fault was raised
         self._raised_s: float | None = None
         self._stopped_s: float | None = None
         self._heard = 0
@@ -199,14 +199,14 @@ class Run:
         elif name == "fast forward":
             self.rig._speed = 5.0
         elif name != RUNS:
-            same = (name, self.cell.row.id) == ("status_bits", "status_trip")  # it would be there already
+            same = (name, self.cell.row.id) == ("status_bits", "status_trip")  # otherwise it would be active already
             other = "error_stop" if same else name
             self.rig.inject(lambda rig: INJECTIONS[other].happen(rig, None))
 
     # --- the moment ---------------------------------------------------------------------------------------------------
 
     def _when_idle(self) -> None:
-        """Nothing is being sent, and nothing is waited for."""
+        """Nothing is being sent or awaited."""
         schedule = self.world.supervisor._ports[0]._schedule
         if self._free_s < self.time.now_s < schedule.next().at_s - 0.001:
             self._inject()
@@ -246,7 +246,7 @@ class Run:
     def _gone(self) -> None:
         self.forced = ""
 
-    # --- what became of it --------------------------------------------------------------------------------------------
+    # --- its result --------------------------------------------------------------------------------------------
 
     def _judge(self) -> None:
         cell, decision = self.cell, self.world.decision()
@@ -275,11 +275,11 @@ class Run:
 
     def _judge_stop(self) -> None:
         if self._standing:
-            return  # it was ordered before, is repeated each 500 ms, and the end is a verified one
+            return  # commanded before, repeated every 500 ms, and the end is verified
         if self._stopped_s is None or self._raised_s is None:
             self.wrong.append("no stop was written")
             return
-        at_once = self.cell.row.for_s == 0 and self.cell.row.polls == 1  # else it is raised whenever it has lasted
+        at_once = self.cell.row.for_s == 0 and self.cell.row.polls == 1  # otherwise it is raised once it has lasted
         took_s = self.ended.stop_s = self._stopped_s - self._raised_s
         allowed_s = STOP_WITHIN_S[self.cell.phase if at_once else Phase.IN_FLIGHT]
         if took_s > allowed_s:
@@ -294,7 +294,7 @@ class Run:
 
 
 def cells(phases: Callable[[int], tuple[Phase, ...]]) -> Iterator[Cell]:
-    """The whole grid, or for each pair of state and row the phases that `phases(number)` names."""
+    """The whole grid, or the phases `phases(number)` of each pair of state and row."""
     number = 0
     for state in State:
         for row in FAULTS:
@@ -303,7 +303,7 @@ def cells(phases: Callable[[int], tuple[Phase, ...]]) -> Iterator[Cell]:
 
 
 def play(cell: Cell, used: Used) -> Ended:
-    """From the beginning to the operator's stop."""
+    """From the start to the operator's stop."""
     situation = SITUATIONS[cell.state]
     the_station = station([ControlMode.MANUAL], [POLICIES["demo" if situation.is_toy else "48v"]], sweep_s=0.3)
     with world(the_station, [situation.nature()], end_s=120.0 + cell.row.for_s) as made:
@@ -313,9 +313,9 @@ def play(cell: Cell, used: Used) -> Ended:
 
 
 def orders(limit_a: float, soc_pct: float | None) -> set[tuple[Action, int]]:
-    """The orders that are let out in a charge with this station limit.
+    """The commands that leave the interlock in a charge with this station limit.
 
-    Without a SOC it is a whole charge, from the first pulse to full.
+    Without a SOC: a whole charge, from the first pulse to full.
     """
     policy = load_policy("li-ion-48v") if soc_pct is not None else POLICIES["demo"]
     let_out: set[tuple[Action, int]] = set()
@@ -324,7 +324,7 @@ def orders(limit_a: float, soc_pct: float | None) -> set[tuple[Action, int]]:
         [Situation(soc_pct=soc_pct).nature()],
         end_s=120.0,
     ) as made:
-        made.rigs[0].bay.charger.current_limit = 4  # as whoever was here before has left it
+        made.rigs[0].bay.charger.current_limit = 4  # as the previous controller left it
         port = made.supervisor._ports[0]
         write = port._write
 

@@ -1,7 +1,7 @@
-"""What can befall a station and its gateway: scripts over several lives, made from a seed or written by hand, as JSON.
+"""Hazards for a station and its gateway: scripts over several lives, from a seed or hand-written, as JSON.
 
-The same script always plays the same way. `SCENES` are those that were once seen to go wrong; the random ones mix the
-same hazards at random moments.
+The same script always plays the same way. `SCENES` are those that once went wrong; the random ones mix the same hazards
+at random moments.
 """
 
 import json
@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from random import Random
 
-#: A charge of each bay has begun within this, one after the other.
+#: Within this every bay has started its charge, one after another.
 BEGIN_S = 16.0
-#: What somebody does between two lives takes this long.
+#: Duration of a person's action between two lives.
 BETWEEN_S = 3.0
 FOR_EVER = -1.0
 SPEEDS = (termios.B115200, termios.B9600, termios.B38400)
@@ -20,7 +20,7 @@ SPEEDS = (termios.B115200, termios.B9600, termios.B38400)
 
 @dataclass(frozen=True, slots=True)
 class Hazard:
-    """Something happens: what, to which bay (−1: none or all), with which number, and in which particular."""
+    """An event: its kind, bay (−1: none or all), number and detail."""
 
     t_s: float
     what: str
@@ -31,22 +31,22 @@ class Hazard:
 
 @dataclass(frozen=True, slots=True)
 class Bay:
-    """One bay at the beginning."""
+    """The initial state of a bay."""
 
     soc_pct: float = 50.0
     temperature_c: float = 20.0
     line: str = "real"
     running: bool = False
     cells: int = 13
-    small: bool = False  #: by a policy of which a charge ends after 0.15 Ah, a precharge without a rise after 24 s
-    cross: int = -1  #: its serial cable goes to the charger of that bay, and the other way round
+    small: bool = False  #: with a policy that ends a charge after 0.15 Ah, and a precharge without a rise after 24 s
+    cross: int = -1  #: its serial cable is swapped with that bay's
     control: str = "manual"
     contactor: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """One run. `systemd`: whoever ends with an error is started anew, `estop` before. `recorded`: with snapshots."""
+    """One run. `systemd`: `estop` and a restart after an exit with an error. `recorded`: with snapshots."""
 
     seed: int
     bays: tuple[Bay, ...]
@@ -68,17 +68,17 @@ class Script:
 
     @classmethod
     def of_seed(cls, seed: int) -> "Script":
-        """A random one; the same seed, the same script."""
+        """A random script, reproducible from its seed."""
         return _random(seed)
 
 
 # --- random ones ------------------------------------------------------------------------------------------------------
 
-#: What others do on the bus, as everybody may.
+#: Permitted actions of others on the bus.
 TOOLS = ("master", "reads all", "abort", "fd", "heartbeat", "flood")
 Make = Callable[[Random, float, int], Iterator[Hazard]]
 
-#: Calls that may hang: of a port, of what is kept and recorded, of standard error.
+#: Calls that may hang: on a port, on the store and the journal, on standard error.
 PORT_CALLS = ("open", "close", "read", "write", "tcsetattr", "tcgetattr", "tcflush", "flock", "ioctl")
 DISK_CALLS = ("open", "write", "fsync", "rename", "close")
 DISK_ERRORS = ("ENOSPC", "EROFS", "EIO")
@@ -103,7 +103,7 @@ BMU_VALUES = (0.0, 1.0, 10.0, 50.0, 100.0, 140.0, -5.0, 655.35)
 def _slow_port(dice: Random, t_s: float, bay: int) -> Iterator[Hazard]:
     call = dice.choice(PORT_CALLS)
     yield Hazard(t_s, "slow", bay, dice.choice((5.0, 5.0, FOR_EVER)), f"{call}:port:{dice.choice((3, 10, 30))}")
-    if call in ("open", "close", "tcsetattr", "flock"):  # that needs a port that is opened again
+    if call in ("open", "close", "tcsetattr", "flock"):  # needs a reopened port
         yield Hazard(t_s + 0.5, "fault", bay, None, "port_gone")
         yield Hazard(t_s + 1.5, "heal", bay)
 
@@ -203,14 +203,14 @@ def _random(seed: int) -> Script:
     return _with_more(script, Random(f"more of {seed}"))
 
 
-#: What a stranger's program sends, once or again and again, and what a chip of contactors may do.
+#: Frames of a foreign program, sent once or repeatedly, and failures of a contactor chip.
 PROGRAM = ("run", "run", "operation", "resume", "stop", "rest", "limit 4", "limit 0", "charge", "precharge", "full")
 STRANGE = ("parenb", "cstopb", "crtscts", "min", "icanon", "ixon")
 CHIP = ("ioctl:chip:3:EIO", "ioctl:chip:30:EIO", "ioctl:chip:3:ENODEV")
 
 
 def _with_more(script: Script, dice: Random) -> Script:
-    """Bays of other kinds, and what these bring with them; by dice of their own, so that the rest stays as it was."""
+    """Other kinds of bays and their hazards, from a separate random generator, so the rest stays unchanged."""
     bays = tuple(
         replace(bay, control="automatic" if dice.random() < 0.15 else "manual", contactor=dice.random() < 0.15)
         if bay.cross < 0
@@ -237,7 +237,7 @@ def _with_more(script: Script, dice: Random) -> Script:
 
 
 def smaller(script: Script) -> Iterator[Script]:
-    """Simpler neighbours, those that leave most away first."""
+    """Simpler neighbours, the simplest first."""
     hazards = script.hazards
     for at in range(len(hazards)):
         if hazards[at].t_s:

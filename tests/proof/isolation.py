@@ -1,8 +1,8 @@
-"""What a contactor must do, and must not: held against the plant.
+"""What a contactor must and must not do, checked against the plant.
 
-1. It closes onto a charger that stands by, or one that we have told to run.
-2. It opens without current, unless the charger was told to stop and has had its time.
-3. Where it can be driven, current without an order ends with it, whatever the charger obeys.
+1. It closes only onto a charger in standby, or one we told to run.
+2. It opens without current, unless the charger was told to stop and had time to obey.
+3. Where it can be driven, it ends current without a command, even if the charger disobeys.
 """
 
 from collections.abc import Iterator
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 #: A charger that obeys is without current within this after the first stop (`lastline.ROUND_S` less what a byte takes).
 OBEYS_S = 0.4
-#: Current without an order has ended by a contactor within this: it is seen, stopped, not verified; margins.
+#: A contactor ends current without a command within this: noticed, stopped, not verified, plus margins.
 ISOLATED_S = 2.0 + 3.0 + 1.4
 BREAKS_A = 1.0
 
-Finding = tuple[str, str]  #: the invariant, what was seen
+Finding = tuple[str, str]  #: the invariant, the observation
 
 
 def contactor_moves(judge: "Judge", charger: "Charger", *, closed: bool) -> Iterator[Finding]:
-    """It is about to close, or to open."""
+    """It is about to close or open."""
     model, now_s = charger.rig.bay.charger, judge.time.now_s
     chip = judge.gateway.kernel.chips[CHIP]
     if closed and model.running and charger.meant != "run" and charger.seen and now_s - charger.strange_s > OBEYS_S:
@@ -36,7 +36,7 @@ def contactor_moves(judge: "Judge", charger: "Charger", *, closed: bool) -> Iter
 
 
 def isolates(judge: "Judge", charger: "Charger") -> bool:
-    """Whether its contactor can be driven, by somebody who is there and sees why."""
+    """Whether its contactor can be driven by a process that is there and sees the reason."""
     breaker, chip = charger.rig.breaker, judge.gateway.kernel.chips[CHIP]
     alive = judge.gateway.alive(judge.gateway.controller) and judge.booted_s is not None and not judge.frozen
     return (
@@ -45,7 +45,7 @@ def isolates(judge: "Judge", charger: "Charger") -> bool:
 
 
 def left_on(judge: "Judge", charger: "Charger") -> Iterator[Finding]:
-    """Current without an order, for longer than a contactor leaves it."""
+    """Current without a command, for longer than a contactor allows."""
     since_s, now_s = charger.since_s.get("no order"), judge.time.now_s
     if since_s is None or charger.current_a < BREAKS_A or judge.entry(charger) is None or charger.rig.breaker is None:
         return

@@ -1,12 +1,12 @@
-"""What must hold on the wire and on the plant, whatever befalls the station; our own words count only where they claim.
+"""Invariants of wire and plant, whatever happens to the station; our own output counts only as a claim.
 
-1. Current flows only under an order that is allowed now (`REASONS`: facts of the plant under which none is).
-2. A stop that is meant is understood by a charger that can hear, within its budget, whatever the other ports do.
-3. Nothing that waits for a person energises by itself, over any number of lives.
-4. What is said to be stopped, verified or at rest is so; who cannot be stopped is called so.
+1. Current flows only under a command allowed now (`REASONS`: facts of the plant that allow none).
+2. An intended stop is understood by a charger that can hear, within its budget, whatever other ports do.
+3. Nothing waiting for a person energises by itself, over any number of lives.
+4. A bay reported as stopped, verified or at rest is so; one that cannot be stopped is reported so.
 
-A lie that both witnesses tell alike cannot be seen by anybody: nothing is demanded there. A temperature has one witness
-only, the BMU.
+Nobody can see through a lie told by both witnesses: nothing is required there. A temperature has one witness only, the
+BMU.
 """
 
 import json
@@ -30,24 +30,24 @@ STOP, OPERATION_0 = bytes.fromhex("AFFA900410900034AFA0"), bytes.fromhex("AFFA90
 OPERATION_1, RESUME = bytes.fromhex("AFFA90050290010129AFA0"), bytes.fromhex("AFFA90041090 0135AFA0")
 LIMIT = re.compile(re.escape(bytes.fromhex("AFFA9005029002")) + b"(.)", re.DOTALL)
 
-#: An output below this is none; what flows above it can be seen by everybody.
+#: An output below this counts as none; a current above it is visible to all.
 FLOWS_A, SEEN_A = 0.5, 1.0
-#: "Device falls silent or its line is reconfigured → stop understood", "stop not verified → UNCONTROLLABLE", and what
-#: the noticing of it may take: a repetition, a poll, a status.
+#: "Device falls silent or its line is reconfigured → stop understood", "stop not verified → UNCONTROLLABLE", and the
+#: time noticing it may take: a repetition, a poll, a status.
 LINE_S, VERIFY_S, MARGIN_S = 2.0, 3.0, 1.4
-#: A bay that has been opened begins with a stop within this.
+#: An opened port sends its first stop within this.
 OPEN_S = 2.0
-#: Within this after an operator's answer, or the end of a process, its stop is understood.
+#: A stop is understood within this after an operator's answer or the end of a process.
 ASKED_S, KILLED_S, FROZEN_S, TERM_S, ESTOP_S = 0.6, 0.25, 1.2, 0.7, 0.5
-#: The control socket is there this long after the start, and answers within that.
+#: The control socket exists this long after the start, and answers within that.
 START_S, ANSWER_S = 1.5, 6.0
-#: Over this the current is held against what was ordered.
+#: The period over which current is compared with its setpoint.
 MEAN_S = 12.0
-#: Who runs again without an order this often within that time was not stopped, and is called so.
+#: A charger running again this often within that time, without a command, was not stopped and is reported so.
 RESTARTS, RESTARTS_S = 3, 25.0
-#: What latched this long ago is on the disk.
+#: A latch this old is on the disk.
 KEPT_S = 2.6
-#: What another program does to a charger is seen with the next sample.
+#: Another program's effect on a charger shows in the next sample.
 GRACE_S = 0.6
 VERIFIED = re.compile(r"standby verified|stands? by, verified|verified (?:standby|to stand by)", re.IGNORECASE)
 DENIED = re.compile(r"NOT|not verified|no proof")
@@ -55,32 +55,30 @@ DENIED = re.compile(r"NOT|not verified|no proof")
 
 @dataclass(slots=True)
 class Charger:
-    """One charger of the plant and what is known of its bay."""
+    """One charger of the plant and the data on its bay."""
 
     number: int
     rig: VirtualRig
-    meant: str = (
-        ""  #: the newest that a process of ours has written to its port: "run", "stop"; "" nothing in this life
-    )
+    meant: str = ""  #: the last command our processes wrote to its port: "run", "stop"; "" none in this life
     meant_s: float = 0.0
-    told_s: float = 0.0  #: when it was first told to stop, after it was told to run
-    limit: int = 4  #: the newest current limit that was written
-    deaf_s: float = 0.0  #: when it could last not hear, or not be reached
+    told_s: float = 0.0  #: when it was first told to stop after being told to run
+    limit: int = 4  #: the last current limit written
+    deaf_s: float = 0.0  #: when it last could not hear or be reached
     since_s: dict[str, float] = field(default_factory=dict)  #: reason → since when it holds while current flows
-    named_s: float = 0.0  #: when people were last told that it is not under control
+    named_s: float = 0.0  #: when it was last reported as out of control
     waits: dict[str, str] = field(default_factory=dict)  #: for a person: why, in words
-    tripped_s: float | None = None  #: since when the status says TRIPPED
-    asked_stop: bool = False  #: an operator's stop was accepted, and no start since
+    tripped_s: float | None = None  #: since when the status is TRIPPED
+    asked_stop: bool = False  #: an operator's stop was accepted, with no start since
     flown: deque[tuple[float, float, float]] = field(default_factory=lambda: deque(maxlen=300))
     stopped_s: float = 0.0  #: when a stop was last understood at its port
     looked_s: float = 1000.0
     charged_ah: float = 0.0
-    thawed: tuple[float, float] = (0.0, 0.0)  #: Ah and volts when its BMU was last seen to move
+    thawed: tuple[float, float] = (0.0, 0.0)  #: Ah and volts at the last change of its BMU's values
     precharged_s: float = 0.0
-    told: Told = field(default_factory=Told)  #: what the status has said of it
-    strange_s: float = 0.0  #: when another program's frame has switched it on or off
+    told: Told = field(default_factory=Told)  #: the status of it
+    strange_s: float = 0.0  #: when another program's frame switched it on or off
     stood_s: float = 0.0  #: since when its output is off
-    onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without an order
+    onsets: deque[float] = field(default_factory=lambda: deque(maxlen=RESTARTS))  #: when it ran again without a command
 
     @property
     def flows(self) -> bool:
@@ -98,7 +96,7 @@ class Charger:
         )  # fmt: skip
 
     def honest(self, kind: Kind, *fields: str) -> bool:
-        """At least one of the two witnesses tells the truth."""
+        """At least one of the two witnesses is truthful."""
         wire, bay = self.rig.wire, self.rig.bay
         charger_honest = kind not in wire.lies and kind not in wire.liars and not wire.mute_tx
         bmu_honest = not set(fields) & set(bay.falsify) and not self.rig.bmu.port.faults.mute
@@ -106,7 +104,7 @@ class Charger:
 
     @property
     def seen(self) -> bool:
-        """Somebody tells the truth about the current."""
+        """At least one witness is truthful about the current."""
         wire = self.rig.wire
         charger = not {Kind.OPERATION, Kind.CURRENT} & {*wire.lies, *wire.liars} and not (wire.mute_tx or wire.mute_rx)
         faults = self.rig.bmu.port.faults
@@ -115,7 +113,7 @@ class Charger:
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """A fact of the plant under which no current may flow for longer than `within_s`."""
+    """A fact of the plant that allows no current for longer than `within_s`."""
 
     name: str
     within_s: float
@@ -123,7 +121,7 @@ class Reason:
 
 
 def _temperature_honest(charger: Charger) -> bool:
-    """What somebody else sends in the BMU's name is no excuse: the BMU answers as well, and differently."""
+    """Frames forged in the BMU's name are no excuse: the BMU answers too, and differently."""
     return "temperature_c" not in charger.rig.bay.falsify
 
 
@@ -145,7 +143,7 @@ def _cold(_: "Judge", charger: Charger) -> bool:
 
 
 def _frozen(judge: "Judge", charger: Charger) -> bool:
-    """Its BMU stands still, and enough has gone in since to be sure of that: 1 Ah, or 0.3 V more."""
+    """Its BMU's values are frozen, and the charge since then proves it: 1 Ah, or 0.3 V more."""
     rig = charger.rig
     if not rig.frozen:
         charger.thawed = charger.charged_ah, rig.bay.charger.voltage_v
@@ -154,13 +152,13 @@ def _frozen(judge: "Judge", charger: Charger) -> bool:
 
 
 def _another(_: "Judge", charger: Charger) -> bool:
-    """A pack that says it is nearly empty may be a deeply discharged one of the right kind: nobody can tell."""
+    """A pack reporting nearly empty may be a deeply discharged one of the right kind: indistinguishable."""
     pack = charger.rig.bay.pack
     return pack.cells != 13 and pack.soc > 0.1 and not charger.rig.bay.falsify
 
 
 def _collapsed(_: "Judge", charger: Charger) -> bool:
-    """A nearly empty pack that has collapsed at rest looks like a deeply discharged one, and is precharged as such."""
+    """A nearly empty pack that collapsed at rest looks deeply discharged and is precharged."""
     pack, precharged = charger.rig.bay.pack, charger.rig.bay.charger.mode is ChargeMode.PRECHARGE
     known = pack.soc > 0.1 or not precharged
     return pack.bias_v < -8.0 and known and charger.honest(Kind.VOLTAGE, "voltage_v")
@@ -173,15 +171,15 @@ def _too_much(judge: "Judge", charger: Charger) -> bool:
 
 
 def _deep(_: "Judge", charger: Charger) -> bool:
-    """A pack at the bottom of its deep discharge gets a precharge at most; a charger on automatic sees to that."""
+    """A pack at the bottom of its deep discharge gets at most a precharge; an automatic charger ensures that itself."""
     model = charger.rig.bay.charger
     volts = model.voltage_v < 33.0 and charger.honest(Kind.VOLTAGE, "voltage_v")
     return volts and charger.current_a > 1.5 * model.precharge_a
 
 
-#: Only the first amperes show that cables are crossed; until then a pack is watched by another one's BMU.
+#: Only the first amperes show crossed cables; until then a pack is watched by another pack's BMU.
 CROSSED_S = 9.0
-#: What the charger's own line tells, whoever's pack it charges.
+#: Facts visible on the charger's own line, whichever pack it charges.
 BY_CHARGER = frozenset({"no order", "operator's stop", "over-current", "over-voltage"})
 
 REASONS: tuple[Reason, ...] = (
@@ -202,13 +200,13 @@ REASONS: tuple[Reason, ...] = (
 )
 
 
-#: Somebody reads or writes on bus and line as everybody may: no reason to stop.
+#: Permitted reads and writes by others on bus and line: no reason to stop.
 HARMLESS = ("boot", "tool", "term", "stderr", "late", "clock")
-#: Verified to stand by, and not told to run.
+#: Verified standby, and not told to run.
 AT_REST = {state.name for state in (State.IDLE, State.FULL, State.SUSPENDED, State.TRIPPED)}
-#: Whom another program has run at rest, or stopped in mid-charge, waits for a person after this.
+#: A charger run at rest, or stopped in mid-charge, by another program waits for a person after this.
 HELD_S, STATUS_S = 3.0, 0.25
-#: After the last start every bay charges within this.
+#: Within this after the last start every bay charges.
 GOES_ON_S = 2 * BEGIN_S
 
 
@@ -225,7 +223,7 @@ def _trips(charger: Charger) -> bool:
 
 
 class Judge:
-    """Follows one script; `wrong` are its findings, "t = …, charger n, invariant: what"."""
+    """Follows one script; `wrong` are the findings, "t = …, charger n, invariant: what"."""
 
     def __init__(self, gateway: Gateway, script: Script) -> None:
         self.gateway, self.script = gateway, script
@@ -235,11 +233,11 @@ class Judge:
         self.chargers = [Charger(number, rig) for number, rig in enumerate(gateway.rigs)]
         self.life = list(gateway.entries)  #: what the running service has read
         self.life_began_s: float | None = None
-        self.booted_s: float | None = None  #: when the present life began; None: nobody is there
+        self.booted_s: float | None = None  #: when the current life began; None: no service runs
         self.status: Mapping[str, Any] | None = None
         self.status_s = 0.0
         self.frozen = False
-        self._read = 0  # lines that were said
+        self._read = 0  # log lines
         for charger in self.chargers:
             charger.rig.tty.on_written = partial(self._written, charger)
             charger.rig.wire.on_started = partial(self._started, charger)
@@ -248,18 +246,18 @@ class Judge:
                 charger.rig.breaker.on_moved = partial(self._moved, charger)
 
     def entry(self, charger: Charger) -> Any:
-        """The bay of the present life that this charger's port belongs to."""
+        """The bay with this charger's port in the current life."""
         return next((entry for entry in self.life if entry.port == charger.number), None)
 
     def by(self, charger: Charger) -> Charger:
-        """At whose port this charger hangs: its own, unless cables are crossed."""
+        """The port this charger is wired to: its own, unless cables are crossed."""
         model = charger.rig.bay.charger
         return charger if charger.rig.wire.charger is model else next(
             one for one in self.chargers if one.rig.wire.charger is model
         )  # fmt: skip
 
     def wants(self, charger: Charger) -> bool:
-        """The service says that it charges here: where the charger runs already, it need not be told to."""
+        """The service reports charging here: a charger already running need not be told to."""
         return self._shown(charger).get("state") in ENERGISED and self.time.now_s - self.status_s < 1.0
 
     def find(self, charger: int, name: str, text: str) -> None:
@@ -280,7 +278,7 @@ class Judge:
             charger.limit = limit[1][0]
 
     def _started(self, charger: Charger, _now_s: float) -> None:
-        """A frame has switched an output on: of the charger behind this port."""
+        """A frame switched on the output of the charger behind this port."""
         for name, text in starts(self, charger):
             self.find(charger.number, name, text)
         if charger.waits:
@@ -289,7 +287,7 @@ class Judge:
             self.find(charger.number, "by itself", "it was started by nobody")
 
     def _stranger(self, charger: Charger, ran: bool) -> None:
-        """A frame of another program has switched an output on or off."""
+        """A frame of another program switched an output on or off."""
         charger.strange_s = self.time.now_s
         state = self._shown(charger).get("state", "")
         at_rest, fresh = state in AT_REST, self.time.now_s - self.status_s < 2 * STATUS_S
@@ -299,7 +297,7 @@ class Judge:
             self.time.call_later(HELD_S, self._held, charger, self.time.now_s)
 
     def _latched(self, charger: Charger, since_s: float, booted_s: float | None) -> None:
-        """FAULTS C5: one that was run by somebody else at rest waits for a person."""
+        """Fault C5: a charger run by somebody else at rest waits for a person."""
         shown = self._shown(charger)
         undisturbed = charger.strange_s == since_s and charger.deaf_s < since_s and not charger.rig.wire.mute_tx
         told = booted_s == self.booted_s and self.time.now_s - self.status_s < 1.0
@@ -308,7 +306,7 @@ class Judge:
             self.find(charger.number, "latched", f"another program has run it, {self._state(charger)}")
 
     def _held(self, charger: Charger, since_s: float) -> None:
-        """FAULTS C4: one that somebody else has stopped in mid-charge waits for a person."""
+        """Fault C4: a charger stopped by somebody else in mid-charge waits for a person."""
         if charger.strange_s == since_s and not charger.flows:
             charger.waits["stranger"] = "another program has stopped it"
 
@@ -318,7 +316,7 @@ class Judge:
             self.find(charger.number, name, text)
 
     def forgotten(self) -> None:
-        """The file of what survives is damaged: nobody knows what was latched."""
+        """The persisted state is damaged: the latches are unknown."""
         for charger in self.chargers:
             charger.waits["past"] = "its past cannot be read"
 
@@ -347,7 +345,7 @@ class Judge:
         return next((self.chargers[entry.port] for entry in self.life if entry.name == name), None)
 
     def asked(self, asked: Asked, names: list[str]) -> None:
-        """A person asks: a stop is one whatever is answered, and something is answered."""
+        """A person's request: a stop counts whatever the answer, and there is an answer."""
         if self.booted_s is None or self.frozen or self.time.now_s < self.booted_s + START_S:
             return
         if asked.request["verb"] == "stop":
@@ -383,7 +381,7 @@ class Judge:
             charger.since_s.clear()
 
     def dies(self, why: str, *, orderly: bool = False) -> None:
-        """The controller is gone, or is told to go."""
+        """The controller has ended or is told to end."""
         for charger in self.chargers:
             if not orderly and charger.meant == "run" and charger.flows and charger.current_a > FLOWS_A:
                 charger.waits["died"] = f"{why} in mid-charge"
@@ -397,11 +395,11 @@ class Judge:
         self.booted_s = None
 
     def helped(self) -> None:
-        """Somebody stops the station without a service."""
+        """The station is stopped without a service."""
         self.booted_s = self.time.now_s if self.booted_s is None else self.booted_s
 
     def meant(self, within_s: float, why: str) -> None:
-        """A stop of every charger of this life is meant, now."""
+        """From now on every charger of this life must stop."""
         for charger in self.chargers:
             if self.entry(charger) is not None:
                 self._meant(charger, self.time.now_s, within_s, why)
@@ -412,7 +410,7 @@ class Judge:
 
     def _understood(self, charger: Charger, since_s: float, why: str) -> None:
         due_s = charger.rig.tty.changed_s + LINE_S
-        if due_s > self.time.now_s:  # the line was set up otherwise just then
+        if due_s > self.time.now_s:  # the line had other settings just then
             self.time.call_at(due_s, self._understood, charger, since_s, why)
         elif charger.stopped_s < since_s and charger.deaf_s < since_s and self.booted_s is not None:
             self.find(
@@ -436,7 +434,7 @@ class Judge:
         self._judge_small(now_s)
 
     def _judge_small(self, now_s: float) -> None:
-        """Limits of a charge hold over restarts."""
+        """Limits of a charge hold across restarts."""
         for charger, bay in zip(self.chargers, self.script.bays, strict=True):
             dt_s, charger.looked_s = now_s - charger.looked_s, now_s
             charger.charged_ah += charger.current_a * dt_s / 3600
@@ -449,7 +447,7 @@ class Judge:
                 self.find(charger.number, "limits", f"{charger.precharged_s:.0f} s of precharge without a rise")
 
     def ends(self) -> None:
-        """The script is over: what was harmless has stopped nobody, and the record can be read."""
+        """At the end of the script: harmless events stopped nothing, and the journal is readable."""
         plain = [replace(bay, control="manual", contactor=False) for bay in self.script.bays]
         harmless = all(one.what in HARMLESS for one in self.script.hazards) and plain == [Bay()] * 3
         harmless = harmless and self.gateway.alive(self.gateway.controller)
@@ -499,19 +497,19 @@ class Judge:
             self.find(charger.number, name, text)
 
     def _judge_restless(self, charger: Charger, now_s: float) -> None:
-        """Who is stopped, and runs again and again, was never stopped."""
+        """A charger that is stopped and runs again repeatedly was never stopped."""
         if charger.since_s.get("no order") == now_s and charger.seen:
             charger.onsets.append(now_s)
         onsets = charger.onsets
         if self.booted_s is None or self.entry(charger) is None or len(onsets) < RESTARTS or onsets[0] < self.booted_s:
             return
-        if self.frozen or not self.gateway.alive(self.gateway.controller):  # nobody is there to tell
+        if self.frozen or not self.gateway.alive(self.gateway.controller):  # no service to report it
             return
         if now_s - onsets[0] < RESTARTS_S and charger.named_s < onsets[0] and now_s - onsets[-1] > VERIFY_S:
             self.find(charger.number, "nobody is told", f"it runs again and again by itself, {self._state(charger)}")
 
     def _judge_named(self, charger: Charger, reason: Reason, since_s: float, now_s: float) -> None:
-        """Who cannot be stopped is called so."""
+        """A charger that cannot be stopped is reported so."""
         if charger.current_a < SEEN_A or not charger.seen or not self.gateway.alive(self.gateway.controller):
             return
         if self.booted_s is None or self.frozen or now_s - self.status_s > 1.0 or reason.name == "crossed":
@@ -525,7 +523,7 @@ class Judge:
             )
 
     def _judge_mean(self, charger: Charger, now_s: float) -> None:
-        """On the average, no more flows than was ordered."""
+        """The average current is at most the setpoint."""
         port = self.by(charger)
         ordered_a = STEPS_A[min(port.limit, 4)] if port.meant == "run" else 20.0
         flown = charger.flown
@@ -570,18 +568,18 @@ class Judge:
             entry = self.entry(charger)
             named = port_name(charger.number) in text
             if entry is not None and not any(port_name(one.number) in text for one in self.chargers):
-                named = re.search(rf"\b{entry.name}\b", text) is not None  # else it may have another bay's name by now
+                named = re.search(rf"\b{entry.name}\b", text) is not None  # not another bay's name by now
             if not (named or "every charger" in text) or charger.current_a < SEEN_A or entry is None:
                 continue
             if self.time.now_s - charger.strange_s < GRACE_S:
                 continue
-            alone = process == "guardian" or self.gateway.door is None  # who has the charger's word only
+            alone = process == "guardian" or self.gateway.door is None  # has only the charger as a witness
             lies = {*charger.rig.wire.lies, *charger.rig.wire.liars} & {Kind.OPERATION, Kind.CURRENT}
             if not lies if alone else charger.seen:
                 self.find(charger.number, "verified", f"{process} says {text!r}, and {charger.current_a:.1f} A flow")
 
     def ended(self, name: str, status: int) -> None:
-        """A process has ended in order: with 0, nothing flows."""
+        """A process ended cleanly: with status 0, nothing flows."""
         if name in ("controller", "guardian", "estop") and status == 0:
             for charger in self.chargers:
                 if self.entry(charger) is None or charger.current_a < SEEN_A:

@@ -1,4 +1,4 @@
-"""Plays a script of `hazards.py` on a whole station over the lives of its gateway: one `Lived` comes out."""
+"""Plays a script of `hazards.py` on a whole station over the lives of its gateway; the result is a `Lived`."""
 
 import errno
 import signal
@@ -27,11 +27,11 @@ from tests.proof.virtual_process import Process
 from tests.proof.virtual_rig import ANSWER_S, Nature
 
 LOOK_S, STATUS_S = 0.05, 0.25
-#: systemd waits this long before it starts the service anew.
+#: systemd waits this long before restarting the service.
 RESTART_S = 2.0
 
 
-#: A charger that answers late, but within the deadline of 120 ms.
+#: The delay of a charger that answers late, but within the deadline of 120 ms.
 LATE_S = (0.060, 0.119)
 #: After these the service may end.
 EXCUSES = ("term", "kill", "kill guardian", "kill both", "freeze", "power")
@@ -39,16 +39,16 @@ EXCUSES = ("term", "kill", "kill guardian", "kill both", "freeze", "power")
 
 @dataclass(slots=True)
 class Lived:
-    """What became of a script."""
+    """The result of a script."""
 
     script: Script
     wrong: list[str] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
-    charged: int = 0  #: how many chargers have run
+    charged: int = 0  #: number of chargers that have run
 
     @property
     def kinds(self) -> set[str]:
-        """Which invariants were broken: "t = 1.00 s, charger 1, hot: …" is "hot"."""
+        """The broken invariants: "t = 1.00 s, charger 1, hot: …" is "hot"."""
         return {line.split(", ", 2)[2].split(":")[0] for line in self.wrong}
 
 
@@ -68,8 +68,8 @@ class Player:
         self.judge = Judge(self.gateway, script)
         self.began_s = self.time.now_s
         self.gateway.on_end = self._ended
-        self._wanted = False  # somebody wants the service to run
-        self._excused = False  # something has happened for which it may end
+        self._wanted = False  # the service should run
+        self._excused = False  # an event after which it may end
         self._charged: set[int] = set()
 
     def _cross(self) -> None:
@@ -85,7 +85,7 @@ class Player:
         self.time.call_later(STATUS_S, self._ask_status)
         try:
             self.time.wait(self.began_s + self.script.end_s)
-        except BaseException:  # noqa: BLE001 - a world that breaks is the worst of all findings
+        except BaseException:  # noqa: BLE001 - a broken world is the worst finding
             error = self.time.failure
             where = traceback.extract_tb(error.__traceback__)[-1] if error and error.__traceback__ else None
             self.judge.find(-1, "exception", f"{error!r} in {where and where.name}, {where and where.filename}")
@@ -125,7 +125,7 @@ class Player:
             self.gateway.boot()
 
     def _ended(self, process: Process) -> None:
-        """A process of ours has ended by itself."""
+        """One of our processes ended by itself."""
         if process in (self.gateway.controller, self.gateway.service) and not self._excused:
             self.judge.find(-1, "ended", f"{process.name}, though nobody wanted it to, and no thread of it could hang")
         self.judge.ended(process.name, process.status if process.status is not None else self.gateway.ended[-1].status)
@@ -156,7 +156,7 @@ class Player:
     def _kill(self, _: Hazard) -> None:
         if self.gateway.alive(self.gateway.controller):
             self.judge.dies("the controller was killed")
-            # One that has a thread in a driver does not die at once, but falls silent.
+            # A process with a thread in a driver does not die at once, but falls silent.
             hangs = self.gateway.controller is not None and self.gateway.controller.hangs
             self.judge.meant(FROZEN_S if hangs else KILLED_S, "the controller was killed")
             self.gateway.signal(self.gateway.controller, signal.SIGKILL)
@@ -211,7 +211,7 @@ class Player:
             now = usual
         elif hazard.detail == "rename":
             now = [replace(one, name=f"{one.name}b") if one.port == at else one for one in now]
-        elif hazard.detail == "rewire":  # every bay has another's name
+        elif hazard.detail == "rewire":  # every bay has another bay's name
             now = [replace(one, name=f"bay-{(one.port + 1) % 3 + 1}") for one in now]
         elif hazard.detail == "swap":
             other = {at: (at + 1) % 3, (at + 1) % 3: at}
@@ -219,7 +219,7 @@ class Player:
         elif hazard.detail == "nodes":
             other = {at: (at + 1) % 3, (at + 1) % 3: at}
             now = [replace(one, node=other.get(one.node, one.node)) for one in now]
-        elif hazard.detail == "inherit":  # it has a new name, and the next one its old one
+        elif hazard.detail == "inherit":  # it has a new name, and the next one has its old name
             names = {at: "bay-new", (at + 1) % 3: f"bay-{at + 1}"}
             now = [replace(one, name=names.get(one.port, one.name)) for one in now]
         self.gateway.entries = now or usual
@@ -238,7 +238,7 @@ class Player:
             rig.frozen = rig.frozen or hazard.detail == "bmu_frozen"
 
     def _comes(self, hazard: Hazard) -> None:
-        """detail: FIELD; for 2.75 s of every 3 s the BMU says so much more."""
+        """detail: FIELD; for 2.75 s of every 3 s the BMU reports that much more."""
         for rig in self._rigs(hazard):
             rig.bay.falsify[hazard.detail] = partial(self._more, hazard.value or 0.0)
             rig.apart_v = (hazard.value or 0.0) if hazard.detail == "voltage_v" else 0.0
@@ -248,7 +248,7 @@ class Player:
         return true + (more if self.time.now_s % 3.0 < 2.75 else 0.0)
 
     def _loose(self, hazard: Hazard) -> None:
-        """A plug that has contact for `value` s, and then none for as long."""
+        """A plug with contact for `value` s, then without for as long."""
         for rig in self._rigs(hazard):
             rig.bay.connected = not rig.bay.connected
             rig.bmu.port.faults.mute = not rig.bay.connected
@@ -326,7 +326,7 @@ class Player:
             rig.tty.listener(b"AT+GCAP\r")
 
     def _stty(self, hazard: Hazard) -> None:
-        """detail: a word of `stty`, or "suspended": somebody has typed Ctrl-S there (TCOOFF)."""
+        """detail: a word of `stty`, or "suspended": Ctrl-S was typed there (TCOOFF)."""
         for rig in self._rigs(hazard):
             if hazard.detail == "suspended":
                 rig.tty.flow(goes=False)
@@ -342,7 +342,7 @@ class Player:
             self._repeat(int(times), float(every_s), partial(rig.wire.hears_stranger, data))
 
     def _late(self, hazard: Hazard) -> None:
-        """Its answers come late, within the deadline, in so many pieces."""
+        """Its answers come late, within the deadline, in `value` pieces."""
         for rig in self._rigs(hazard):
             rig.wire.late_s, rig.wire.pieces = LATE_S, int(hazard.value or 1)
 
@@ -363,7 +363,7 @@ class Player:
             output.drive(False)
 
     def _kept(self, hazard: Hazard) -> None:
-        """detail: what somebody has made of the file of what survives."""
+        """detail: new content of the file of persisted state."""
         self.gateway.disk.damage(f"{JOURNAL}/persisted.json", hazard.detail)
         self.judge.forgotten()
 
@@ -373,7 +373,7 @@ class Player:
     # --- the bus ------------------------------------------------------------------------------------------------------
 
     def _tool(self, hazard: Hazard) -> None:
-        """What a CANopen tool or another device does on the bus, as everybody may."""
+        """Permitted actions of a CANopen tool or another device on the bus."""
         node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
         {
             "master": lambda: self._repeat(400, 0.013, lambda: bus.send(0x600 + node, _read(0x6000))),
@@ -393,7 +393,7 @@ class Player:
         }[hazard.detail]()
 
     def _bus(self, hazard: Hazard) -> None:
-        """What nobody may."""
+        """Forbidden actions."""
         node, bus = FIRST_NODE + hazard.bay, self.gateway.bus
         {
             "node": lambda: self._repeat(20, 0.2, lambda: bus.send(0x700 + node, b"\x05")),
@@ -406,17 +406,17 @@ class Player:
         }[hazard.detail]()
 
     def _answer_fd(self, cob_id: int, data: bytes) -> None:
-        """A frame of another kind of bus, which looks like an answer: 60.0 °C."""
+        """A frame of a different bus that looks like an answer: 60.0 °C."""
         if data[:3] == b"\x40\x04\x60":
             self.gateway.bus.raw(_fd(cob_id - 0x80))
 
     def _forge(self, cob_id: int, data: bytes) -> None:
-        """Somebody answers in the BMU's name, and is quicker: 20.0 °C."""
+        """Somebody answers in the BMU's name, faster: 20.0 °C."""
         if data[:3] == b"\x40\x04\x60":
             self.gateway.bus.send(cob_id - 0x80, b"\x43\x04\x60\x00\xc8\x00\x00\x00")
 
     def _answer_oddly(self, cob_id: int, data: bytes) -> None:
-        """Another node answers as well, with the beginning of segments, a toggle bit where there is none."""
+        """Another node answers too, starting a segmented transfer, or with a wrong toggle bit."""
         if data[:1] == b"\x40":
             self.gateway.bus.send(cob_id - 0x80, b"\x51" + data[1:4] + b"\x04\x00\x00\x00")
 
@@ -427,9 +427,9 @@ class Player:
 
 
 def _liar(lie: Lie, how: str, frozen: Any, value: float) -> Callable[[Any], Any]:
-    """What the BMU says of a value: another one, the one of now, or so much more; None is said as it is.
+    """A value as the BMU reports it: another value, the present one for ever, or that much more; None stays None.
 
-    Or the one before (`previous`), or this one and 100 less it in turns (`turns`).
+    Or the previous one (`previous`), or alternately this one and 100 minus it (`turns`).
     """
     said: list[Any] = [frozen]
 
@@ -451,7 +451,7 @@ def _read(index: int) -> bytes:
 
 
 def _extended(cob_id: int) -> can.Message:
-    """A frame of 29 bits whose number ends like the BMU's: 60.0 °C."""
+    """A 29-bit frame with an id ending like the BMU's: 60.0 °C."""
     data = b"\x43\x04\x60\x00\x58\x02\x00\x00"
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=True)
 
@@ -461,12 +461,12 @@ def _fd(cob_id: int) -> can.Message:
     return can.Message(arbitration_id=cob_id, data=data, is_extended_id=False, is_fd=True)
 
 
-#: Somebody tries to write a measurement, and the BMU refuses it.
+#: Somebody tries to write a measurement; the BMU refuses.
 REFUSED = b"\x2b\x00\x60\x00\x01\x00\x00\x00"
 
 
 def entries(script: Script) -> list[Entry]:
-    """The station file as it is meant."""
+    """The intended station file."""
     policies = ["small.yaml" if bay.small else "li-ion-48v" for bay in script.bays]
     return [
         Entry(f"bay-{number + 1}", number, number, policy=policy, control=bay.control, contactor=bay.contactor)
@@ -485,5 +485,5 @@ def _nature(bay: Any, number: int) -> Nature:
 
 
 def live(script: Script) -> Lived:
-    """Play it from the beginning to its end."""
+    """Play it to its end."""
     return Player(script).run()

@@ -1,12 +1,12 @@
-"""Fail the Nth call: every call below the service, of a whole charge, made to fail in turn, with each of its errors.
+"""Fail the Nth call: every call below the service during a whole charge fails in turn, with each of its errors.
 
     python -m tests.proof.nth_call                     all of them, on all processors
-    python -m tests.proof.nth_call --every 10          each tenth
+    python -m tests.proof.nth_call --every 10          every tenth
     python -m tests.proof.nth_call --only 'write:EIO:once:512'    one of them again
 
-A charge here is a deeply discharged toy pack from the first pulse to full, in virtual time, below the real pyserial and
-the real `link/can.py`. A call fails once, or it and all of its line for 3 s. Whatever happens: the invariants of
-`play.py` hold, and the end is a verified stop.
+A charge here takes a deeply discharged toy pack from the first pulse to full, in virtual time, with the real pyserial
+and the real `link/can.py`. A call fails once, or it and all calls of its line for 3 s. Whatever happens, the invariants
+of `play.py` hold and the charge ends in a verified stop.
 """
 
 import argparse
@@ -35,16 +35,16 @@ from tests.proof.script import BaySetup, Script
 from tests.proof.virtual_rig import Nature
 from tests.proof.virtual_service import World, station, world
 
-#: What links say before they have been heard for the first time.
+#: States of a link before it is first heard.
 FIRST = ("not opened yet", "open, no answer yet", "not asked yet")
-#: Twice the time of an undisturbed charge, and a backoff.
+#: Twice the time of an undisturbed charge, plus a backoff.
 END_S = 75.0
-#: So long after a failure it has shown itself.
+#: A failure shows within this.
 SEEN_S = 1.0
 #: A failure that lasts.
 LASTS_S = 3.0
 
-Fault = Callable[[], Any]  #: raises, or returns what the call returns instead
+Fault = Callable[[], Any]  #: raises, or returns the call's replacement result
 
 
 def _raises(make: Callable[[], BaseException]) -> Fault:
@@ -71,7 +71,7 @@ DOWN = {
     **GONE,
 }
 
-#: Call → how it may fail.
+#: Call → its possible failures.
 ERRORS: dict[str, dict[str, Fault]] = {
     "open": {name: _os(getattr(errno, name)) for name in ("ENOENT", "EACCES", "EBUSY", "EIO", "EMFILE")},
     "pipe": {"EMFILE": _os(errno.EMFILE)},
@@ -100,13 +100,13 @@ ERRORS: dict[str, dict[str, Fault]] = {
 }  # fmt: skip
 
 
-#: No kernel says "there is something" and "there is nothing" for seconds.
+#: No kernel reports "readable" and then "nothing to read" for seconds.
 ONCE = {("poll", "POLLHUP"), ("read", "EAGAIN")}
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """The call with this number fails like this."""
+    """How the call with this number fails."""
 
     call: str
     error: str
@@ -124,11 +124,11 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a charge."""
+    """The result of a charge."""
 
     full: bool
     interrupted: bool  #: a stop came before full
-    recorded: bool  #: a link said what is wrong, or a fault was raised
+    recorded: bool  #: a link reported a problem, or a fault was raised
     calls: tuple[str, ...]
     violations: tuple[str, ...]
 
@@ -142,7 +142,7 @@ class Outcome:
 
 
 class Charge:
-    """One charge with one call that fails."""
+    """One charge with one failing call."""
 
     def __init__(self, on: World, case: Case | None, *, brief: bool) -> None:
         self.world, self.case = on, case
@@ -160,7 +160,7 @@ class Charge:
         played = self.player.run()
         if self.world.rigs[0].bay.charger.running:
             played.violations.append("t = end, bay 0, end: the charger runs")
-        elif self._until_s > self.world.time.now_s - LASTS_S:  # it failed to the very end, and says so
+        elif self._until_s > self.world.time.now_s - LASTS_S:  # it failed to the very end and reports it
             played.violations = [line for line in played.violations if "NOT verified" not in line]
         return Outcome(self.full, self.interrupted, self.recorded, tuple(self.calls), tuple(played.violations))
 
@@ -188,21 +188,21 @@ class Charge:
             self.world.time.call_later(0.5, self.world.end)
 
     def _settled(self, decision: Decision) -> bool:
-        """A stop was verified, or the charge has gone on for long enough."""
+        """A stop was verified, or the charge continued for long enough."""
         if self.interrupted:
             return decision.state in SETTLED and decision.command is None
         return self.world.time.now_s > self._until_s + SEEN_S
 
 
 def charge(case: Case | None, *, brief: bool = False) -> Outcome:
-    """The whole of it; `brief`: until the failure has shown what becomes of it."""
+    """The whole charge; `brief`: until the failure's result shows."""
     the_station = station([ControlMode.MANUAL], [POLICIES["demo"]], sweep_s=0.3)
     with world(the_station, [Nature(PACKS["demo"](), line="perfect", speed=6)], end_s=END_S + 60) as made:
         return Charge(made, case, brief=brief).run()
 
 
 def cases(every: int) -> Iterator[Case]:
-    """Each call of an undisturbed charge (each `every`-th), with each of its errors, once and lasting."""
+    """Each call of an undisturbed charge (every `every`-th), with each of its errors, once and lasting."""
     seen: Counter[str] = Counter()
     for number, call in enumerate(charge(None).calls):
         seen[call] += 1
@@ -213,14 +213,14 @@ def cases(every: int) -> Iterator[Case]:
 
 
 def outcome(case: Case) -> tuple[Case, Outcome]:
-    """Each tenth charge is carried to its end, so that recoveries are seen as well."""
+    """Every tenth charge runs to its end, so that recoveries show too."""
     return case, charge(case, brief=case.number % 10 != 0)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """All of them, and a table; 1 if an invariant was broken."""
+    """All of them, with a table; 1 if an invariant was broken."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--every", type=int, default=1, help="only each so many of them")
+    parser.add_argument("--every", type=int, default=1, help="only every Nth of them")
     parser.add_argument("--only", type=Case.parse, help="CALL:ERROR:once|lasting:NUMBER")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     arguments = parser.parse_args(argv)

@@ -1,10 +1,10 @@
-"""Scripts for the changes of state that neither the grid's ways into its states nor its faults make."""
+"""Scripts for transitions made neither by the grid's ways into its states nor by its faults."""
 
 from orchestrator.model import State
 from tests.proof.exploring import NEVER
 from tests.proof.script import BaySetup, Happening, Script
 
-#: The table has them, no run makes them, and why.
+#: Transitions in the table that no run makes, and why.
 NEVER_MADE = {
     **NEVER,
     (State.STARTING, State.FULL): "only a restart leads there, and every script here is one life",
@@ -24,7 +24,7 @@ def _script(setup: BaySetup, *happenings: tuple[float, str] | tuple[float, str, 
     return Script(0, (setup,), befalls, last_s + 22.0, last_s + 14.0)
 
 
-#: What they lead through → how.
+#: Transitions covered → script.
 PATHS: dict[str, Script] = {
     "FULL → OFFLINE → FULL": _script(NEARLY_FULL, (15.0, "charger_cut_off"), (19.0, "heal")),
     "FULL → QUALIFYING → FULL": _script(NEARLY_FULL, (15.0, "implausible_soc", 50.0), (16.0, "heal")),

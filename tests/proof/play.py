@@ -1,8 +1,8 @@
-"""Plays a script on the virtual service and holds the truth against what must be: one `Played` comes out.
+"""Plays a script on the virtual service and checks the true state against the invariants; the result is a `Played`.
 
-The invariants: no charger runs under a STOP-worthy condition for longer than its budget, unless the bay says that it is
-out of control; every step of the core keeps the properties of `orchestrator.workbench`; what starts was qualified; no
-thread dies, hangs or meets an exception; and at the end, every fault taken away, every charger is verified to stand by.
+The invariants: no charger runs under a STOP-worthy condition for longer than its budget, unless the bay reports it out
+of control; every decision keeps the properties of `orchestrator.workbench`; every start was qualified; no thread dies,
+hangs or raises; and at the end, with all faults removed, every charger is in verified standby.
 """
 
 import traceback
@@ -30,35 +30,35 @@ from tests.proof.virtual_rig import ANSWER_S, Nature
 from tests.proof.virtual_service import FIRST_NODE, World, station, world
 
 POLICIES = {"48v": load_policy("li-ion-48v"), "demo": load_policy(shipped_dir() / "configs/demo/policy.yaml")}
-#: How often the truth is looked at.
+#: Interval of the checks.
 LOOK_S = 0.05
-#: As many heartbeats are missed within the guardian's patience.
+#: Number of heartbeats within the guardian's time-out.
 UNWELL = 4
-#: An operator's request is answered within this: by the next step, or one more for each that was asked before it.
+#: An operator's request is answered within this: by the next decision, or one more for each earlier request.
 ANSWERED_S = 0.6
-#: A port that is there again is found within this, and begins with a stop.
+#: A port that returns is found within this, and its first frame is a stop.
 REOPENED_S = 1.3
-#: A bay must have been in QUALIFYING for this long before its charger starts.
+#: A bay must be in QUALIFYING for this long before its charger starts.
 QUALIFY_S = 2.0
 
 
 @dataclass(slots=True)
 class Injected:
-    """One fault that was injected while the charger ran, and what came of it."""
+    """One fault injected while the charger ran, and its outcome."""
 
     name: str
     t_s: float
     stop_s: float | None = None  #: from then to the first byte of a stop
-    fault: str = ""  #: the id of the first fault that was raised
+    fault: str = ""  #: the id of the first fault raised
     verified: bool = False  #: the bay came to verified standby afterwards
     named: bool = False  #: it said that the charger is out of control
-    lasted_s: float | None = None  #: until it was taken away, an operator asked for something, or the end
-    alone: bool = True  #: no other fault had been injected before it, or all were taken away again
+    lasted_s: float | None = None  #: until it was removed, an operator's request, or the end
+    alone: bool = True  #: no other fault was active before it
 
 
 @dataclass(slots=True)
 class Played:
-    """What became of a script."""
+    """The result of a script."""
 
     script: Script
     violations: list[str] = field(default_factory=list)
@@ -70,7 +70,7 @@ class Played:
 
 @dataclass(slots=True)
 class Watch:
-    """What is followed of one bay."""
+    """The data tracked for one bay."""
 
     heard: Heard = field(default_factory=Heard)
     since_s: dict[str, float] = field(default_factory=dict)  #: condition → since when it holds while the charger runs
@@ -79,7 +79,7 @@ class Watch:
     qualifying_s: float | None = None
     open: list[Injected] = field(default_factory=list)
     named_s: float = 0.0  #: when the bay last said that its charger is out of control
-    reachable_s: float | None = None  #: since when the port takes what is written to it
+    reachable_s: float | None = None  #: since when the port accepts writes
     faulty: bool = False  #: a fault was injected and not healed since
 
 
@@ -91,7 +91,7 @@ class Player:
         self._look_s = look_s
         self.played = Played(script)
         self.began_s = self.time.now_s
-        self.out_of_reach: Callable[[], bool] = lambda: False  #: what is written does not get out
+        self.out_of_reach: Callable[[], bool] = lambda: False  #: writes do not reach the line
         self.watches = [Watch() for _ in on.rigs]
         for number, rig in enumerate(on.rigs):
             rig.wire.on_bytes = partial(self._bytes, number)
@@ -109,7 +109,7 @@ class Player:
         self.time.call_later(self._look_s, self._look)
         try:
             self.played.status = self.world.run()
-        except BaseException as error:  # noqa: BLE001 - a world that breaks is the worst of all findings
+        except BaseException as error:  # noqa: BLE001 - a broken world is the worst finding
             where = traceback.extract_tb(error.__traceback__)[-1]
             self._wrong(0, "exception", f"{error!r} in {where.name}, {where.filename}:{where.lineno}")
         self._judge_end()
@@ -120,7 +120,7 @@ class Player:
     def _happen(self, one: Happening) -> None:
         rig, watch = self.world.rigs[one.bay], self.watches[one.bay]
         if one.name in (*MENDS, *Request):
-            self._close(watch)  # what follows may be due to this
+            self._close(watch)  # later events may be due to this
         if one.name in set(Request):
             asked = self.world.ask(Request(one.name), one.bay)
             self.time.call_later(ANSWERED_S, self._answered, one, asked)
@@ -304,13 +304,13 @@ class Player:
 
 
 def play(script: Script) -> Played:
-    """Play it from the beginning to its end."""
+    """Play it to its end."""
     with stage(script) as made:
         return Player(script, made).run()
 
 
 def stage(script: Script, bus: Bus = PERFECT) -> AbstractContextManager[World]:
-    """The world that a script is about."""
+    """The world of a script."""
     controls = [ControlMode.AUTOMATIC if bay.automatic else ControlMode.MANUAL for bay in script.bays]
     policies = [POLICIES[bay.pack] for bay in script.bays]
     the_station = station(controls, policies, script.limit_a, sweep_s=script.sweep_s, tpdo_s=script.tpdo_s)

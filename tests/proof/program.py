@@ -1,4 +1,4 @@
-"""What another program for this charger sends on the same line: valid frames (protocol 2/2, §3.3.1, §3.3.2, §3.3.4)."""
+"""Frames of another program for this charger on the same line, all valid (protocol 2/2, §3.3.1, §3.3.2, §3.3.4)."""
 
 from orchestrator.model import ChargeMode, Precharge
 from orchestrator.sim.charger import Push
@@ -22,11 +22,11 @@ FRAMES: dict[str, bytes] = {
     "continuous": _push(Push.PRECHARGE, Precharge.CONTINUOUS),
     **{f"limit {step}": _push(Push.CURRENT_LIMIT, step) for step in range(5)},
 }
-#: As programs use them: with everything that a charge needs.
+#: As programs use them, with everything a charge needs.
 FRAMES["run"] = FRAMES["charge"] + FRAMES["limit 4"] + FRAMES["resume"] + FRAMES["operation"]
 FRAMES["stop"] = FRAMES["rest"] + FRAMES["standby"]
 
 
 def frames(names: str) -> bytes:
-    """ "limit 4+resume": these, one after another."""
+    """ "limit 4+resume": these two in order."""
     return b"".join(FRAMES[name] for name in names.split("+"))

@@ -1,10 +1,10 @@
-"""The soak's real part: the demo's two processes on a poor line and a poor bus, for as long as one likes.
+"""The soak's real part: the demo's two processes on a poor line and a poor bus, for any length of time.
 
-Batteries come, are charged and leave; now and then something breaks in mid-charge, is found out, mended and reset.
-The emulated station says what is true, the service's own journal what it made of it.
+Batteries arrive, charge and leave; now and then something breaks in mid-charge, is detected, repaired and reset. The
+emulated station gives the true state, the service's own journal its response.
 
-To be run on a quiet machine: what goes through a pty goes through a thread of the kernel that no priority reaches. If
-that has to wait for half a second, the service stops, its guardian ends it, and it is started anew, which is counted.
+Run it on a quiet machine: a pty's data passes through a kernel thread that no priority affects. If that thread waits
+for half a second, the service stops, its guardian ends it, and the restart is counted.
 """
 
 import json
@@ -29,20 +29,20 @@ from tests.waiting import wait_until
 
 LOOK_S = 0.1
 SAMPLE_S = 10.0
-#: What needs longer to show itself, or to be believed, than SILENT_S.
+#: Faults that need longer than SILENT_S to show or to be believed.
 LATER_S = {
     "stale_reading": 0.5, "implausible_soc": 1.0, "volts_disagree": 3.0, "amps_disagree": 5.0, "over_temperature": 7.0,
     "under_temperature": 6.0, "command_ignored": 5.0, "battery_removed": 1.0,
 }  # fmt: skip
-#: Nothing to stop for in the middle of these charges: a temperature that stays is not seen, a charger's values that
-#: stay only after a minute, what shows in a precharge or at rest neither, and of a SOC that jumps people are warned.
+#: Faults that stop no charge here: a stuck temperature is not detected, stuck charger values
+#: only after a minute, others show in a precharge or at rest only, and a jump of the SOC is just a warning.
 UNSEEN = ("heal", "frozen_charger", "frozen_temperature", "precharge_no_rise", "rogue_run", "soc_jump")
-#: A deeply discharged toy is full within a minute, and a charge that was refused is tried again after a backoff.
+#: A deeply discharged toy pack is full within a minute, and a refused charge is tried again after a backoff.
 BEGIN_S, FULL_S, BACKOFF_S = 25.0, 150.0, 330.0
-#: What was mended is believed after this; what follows an injection, a departure or a mending is due to it.
+#: A repair is believed after this; events this soon after an injection, a removal or a repair are due to it.
 MENDED_S, DUE_S = 6.0, 5.0
 STANDS_A = 0.5
-#: What one step has to say is written down within this, its change of state first.
+#: The records of one decision are written within this, its transition first.
 STEP_S = 0.01
 #: A bay of a service that does not answer.
 NOBODY: dict[str, Any] = {"state": "", "reason": "", "alarm": "none", "command": {"order": {"action": ""}}}
@@ -50,7 +50,7 @@ NOBODY: dict[str, Any] = {"state": "", "reason": "", "alarm": "none", "command":
 
 @dataclass(slots=True)
 class Sample:
-    """One process at one time."""
+    """A process at one time."""
 
     pid: int
     t_s: float
@@ -61,7 +61,7 @@ class Sample:
 
 @dataclass(slots=True)
 class Real:
-    """What came of it."""
+    """The results."""
 
     charges: int = 0
     departures: int = 0
@@ -71,8 +71,8 @@ class Real:
     missed: list[str] = field(default_factory=list)
     false_stops: list[str] = field(default_factory=list)
     false_latches: list[str] = field(default_factory=list)
-    restarts: list[str] = field(default_factory=list)  #: of the service, after its guardian had ended it
-    odd: list[str] = field(default_factory=list)  #: whatever else should not have been
+    restarts: list[str] = field(default_factory=list)  #: of the service, after its guardian ended it
+    odd: list[str] = field(default_factory=list)  #: any other unexpected event
     samples: dict[str, list[Sample]] = field(default_factory=lambda: {"guardian": [], "controller": []})
     status: int = -1  #: the service's exit status
 
@@ -87,14 +87,14 @@ class Life:
         self._sampled_s = 0.0
         self._began_s = time.monotonic()
         self.real = Real()
-        self.due: list[tuple[float, float]] = []  #: between these times whatever happens is due to what was done
+        self.due: list[tuple[float, float]] = []  #: events between these times are due to our own actions
 
     def live(self) -> None:
         while time.monotonic() < self._end_s:
             self._stay()
 
     def _stay(self) -> None:
-        """A battery comes, is charged, or not, and goes."""
+        """A battery arrives, charges or not, and leaves."""
         self._arrive()
         if self._until(self._charging, BEGIN_S):
             dice = self._dice.random()
@@ -144,7 +144,7 @@ class Life:
     # --- faults -------------------------------------------------------------------------------------------------------
 
     def _next_fault(self) -> str:
-        """Each of them before any of them again."""
+        """Each of them once before any repeats."""
         if not self._faults:
             self._faults = [name for name in FAULTS if name not in UNSEEN]
             self._dice.shuffle(self._faults)
@@ -159,7 +159,7 @@ class Life:
         if not self._until(lambda: self._stands() or self._named(), within_s):
             self.real.missed.append(f"{self._t_s():.0f} s: {name}: {self._plant.state()}")
         self._until_passed(self._dice.uniform(2.0, 8.0))
-        first_s = self._plant.state()["first_stop_s"]  # late: a charger that stands by itself is told a moment after
+        first_s = self._plant.state()["first_stop_s"]  # late: a charger in standby by itself is told a moment later
         stops_s = self.real.stops_s.setdefault(name, [])
         if first_s is not None:
             stops_s.append(first_s - injected_s)
@@ -168,7 +168,7 @@ class Life:
         self._until(self._charging, BEGIN_S)
 
     def _mend(self) -> None:
-        """What a person does: take the cause away, reset, start."""
+        """A person's actions: remove the cause, reset, start."""
         self._plant.inject("heal")
         self._until_passed(MENDED_S)
         self._ask("reset")
@@ -176,7 +176,7 @@ class Life:
 
     def _ask(self, verb: str) -> None:
         self.real.requests += 1
-        with suppress(ServiceError):  # it is just being started, and looked at soon
+        with suppress(ServiceError):  # it is just being started; check again soon
             ask(self._stage.directory / "run" / "orchestrator.sock", {"verb": verb, "bays": None})
 
     # --- looking ------------------------------------------------------------------------------------------------------
@@ -202,7 +202,7 @@ class Life:
         return self._stage.bay() or NOBODY
 
     def _restart(self) -> None:
-        """As systemd does: on a machine that lets nobody run for half a second, the guardian ends the controller."""
+        """Like systemd: if the machine stalls for half a second, the guardian ends the controller."""
         began_s = time.monotonic()
         last = self._stage.log.read_text(encoding="utf-8").splitlines()[-1]
         self.real.restarts.append(f"{self._t_s():.0f} s: status {self._stage.service.returncode}: {last}")
@@ -251,8 +251,8 @@ def _sample_of(pid: int, t_s: float) -> Sample:
 
 
 def live(minutes: float, seed: int = 1) -> Real:
-    """Let it live for so long, and judge by the journal what the service made of it."""
-    with suppress(PermissionError):  # else whatever else this machine does is measured as well
+    """Let it live for that long, and judge the service by its journal."""
+    with suppress(PermissionError):  # otherwise the machine's other load is measured too
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     with Stage("--line", "poor", "--bus", "poor") as stage:
         life = Life(stage, time.monotonic() + 60 * minutes, seed)
@@ -264,7 +264,7 @@ def live(minutes: float, seed: int = 1) -> Real:
 
 
 def judge(real: Real, journal: Path, due: list[tuple[float, float]]) -> None:
-    """A fault that stops or latches while nothing was wrong is a false one."""
+    """A fault that stops or latches while nothing is wrong is false."""
     state, before, changed_s = "", "", 0.0
     for line in _lines(journal):
         if line["kind"] == "transition":

@@ -1,9 +1,9 @@
-"""What the long forms print."""
+"""Output of the long forms."""
 
 import sys
 
 
 def say(text: object) -> None:
-    """A line, at once."""
+    """Print a line at once."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()

@@ -1,7 +1,7 @@
-"""What was once seen to go wrong, as scripts: each played first, and each a hole that a bug may open again.
+"""Past failures as scripts: each is played first, and each is a hole that a bug may reopen.
 
-A scene is small: one or two things happen to a station that charges, or to one that has stopped, and it is followed for
-long enough to see what comes of it, over further lives where the past matters.
+A scene is small: one or two events at a charging or stopped station, which is followed for long enough to see the
+result, over further lives where the past matters.
 """
 
 import termios
@@ -161,7 +161,7 @@ SCENES: dict[str, Script] = {
     ),
     "apart for most of the time": _scene(h(0, "comes", 0, 2.0, "voltage_v"), end_s=T + 30),
     "loose plug": _scene(h(0, "loose", 0, 6.0), end_s=T + 90),
-    # 8. Not the battery that is meant.
+    # 8. The wrong battery.
     "a pack of 36 V": _scene(bays=(Bay(cells=10, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
     "a pack of 24 V": _scene(bays=(Bay(cells=7), Bay(), Bay()), end_s=30.0),
     "hot": _scene(h(0, "fault", 0, None, "over_temperature")),
@@ -170,7 +170,7 @@ SCENES: dict[str, Script] = {
         h(0, "fault", 1, None, "bmu_frozen"), bays=(Bay(), Bay(soc_pct=80.0), Bay()), end_s=T + 400
     ),
     "ports swapped in the file": _scene(h(0, "term"), h(4, "edit", 0, None, "swap"), h(4.2, "boot"), end_s=T + 36),
-    # 9. Our own exception.
+    # 9. Our own exceptions.
     "a BMU that reads 0.00 V": _scene(
         h(0, "bmu", 0, 0.0, "voltage_v:is:1"), h(0, "fault", 0, None, "ignore_stop"), end_s=T + 16
     ),
@@ -201,6 +201,6 @@ SCENES: dict[str, Script] = {
     "a temperature that is forged": _scene(
         h(0, "bus", 1, None, "forged"), h(1, "fault", 1, 60.0, "over_temperature"), end_s=T + 16
     ),
-    # What somebody would try next.
+    # Further attempts.
     **VARIANTS,
 }

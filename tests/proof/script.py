@@ -1,6 +1,6 @@
-"""A fault script: what bays there are, and what befalls them when. Made from a seed, written as JSON, made smaller.
+"""A fault script: the bays and what happens to them when. Made from a seed, written as JSON, and shrunk.
 
-The same script always plays the same way, to the byte, so a failure is its script and nothing else.
+The same script always plays the same way, to the byte, so the script alone reproduces a failure.
 """
 
 import json
@@ -12,20 +12,20 @@ from orchestrator.model import Request
 from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.line import LINES
 
-#: Faults of the station's lines, beside those of `sim.faults`.
+#: Faults of the station's lines, in addition to those of `sim.faults`.
 LINE_FAULTS = ("port_stalled", "bus_down", "bus_lost")
-#: A battery comes, of which `value` is the SOC. It takes every fault away, as `heal` does.
+#: A battery arrives with SOC `value`. It removes every fault, like `heal`.
 ARRIVES = "arrives"
 MENDS = ("heal", ARRIVES)
 REQUESTS = tuple(str(request) for request in Request)
-#: What `hazards.py` plays, with invariants of its own.
+#: Kinds played by `hazards.py`, with its own invariants.
 ENVIRONMENT = (
     "line_taken_over", "port_locked", "says_standby", "says_standby_now_and_then", "limit_reverts", "runs_again",
     "obeys_once", "stopped_elsewhere", "bmu_frozen", "pack_collapsed", "another_pack",
 )  # fmt: skip
-#: Everything that can befall a bay; `heal` takes all faults away again.
+#: Everything that can happen to a bay; `heal` removes all faults.
 INJECTIONS = (*(name for name in FAULTS if name not in ("heal", *ENVIRONMENT)), *LINE_FAULTS)
-#: Other strengths of some faults than their usual one.
+#: Other strengths of some faults than the usual one.
 STRENGTHS: dict[str, tuple[float, ...]] = {
     "over_temperature": (46.0, 56.0, 70.0),
     "under_temperature": (-0.5, -20.0),
@@ -40,14 +40,14 @@ STRENGTHS: dict[str, tuple[float, ...]] = {
     "emergency": (float(0x1000), float(0x4210)),
     "illegal_value": (0.0, 255.0),
 }
-#: A charge begins within this, and what follows a fault is seen within that. Once all faults are gone, standby is
-#: believed again within this, also of a charger that has not obeyed.
+#: A charge begins within this, and a fault's effects show within that. Once all faults are gone, standby is
+#: believed again within this, even for a charger that disobeyed.
 BEGIN_S, SEE_S, END_S = 7.0, 9.0, 20.0
 
 
 @dataclass(frozen=True, slots=True)
 class BaySetup:
-    """One bay at the beginning."""
+    """The initial state of a bay."""
 
     pack: str = "48v"
     soc_pct: float | None = None
@@ -60,7 +60,7 @@ class BaySetup:
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """Something befalls a bay: a fault, `heal`, or an operator's request."""
+    """An event at a bay: a fault, `heal`, or an operator's request."""
 
     t_s: float
     bay: int
@@ -93,7 +93,7 @@ class Script:
 
     @classmethod
     def of_seed(cls, seed: int) -> "Script":
-        """A random one; the same seed, the same script."""
+        """A random script, reproducible from its seed."""
         dice = Random(seed)
         bays = tuple(_bay(dice) for _ in range(dice.choices((1, 2, 3), (8, 2, 1))[0]))
         happenings = _happenings(dice, len(bays))
@@ -136,14 +136,14 @@ def _happenings(dice: Random, bays: int) -> tuple[Happening, ...]:
 
 
 def shrink(script: Script, fails: Callable[[Script], bool]) -> Script:
-    """The smallest script on the way down that still fails; `fails` plays one."""
+    """The smallest script found by shrinking that still fails; `fails` plays one."""
     while (smaller := next(filter(fails, _smaller(script)), None)) is not None:
         script = smaller
     return script
 
 
 def _smaller(script: Script) -> Iterator[Script]:
-    """Simpler neighbours, those that leave most away first."""
+    """Simpler neighbours, the simplest first."""
     happenings = script.happenings
     for at in range(len(happenings)):
         yield replace(script, happenings=happenings[:at] + happenings[at + 1 :])

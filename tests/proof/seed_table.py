@@ -1,4 +1,4 @@
-"""The seeds: holes that were closed, each as a small change of the package that opens it again."""
+"""The seeds: closed holes, each with a small change of the package that reopens it."""
 
 from tests.proof.seeded.bus import BUS
 from tests.proof.seeded.conditions import CONDITIONS

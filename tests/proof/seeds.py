@@ -1,11 +1,11 @@
-"""Testing the tester: each hole that was closed is opened again in a copy of the package, and the proofs must find it.
+"""Testing the tester: each closed hole is reopened in a copy of the package, and the proofs must find it.
 
     python -m tests.proof seeds                       all of them; writes docs/proofs.md
-    python -m tests.proof.seeds --only NAME ...       some of them, nothing is written
+    python -m tests.proof.seeds --only NAME ...       some of them; writes nothing
 
-A seed is a text that stands in the package exactly once and what takes its place (`seeded/`). The likeliest proof
-runs first, and of that the likeliest part; then all proofs, one after the other, until one finds something. What the
-package itself makes them find does not count.
+A seed is a text that occurs in the package exactly once and its replacement (`seeded/`). The likeliest proof runs
+first, starting with its likeliest part; then all proofs in turn until one finds something. Findings in the unchanged
+package do not count.
 """
 
 import argparse
@@ -30,19 +30,19 @@ from tests.proof.seeded.seed import Seed
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs" / "proofs.md"
 HEADING = "## Which proof finds which bug"
-#: Who goes on working here meanwhile must not be what is found.
+#: A copy, so that ongoing edits in this tree are not what is found.
 COPIED = ("orchestrator", "tests")
-#: Of the seeds, at least this share must be found.
+#: At least this share of the seeds must be found.
 ENOUGH = 0.95
-#: What the package itself makes the proofs find is looked for once.
+#: Findings in the unchanged package are determined once.
 LOOKING = Lock()
-#: A seed may take this long in all, in the mean.
+#: Mean time allowed per seed.
 SEED_S = 180.0
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """One of the proofs: its command, and how long it may take. `usual` is what it looks at if nothing is named."""
+    """One of the proofs: its command and time limit. `usual` is what it plays if nothing is named."""
 
     about: str
     sees: str
@@ -50,7 +50,7 @@ class Proof:
     command: tuple[str, ...]
     within_s: float
     usual: tuple[str, ...] = ()
-    named: str = ""  #: the option before what is named, once for each
+    named: str = ""  #: the option before each name
 
     def words(self, where: Sequence[str]) -> list[str]:
         """The command line."""
@@ -59,22 +59,22 @@ class Proof:
 
 
 PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60")
-#: Random scripts that are played after the scenes, for what no scene finds.
+#: Random scripts played after the scenes, for bugs no scene finds.
 RUNS = "40"
 PROOFS: Mapping[str, Proof] = {
     "environment": Proof(
         "scenes, then random trouble with lines, disk, bus and people, over several lives of the gateway",
-        "the whole service in virtual time, held against wire and plant: what flows, who is told, what a restart keeps",
-        "the kernel's own processes, sockets and signals; drivers; what only a second guard hides",
+        "the whole service in virtual time, checked against wire and plant: current, messages, restarts",
+        "real processes, sockets and signals; drivers; bugs hidden by a second guard",
         ("-m", "tests.proof.environment", "--names", "--until-found"),
         300.0,
         ("--runs", RUNS),
         "--only",
     ),
     "hostile": Proof(
-        "real processes, pseudo terminals, sockets and disks among hostile ones",
-        "what virtual time replaces: signals, killed and frozen processes, drivers that hang, imports, clients",
-        "rare interleavings: it is as slow as the world",
+        "real processes, pseudo terminals, sockets and disks in a hostile environment",
+        "everything virtual time replaces: signals, killed and frozen processes, hanging drivers, imports, clients",
+        "rare interleavings: it runs in real time",
         PYTEST,
         300.0,
         (
@@ -92,7 +92,7 @@ PROOFS: Mapping[str, Proof] = {
     ),
     "parts": Proof(
         "the tests of single parts",
-        "a guard behind which another one stands, so that the whole station is safe without it",
+        "a guard backed by another one, so that the whole station is safe without it",
         "how parts work together",
         PYTEST,
         300.0,
@@ -100,22 +100,22 @@ PROOFS: Mapping[str, Proof] = {
     ),
     "scripts": Proof(
         "random fault scripts on a station",
-        "faults of chargers and BMUs in combinations that nobody thought of",
-        "whoever else is on the machine, and restarts",
+        "faults of chargers and BMUs in unforeseen combinations",
+        "other programs on the machine, and restarts",
         ("-m", "tests.proof.campaign", "--scripts", "120"),
         120.0,
     ),
     "calls": Proof(
-        "every call of a charge made to fail in turn",
-        "an error that nobody expects, wherever it comes",
-        "what hangs, and what is wrong without an error",
+        "every call during a charge fails in turn",
+        "an unexpected error at any place",
+        "hanging calls, and bugs without an error",
         (*PYTEST, "tests/proof/test_nth_call.py"),
         120.0,
     ),
     "core": Proof(
-        "everything that the core can come to",
-        "each state under each input: what may follow, and that all ends at rest",
-        "everything outside of the core",
+        "everything the core can reach",
+        "each state under each input: every transition is allowed, and everything ends at rest",
+        "everything outside the core",
         (*PYTEST, "tests/proof/test_explore.py"),
         120.0,
     ),
@@ -124,17 +124,17 @@ PROOFS: Mapping[str, Proof] = {
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What became of a seed."""
+    """The result for a seed."""
 
     seed: Seed
-    proof: str  #: that found it; "" none
-    by: str  #: which scene or test of it
+    proof: str  #: the proof that found it; "" none
+    by: str  #: its scene or test
     took_s: float  #: of that proof
     all_s: float  #: of all that were tried
 
 
 def apply(seed: Seed, root: Path) -> None:
-    """Open the hole in the package below `root`; ValueError if a text does not stand there exactly once."""
+    """Reopen the hole in the package below `root`; ValueError if a text does not occur exactly once."""
     for name, old, new in seed.changes:
         path = root / name
         text = path.read_text(encoding="utf-8")
@@ -146,7 +146,7 @@ def apply(seed: Seed, root: Path) -> None:
 
 @contextmanager
 def copied(seed: Seed | None) -> Iterator[Path]:
-    """A tree with the package changed, everything else as it is."""
+    """A tree with the changed package; everything else is unchanged."""
     with tempfile.TemporaryDirectory(prefix="seed") as directory:
         root = Path(directory)
         for name in COPIED:
@@ -160,7 +160,7 @@ def copied(seed: Seed | None) -> Iterator[Path]:
 
 
 def run(words: Sequence[str], within_s: float, root: Path) -> tuple[bool, str]:
-    """Whether it finds something in the tree, and what it said. One that takes too long has found nothing."""
+    """Whether it finds something in the tree, and its output. A proof that takes too long has found nothing."""
     environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
     with subprocess.Popen(
         [sys.executable, *words], cwd=root, env=environment, stdout=subprocess.PIPE,
@@ -176,7 +176,7 @@ def run(words: Sequence[str], within_s: float, root: Path) -> tuple[bool, str]:
 
 @cache
 def known() -> tuple[str, ...]:
-    """What the package as it is makes the environment find, as options that leave it out; asked for where it counts."""
+    """The environment's findings in the unchanged package, as options that exclude them; computed when needed."""
     with LOOKING, copied(None) as root:
         command = ("-m", "tests.proof.environment", "--names", "--runs", RUNS)
         found, said = run(command, 600.0, root)
@@ -187,7 +187,7 @@ def known() -> tuple[str, ...]:
 
 
 def attempts(seed: Seed) -> Iterator[tuple[str, Sequence[str]]]:
-    """Proofs in the order in which they are tried, and what of each."""
+    """The proofs in the order tried, and the parts of each."""
     if seed.where:
         yield seed.likely, seed.where
     for name in sorted(PROOFS, key=lambda name: name != seed.likely):
@@ -211,7 +211,7 @@ def search(seed: Seed) -> Result:
 
 
 def _finding(said: str) -> tuple[str, str]:
-    """Which scene, script or test it was, and what it said."""
+    """The scene, script or test, and its message."""
     lines = said.splitlines()
     for line in lines:
         if line.startswith(("scene ", "seed ")):
@@ -230,7 +230,7 @@ def page(results: Sequence[Result]) -> Iterator[str]:
     yield ""
     yield "Each hole that was once open is kept as a seeded bug: a small change that opens it again. `make campaign"
     yield "ARGS=seeds` applies each of them to a copy of the package, runs the proofs until one finds it, and writes"
-    yield "this page. A bug that no proof finds is a proof to be written."
+    yield "this page. A bug that no proof finds calls for a new proof."
     yield ""
     yield f"{len(found)} of {len(results)} are found, in {mean_s:.0f} s each on average."
     yield ""
@@ -242,7 +242,7 @@ def page(results: Sequence[Result]) -> Iterator[str]:
         number = sum(result.proof == name for result in results)
         yield f"| {name} | {proof.about} | {proof.sees} | {proof.blind} | {number} |"
     yield ""
-    yield "The likeliest proof is asked first, so a proof that finds nothing first may still be able to find a bug."
+    yield "The likeliest proof is tried first, so a proof that found nothing first may still be able to find a bug."
     yield ""
     yield "### The bugs"
     yield ""

@@ -1,11 +1,11 @@
 """The soak: long lives on lines that lose 1 % of all frames and damage 0.1 %, serial and CAN.
 
-    python -m tests.proof.soak                            30 days in virtual time, and an hour in earnest beside them
+    python -m tests.proof.soak                            30 days in virtual time, and an hour in real time beside them
     python -m tests.proof.soak --days 2 --minutes 0       only two days
     python -m tests.proof.soak --days 0 --minutes 5       only five minutes of the real processes
 
-What must not be: a stop that is missed (a condition of `truth.py` that holds on), a fault that latches though nothing
-is wrong, memory that grows. A charge that was stopped though nothing is wrong is counted.
+Failures: a missed stop (a condition of `truth.py` that persists), a fault that latches though nothing is wrong, growing
+memory. A charge stopped though nothing is wrong is counted.
 """
 
 import argparse
@@ -22,12 +22,12 @@ from tests.proof.days import DAY_S, Lived
 from tests.proof.real_time import Real, Sample
 from tests.proof.report import say
 
-#: What a process may grow by from its first day or quarter to its last, and still be called flat.
+#: Growth from a process's first day or quarter to its last that still counts as flat.
 FLAT_MIB = 1.0
 
 
 def _live(job: tuple[int, int]) -> Lived:
-    os.nice(10)  # the real processes beside it come first
+    os.nice(10)  # the real processes beside it have priority
     return days.live(*job)
 
 
@@ -86,7 +86,7 @@ def told_of_real(real: Real, minutes: float) -> Iterator[str]:
 
 
 def longest(samples: Sequence[Sample]) -> list[Sample]:
-    """Of the process that lived longest."""
+    """Of the longest-lived process."""
     pid, _ = Counter(sample.pid for sample in samples).most_common(1)[0]
     return [sample for sample in samples if sample.pid == pid]
 
@@ -115,7 +115,7 @@ def _kinds(names: Iterable[str]) -> str:
 
 
 def grown(lives: Sequence[Lived], real: Real | None) -> list[str]:
-    """Processes of which the memory is not flat."""
+    """Processes whose memory is not flat."""
     wrong = [
         f"a life grew from {x.mib[0]:.1f} to {x.mib[-1]:.1f} MiB" for x in lives if x.mib[-1] > x.mib[0] + FLAT_MIB
     ]
@@ -128,7 +128,7 @@ def grown(lives: Sequence[Lived], real: Real | None) -> list[str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Live, and tell; 1 if anything was that must not be."""
+    """Run and report; 1 if there was any failure."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--days", type=int, default=30, help="in virtual time (default: %(default)s)")
     parser.add_argument("--minutes", type=float, default=60, help="of real processes (default: %(default)s)")

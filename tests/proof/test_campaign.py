@@ -1,4 +1,4 @@
-"""The campaign in its short form, and the campaign itself: it replays, it sees what is broken, and makes it small."""
+"""The short form of the campaign, and the campaign itself: it replays, finds what is broken, and shrinks it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -67,13 +67,13 @@ def breaks_on_noise(patch: Patch) -> None:
 
 
 def charged(*happenings: tuple[float, str], **setup: object) -> Script:
-    """One or two bays in mid-charge, and what befalls the second one, among other things."""
+    """One or two bays in mid-charge, and events at the second one among others."""
     bays = (BaySetup(), BaySetup(line="perfect", **setup))  # type: ignore[arg-type]  # its fields
     befalls = (Happening(8.0, 0, "status_bits", 1.0), *(Happening(t_s, 1, name) for t_s, name in happenings))
     return Script(0, bays, befalls, 24.0, None, limit_a=9.0)
 
 
-#: The invariant → a bug that breaks it, a script that shows it, what the smallest script has to say.
+#: The invariant → a bug that breaks it, a script that shows it, the events left in the smallest script.
 BUGS: dict[str, tuple[Callable[[Patch], None], Script, list[str]]] = {
     "BMU silent": (
         without("bmu_silent", "stale_reading", "heartbeat_lost"),

@@ -20,7 +20,7 @@ def played(
     soc_pct: float,
     control: ControlMode = ControlMode.MANUAL,
 ) -> list[tuple[State, bool]]:
-    """What becomes of the bay of the demo: each state with its contactor, closed or not, as often as it changes."""
+    """The history of the demo's bay: each change of state or contactor."""
     course: list[tuple[State, bool]] = []
 
     def look(_: BayRunner) -> None:
@@ -32,7 +32,7 @@ def played(
     pack.set_soc(soc_pct)
     the_station = station([control], [POLICIES["demo"]], contactors=True)
     with world(the_station, [Nature(pack, control)], end_s=end_s + 60.0) as made:
-        made.rigs[0].bay.connected = False  # nobody drives the line, and it has its pull-down
+        made.rigs[0].bay.connected = False  # an undriven line with its pull-down
         made.on_step = look
         for t_s, happen in {**happenings, end_s: World.end}.items():
             made.time.call_later(t_s, happen, made)
@@ -54,7 +54,7 @@ def mends(on: World) -> None:
 
 
 def test_from_the_start_to_a_full_charge_and_back() -> None:
-    """From the bottom of the deep discharge, every state on the way; recharged after some of it was used."""
+    """From the bottom of the deep discharge through every state; recharged after some use."""
     assert played({120.0: lambda on: on.rigs[0].bay.pack.set_soc(50.0)}, 150.0, soc_pct=-100.0) == [
         (S.STARTING, False),
         (S.OFFLINE, True),
@@ -79,7 +79,7 @@ def test_a_charger_that_was_out_of_control_can_charge_again(control: ControlMode
         8.0: deafens,
         9.0: asks(Request.STOP),
         20.0: mends,
-        35.0: asks(Request.RESET),  # it has stood by for 10 s
+        35.0: asks(Request.RESET),  # in standby for 10 s
         36.0: asks(Request.START),
     }
     assert played(happenings, 50.0, 20.0, control) == [

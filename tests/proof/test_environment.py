@@ -1,4 +1,4 @@
-"""The environment's campaign in its short form, and the judge: nothing is found here, and each bug that is put in."""
+"""The short form of the environment's campaign, and the judge: no findings here, and every planted bug is found."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,7 +15,7 @@ from tests.proof.hazards import BEGIN_S, Bay, Hazard, Script
 from tests.proof.lives import live
 from tests.proof.scenes import SCENES
 
-#: Scenes and random scripts that are played each time; `make campaign` plays all, and a thousand.
+#: Scenes and random scripts played each time; `make campaign` plays all scenes and a thousand scripts.
 SHORT: tuple[str | int, ...] = (
     "nothing happens", "another speed, then killed", "locked by a stranger", "charging, then the disk is torn",
     "crossed cables, hot", "says standby now and then", "half dead adapter, estop", "stopped while it ends",
@@ -93,7 +93,7 @@ def blames(patch: Patch) -> None:
     patch.setattr(course, "out_of_control", disobeys)
 
 
-#: The invariant → a bug that breaks it, and a variant that shows it, in which nothing is found without.
+#: The invariant → a bug that breaks it, and a variant that shows it and is clean without the bug.
 MORE_BUGS: dict[str, tuple[Callable[[Patch], None], str]] = {
     "isolated": (never_opens, "contactor, does not obey"),
     "latched": (lets_others_run, "another program runs it at rest"),
@@ -109,7 +109,7 @@ def test_a_bug_is_found_by_a_variant(name: str, monkeypatch: Patch) -> None:
 
 
 def test_who_says_standby_while_current_flows_is_believed_only_where_nobody_knows_better() -> None:
-    """Both witnesses tell the same lie: nobody can know, so nothing is demanded."""
+    """Both witnesses tell the same lie: undetectable, so nothing is required."""
     lies = tuple(Hazard(8.0, "lie", 0, 0.0, f"{kind.name}:1") for kind in (Kind.CURRENT, Kind.OPERATION))
     deaf = Hazard(8.0, "fault", 0, None, "ignore_stop")
     blind = (*lies, Hazard(8.0, "bmu", 0, 0.0, "current_a:is:1"))

@@ -1,4 +1,4 @@
-"""Everything that the core can come to, with one input of each kind: no property is broken, no row is idle."""
+"""Everything the core can reach, with one input of each kind: no property is broken, no row is unused."""
 
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
@@ -17,7 +17,7 @@ from tests.proof.exploring import NEVER, changes_of_table, rules, small, walk_on
 
 @dataclass(frozen=True)
 class Explored:
-    """What came of it, from a process of its own."""
+    """The result, from a separate process."""
 
     control: ControlMode
     found: tuple[str, ...]
@@ -51,7 +51,7 @@ def _explored(request: pytest.FixtureRequest, explorations: Mapping[ControlMode,
     return explorations[request.param].result()
 
 
-pytestmark = pytest.mark.timeout(600)  # both explorations may have to share a core
+pytestmark = pytest.mark.timeout(600)  # both explorations may share a processor core
 
 
 def test_every_property_holds(explored: Explored) -> None:

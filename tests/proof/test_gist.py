@@ -1,6 +1,6 @@
-"""What the checker leaves out decides nothing: memories as they come, changed in it, lead to the same.
+"""What the checker leaves out decides nothing: reached memories with it changed lead to the same results.
 
-So do batteries that only a table of steps tells apart, wherever no step is chosen.
+So do batteries that differ only for a table of current steps, wherever no step is chosen.
 """
 
 import random
@@ -49,7 +49,7 @@ def resume_of_what_runs(memory: Memory) -> Memory | None:
 
 
 def warning_at_rest(memory: Memory) -> Memory | None:
-    """One that no input has anything to do with. A charge that begins with it is told apart again."""
+    """A value no input refers to. A charge that begins with it is distinguished again."""
     if memory.state in AT_WORK or "noisy_line" in memory.faults:
         return None
     noisy = FaultMemory(raised_s=memory.last_s, clean_s=memory.last_s, cause=Cause("noisy_line"))
@@ -66,7 +66,7 @@ CHANGES: Mapping[str, Change] = {
 
 
 def places(walk: Walk, inputs: StationInputs) -> Iterator[Place]:
-    """Where random ways lead that begin with some seconds, more or less, in which all goes well."""
+    """The memories reached by random paths that start with several undisturbed seconds."""
     chance, well = random.Random(SEED), Move(TICK_S, "obeys", "healthy")
     moves = list(inputs.moves(State.CHARGING))
     for number in range(WALKS):
@@ -78,7 +78,7 @@ def places(walk: Walk, inputs: StationInputs) -> Iterator[Place]:
 
 
 def shown(walk: Walk, taken: Taken) -> tuple[Gist, object]:
-    """What comes of a step: all that devices and people can tell it by, but for words."""
+    """The outcome of a decision: everything devices and people can observe, except texts."""
     decided = taken.decision
     broken = sorted(name for name, _ in walk.broken(taken))
     return gist(taken.after), (
@@ -113,7 +113,7 @@ def test_what_is_left_out_decides_nothing(name: str, control: ControlMode) -> No
 
 @pytest.mark.parametrize("policy", POLICIES)
 def test_batteries_that_only_a_table_tells_apart_are_others_at_work_only(policy: str) -> None:
-    """Each of them leads where one that is tried leads, too."""
+    """Each of them leads where one of the tried inputs leads."""
     inputs = StationInputs.of(rules(policy))
     walk, chance = walk_on(inputs), random.Random(SEED)
     left_out = [name for name, battery in inputs.batteries.items() if battery.at_work]

@@ -1,4 +1,4 @@
-"""The grid in its short form: every state × every row, the line's three conditions in turn."""
+"""The short form of the grid: every state × every row, with the line's three activities in turn."""
 
 import pytest
 

@@ -1,11 +1,11 @@
-"""Fail the Nth call in its short form: a sample of every call with every error, and a boundary that leaks is seen."""
+"""The short form of "fail the Nth call": a sample of every call with every error; a leaking boundary is found."""
 
 import pytest
 
 from orchestrator.link import serial as serial_module
 from tests.proof.nth_call import ERRORS, Case, cases, charge
 
-#: Each so-and-so-many-th of all failures; `make campaign` plays them all.
+#: Every Nth of all failures; `make campaign` plays them all.
 SAMPLE = 60
 
 

@@ -1,4 +1,4 @@
-"""The whole service beside others on its bus, in virtual time: masters, forgers, a BMU with a main loop."""
+"""The whole service next to others on its bus, in virtual time: masters, forgers, a BMU with a main loop."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -17,24 +17,24 @@ from tests.proof.virtual_rig import Nature
 from tests.proof.virtual_service import FIRST_NODE, World, station, world
 
 S = State
-#: What only says that somebody else is there.
+#: Faults that only report somebody else's presence.
 SAID = {"other_master", "heartbeat_set"}
 START_S, END_S = 6.0, 40.0
 
 
 @dataclass
 class Next:
-    """What became of one bay."""
+    """The history of one bay."""
 
     states: list[State] = field(default_factory=list)
-    stopped_s: float | None = None  #: when current was last there after START_S, and then not any more
+    stopped_s: float | None = None  #: when current last flowed after START_S
     faults: set[str] = field(default_factory=set)
     link: BatteryLink = field(default_factory=BatteryLink)
-    reads_s: float = 0.0  #: the oldest that volts were while current flowed
+    reads_s: float = 0.0  #: the greatest age of the volts while current flowed
 
 
 def played(come: Callable[[World], object], *, end_s: float = END_S, main_loop: bool = True, **battery: Any) -> Next:
-    """A bay that charges from the beginning; `come(world)` happens at START_S."""
+    """A bay charging from the start; `come(world)` is called at START_S."""
     course, pack = Next(), PACKS["demo"]()
     pack.set_soc(30.0)
     the_station = station([ControlMode.MANUAL], [POLICIES["demo"]], **battery)
@@ -68,7 +68,7 @@ def master(on: World) -> SecondMaster:
 
 
 def writes_everything(on: World) -> None:
-    """Writes to what may not be written, ten times a second: each is refused."""
+    """Writes to read-only objects, ten times a second: each is refused."""
     one = master(on)
 
     def again(number: int) -> None:

@@ -1,4 +1,4 @@
-"""The checker itself: for each of its properties a core with a bug that it must catch, with the story of it."""
+"""The checker itself: for each of its properties, a core with a bug it must catch, with the counterexample."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -32,7 +32,7 @@ Patch = pytest.MonkeyPatch
 
 
 def without(*names: str) -> Callable[[Patch], None]:
-    """Rows of the fault table that somebody has deleted."""
+    """Rows deleted from the fault table."""
     return lambda patch: patch.setattr(latches, "FAULTS", tuple(row for row in FAULTS if row.id not in names))
 
 
@@ -176,7 +176,7 @@ def nobody_believes_the_bmu(patch: Patch) -> None:
 
 
 def written_down(change: Callable[[Persisted], Persisted]) -> Callable[[Patch], None]:
-    """What a restart begins with is this."""
+    """A restart begins with this."""
     of = Persisted.of
     return lambda patch: patch.setattr(Persisted, "of", lambda memory, now_s: change(of(memory, now_s)))
 

@@ -1,4 +1,4 @@
-"""The seeds still fit the package they are about, so that the table cannot rot."""
+"""The seeds still apply to the package, so the table cannot rot."""
 
 from pathlib import Path
 
@@ -47,7 +47,7 @@ def test_the_page_names_what_nobody_found() -> None:
     assert "**nothing**" in text
 
 
-#: Some that take a second or two, one for each thing that a status is held against.
+#: A few that take a second or two, one for each check on a status.
 QUICK = (
     "nobody is told of a changed line",
     "a stranger's lock is no alarm",

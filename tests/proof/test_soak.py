@@ -1,4 +1,4 @@
-"""The soak in its short form, and that each of its verdicts can be the other one."""
+"""The short form of the soak, and a test that each of its verdicts can go either way."""
 
 import json
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from tests.proof.soak import grown, shares, told_of_days, told_of_real
 
 Patch = pytest.MonkeyPatch
 
-#: One stay, with a fault in it, on the poor line and the poor bus.
+#: One stay with a fault, on the poor line and the poor bus.
 STAY = Script(
     1,
     (BaySetup(soc_pct=97.5, line="poor"),),
@@ -101,7 +101,7 @@ def test_memory_that_grows_is_found_and_memory_that_settles_is_not() -> None:
     assert grown([growing], None) == ["a life grew from 37.0 to 39.0 MiB"]
     settles = Real(samples={"controller": samples(30.0, 33.0, 33.1, 33.1, 33.2, 33.2, 33.1, 33.2)})
     climbs = Real(samples={"controller": samples(30.0, 33.0, 33.5, 34.0, 34.5, 35.0, 35.5, 36.0)})
-    settles.samples["controller"].append(Sample(8, 80.0, 99.0, 11, 5))  # of another one, that was started in its place
+    settles.samples["controller"].append(Sample(8, 80.0, 99.0, 11, 5))  # of another one, started in its place
     assert not grown([], settles)
     assert grown([], climbs) == ["the controller grew from 33.5 to 36.0 MiB"]
 

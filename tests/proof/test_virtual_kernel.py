@@ -1,4 +1,4 @@
-"""The virtual kernel does what the real one does: settings, locks, files, power cuts, processes that die."""
+"""The virtual kernel behaves like the real one: settings, locks, files, power cuts, dying processes."""
 
 import fcntl
 import os
@@ -51,7 +51,7 @@ def test_a_port_begins_as_nobody_has_set_it_up_and_is_heard_at_the_right_speed_o
 
 
 def test_settings_are_those_of_a_real_tty(kernel: Kernel) -> None:
-    """The same calls on a pty: what is read back is what was set, in the same form."""
+    """The same calls on a pty: settings read back as set, in the same form."""
     master, slave = os.openpty()
     fd = kernel.open(NAME, os.O_RDWR)
     set_up(kernel, fd, termios.B19200)
@@ -127,7 +127,7 @@ def left(disk: Disk, how: str, seed: int = 0) -> dict[str, bytes]:
 
 
 def replaced(*, sync_file: bool, sync_directory: bool) -> Disk:
-    """A file "old", durable, over which "new" was written beside and renamed."""
+    """A durable file "old", replaced by "new" with a write beside it and a rename."""
     disk = Disk("/virtual")
     written(disk, FILE, b"old")
     disk.sync(disk.names[FILE])

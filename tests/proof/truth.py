@@ -1,8 +1,8 @@
-"""What is true of an emulated bay, and what must therefore be happening: conditions with their budgets (DESIGN §6).
+"""The true state of an emulated bay, and what must follow from it: conditions with their budgets.
 
-Nothing here looks at what the product believes, but for its state and its alarm: a condition is a fact of the model or
-of the wire. While one holds and the charger runs, a stop has to be written within its budget; and unless the charger
-then stands still, the bay has to be UNCONTROLLABLE, with its alarm, 3 s later.
+Nothing here uses the product's beliefs, except its state and alarm: a condition is a fact of the model or the wire.
+While one holds and the charger runs, a stop must be written within its budget; and unless the charger then stops, the
+bay must be UNCONTROLLABLE, with its alarm, 3 s later.
 """
 
 from collections.abc import Callable
@@ -16,28 +16,28 @@ from orchestrator.sim.pack import Readout
 from tests.proof.virtual_rig import VirtualRig
 from tests.proof.virtual_service import STEPS_A
 
-#: "Device falls silent → stop byte" (DESIGN §6); a value that is read takes at most as long to be noticed.
+#: "Device falls silent → stop byte"; a value read takes at most as long to be noticed.
 SILENT_S = 2.0
-#: "Stop not verified → UNCONTROLLABLE", and what the noticing of it may take: a repetition and a poll.
+#: "Stop not verified → UNCONTROLLABLE", and the time noticing it may take: a repetition and a poll.
 VERIFY_S, MARGIN_S = 3.0, 0.7
-#: What the BMU's words cannot show: their resolution, and the charger's own.
+#: Below the resolution of the BMU's values and of the charger's own.
 ROUND_C, ROUND_V, ROUND_A = 0.1, 0.1, 0.2
 
 
 @dataclass(slots=True)
 class Heard:
-    """What came over the lines, seen by the emulated devices."""
+    """The traffic on the lines, as seen by the emulated devices."""
 
     boot_s: float | None = None
     emergency_s: float | None = None
-    stop_asked_s: float | None = None  #: the operator's stop or pause that no start has followed
-    stop_frame_s: float | None = None  #: the newest stop frame that was written to the port
-    started_s: float | None = None  #: when the output was switched on, by a frame
+    stop_asked_s: float | None = None  #: the operator's stop or pause, not followed by a start
+    stop_frame_s: float | None = None  #: the last stop frame written to the port
+    started_s: float | None = None  #: when a frame switched the output on
 
 
 @dataclass(slots=True)
 class Bay:
-    """One bay as it is."""
+    """One bay as it really is."""
 
     rig: VirtualRig
     rules: Rules
@@ -57,7 +57,7 @@ class Bay:
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Something under which no charger may run for longer than `within_s`."""
+    """A condition under which no charger may run for longer than `within_s`."""
 
     name: str
     within_s: float
@@ -65,7 +65,7 @@ class Condition:
 
 
 def _shown(bay: Bay, kind: Kind, truth: float) -> float:
-    """What the charger says: nobody can see through its lie, only past it, at the BMU's values."""
+    """The charger's reported value: its lie shows only in comparison with the BMU's values."""
     return bay.rig.wire.lies[kind] / 100 if kind in bay.rig.wire.lies else truth
 
 
@@ -127,7 +127,7 @@ CONDITIONS: tuple[Condition, ...] = (
     Condition("implausible SOC", SILENT_S + 1.0, _implausible),
     Condition("status word", SILENT_S, lambda b: bool(int(b.told.status) & TRIP_BITS)),
     Condition("volts disagree", SILENT_S + 3.0, lambda b: not _pulses(b) and _volts_disagree(b)),
-    # Pulses move both values faster than the BMU is read: what is compared there is the mean of the last 10 s.
+    # Pulses move both values faster than the BMU is read: there the means of the last 10 s are compared.
     Condition("volts disagree in pulses", SILENT_S + 3.0 + 10.0, lambda b: _pulses(b) and _volts_disagree(b)),
     Condition("amps disagree", SILENT_S + 5.0, _amps_disagree),
     Condition("no battery", SILENT_S, lambda b: not b.rig.bay.connected),
@@ -140,9 +140,9 @@ CONDITIONS: tuple[Condition, ...] = (
 
 
 def named(bay: Bay) -> bool:
-    """People are told that this charger is not under control.
+    """This charger is reported as out of control.
 
-    UNCONTROLLABLE, with its alarm; or it was last seen at rest (or never), does not answer since, and is being stopped.
+    UNCONTROLLABLE, with its alarm; or last seen at rest (or never), silent since then, and being stopped.
     """
     decision = bay.decision
     if decision.state is State.UNCONTROLLABLE:

@@ -1,4 +1,4 @@
-"""Variants of what was once seen to go wrong: what somebody would try next, by the kinds of `scenes.py`, as tables.
+"""Variants of past failures: the next things to try, by the kinds of `scenes.py`, as tables.
 
 Each is played by `make campaign ARGS=environment` before the random scripts.
 """
@@ -26,13 +26,13 @@ FIELDS = ("voltage_v", "current_a", "soc_pct", "soh_pct", "temperature_c", "rema
 def scene(
     *hazards: Hazard, bays: tuple[Bay, ...] = THREE, end_s: float = 0.0, systemd: bool = True, recorded: bool = False
 ) -> Script:
-    """A station that is started, what happens to it, and 12 s more."""
+    """A started station, the given events, and 12 s more."""
     hazards = (Hazard(0.0, "boot"), *sorted(hazards, key=lambda one: one.t_s))
     return Script(1, bays, hazards, end_s or hazards[-1].t_s + 12.0, systemd, recorded=recorded)
 
 
 def h(t_s: float, what: str, bay: int = -1, value: float | None = None, detail: str = "") -> Hazard:
-    """Something in mid-charge."""
+    """An event in mid-charge."""
     return Hazard(T + t_s, what, bay, value, detail)
 
 
@@ -230,7 +230,7 @@ COME_AND_GO = {
     "every third current is the one before": scene(h(0, "bmu", 0, 0.0, "current_a:previous:3"), STOP, end_s=T + 16),
 }
 
-#: 8. Not the battery that is meant.
+#: 8. The wrong battery.
 BATTERIES = {
     "a pack of 14 cells": scene(bays=(Bay(cells=14, soc_pct=90.0), Bay(), Bay()), end_s=40.0),
     "node ids swapped in the file": scene(h(0, "term"), h(4, "edit", 0, None, "nodes"), h(4.2, "boot"), end_s=T + 36),
@@ -240,7 +240,7 @@ BATTERIES = {
     ),
 }
 
-#: 9. Our own exception; whatever a BMU says.
+#: 9. Our own exceptions; anything a BMU may send.
 VALUES = {
     **{
         f"a BMU whose {name} reads {value:g}": scene(

@@ -1,4 +1,4 @@
-"""The calls of the virtual kernel, one by one: any of them can be made to fail as kernels do, or to take its time."""
+"""The calls of the virtual kernel: any of them can be made to fail as in a real kernel, or to take time."""
 
 import os
 import termios
@@ -12,7 +12,7 @@ from tests.proof.virtual_time import Time
 
 @dataclass(slots=True)
 class Trouble:
-    """Calls of this name, at this place (part of a path; "" anywhere), take so long, or fail with this errno."""
+    """Calls of this name, at this place (part of a path; "" anywhere), take this long or fail with this errno."""
 
     call: str
     place: str
@@ -20,7 +20,7 @@ class Trouble:
     delay_s: float = 0.0
     error: int = 0
     times: float = inf
-    exact: bool = False  #: of this path alone, and not of what is below it
+    exact: bool = False  #: only this path, not anything below it
 
     def meets(self, call: str, place: str, now_s: float) -> bool:
         there = self.place == place if self.exact else self.place in place
@@ -28,11 +28,11 @@ class Trouble:
 
 
 class Calls:
-    """Every call passes here; `on_call` may raise or return what this one shall return instead."""
+    """Every call passes here; `on_call` may raise, or return a replacement result."""
 
     def __init__(self, time: Time) -> None:
         self._time = time
-        self.on_call: Callable[[str], Any] | None = None  #: its name → None: go on
+        self.on_call: Callable[[str], Any] | None = None  #: its name → None: continue
         self.troubles: list[Trouble] = []
 
     def __call__(self, name: str, place: str = "") -> Any:
@@ -52,7 +52,7 @@ class Calls:
                 return
 
     def _hang(self, delay_s: float) -> None:
-        """In the kernel: nothing wakes this thread earlier, and its process cannot die before."""
+        """In the kernel: nothing wakes this thread earlier, and its process cannot die until then."""
         process, until_s = self._time.me().process, self._time.now_s + delay_s
         if process is not None:
             process.in_kernel(until_s)

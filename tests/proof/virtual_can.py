@@ -1,7 +1,7 @@
 """A CAN bus in memory, as a python-can driver below the unchanged `link/can.py`, in virtual time.
 
-The controller's side is `Driver`; the emulated nodes have the other one, `BusWire`. A frame takes its time on the wire,
-and frames follow each other. Every call of the driver goes past `Calls`, which can make any one of them fail.
+The controller's side is `Driver`, the emulated nodes' side is `BusWire`. A frame takes time on the wire, and frames
+follow each other. Every driver call goes through `Calls`, which can make any of them fail.
 """
 
 from collections import deque
@@ -21,14 +21,14 @@ FRAME_S = 0.0005
 
 
 class BusWire:
-    """The wire and the emulated nodes on it; what `sim.can_wire.CanWire` is to them."""
+    """The wire and the emulated nodes on it; the counterpart of `sim.can_wire.CanWire`."""
 
     def __init__(self, time: Time, calls: Calls, kind: Bus = PERFECT) -> None:
         self.calls = calls
-        self.down = False  #: the interface: every call fails with ENETDOWN, and what was open stays deaf
+        self.down = False  #: the interface is down: every call fails with ENETDOWN, and open sockets stay deaf
         self.lost = False  #: nobody hears anybody
         self.epoch = 0  #: how often the interface went down
-        self.on_frame: Callable[[int, bytes], None] = lambda _cob_id, _data: None  #: what a node said and was heard
+        self.on_frame: Callable[[int, bytes], None] = lambda _cob_id, _data: None  #: frames of nodes that were received
         self.drivers: list[Driver] = []
         self._time = time
         self._free_s = 0.0
@@ -46,11 +46,11 @@ class BusWire:
         self._remote.setdefault(cob_id, {})[owner] = handler
 
     def send(self, cob_id: int, data: bytes) -> None:
-        """A node says something, or another master: everybody hears it."""
+        """A node or another master sends: everybody receives it."""
         self._put(self._to_all, can.Message(arbitration_id=cob_id, data=data, is_extended_id=False))
 
     def raw(self, message: can.Message) -> None:
-        """Somebody sends a frame of a kind that the emulated nodes do not hear."""
+        """A frame of a kind the emulated nodes do not receive."""
         self._time.call_at(self._slot(), self._to_drivers, message)
 
     def _to_drivers(self, message: can.Message) -> None:
@@ -102,7 +102,7 @@ class BusWire:
 
 
 class Driver(can.BusABC):
-    """What python-can would open."""
+    """The driver python-can would open."""
 
     def __init__(self, wire: BusWire, time: Time) -> None:
         self.calls = wire.calls
@@ -111,7 +111,7 @@ class Driver(can.BusABC):
             raise OSError(100, "Network is down")
         self._wire, self._time, self._epoch = wire, time, wire.epoch
         self._heard: deque[can.Message] = deque()
-        self.process = time.me().process  #: whose driver it is; when that is dead, nobody hears
+        self.process = time.me().process  #: the owning process; once it is dead, nothing is received
         self.news = Waiting(time)
         super().__init__(channel="virtual time")
         wire.drivers.append(self)

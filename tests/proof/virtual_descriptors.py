@@ -1,4 +1,4 @@
-"""Descriptors of the virtual kernel, and the processes that they belong to."""
+"""Descriptors of the virtual kernel and their processes."""
 
 import errno
 import os
@@ -13,28 +13,28 @@ from tests.proof.virtual_gpio import Chip, Output
 from tests.proof.virtual_time import Time
 from tests.proof.virtual_tty import Tty
 
-#: Descriptors of ours; the others are the real kernel's. None comes twice: what is left of an earlier world, and closes
-#: its port when it is collected, must not close one of this world's.
+#: Our descriptors; the others are the real kernel's. Numbers are never reused: a leftover of an earlier world that
+#: closes its port when garbage-collected must not close one of this world's.
 DESCRIPTORS = count(100_001)
-#: Everything below it is ours; other paths are the real kernel's.
+#: Paths below it are ours; others are the real kernel's.
 ROOT = "/virtual/"
 STDOUT, STDERR = 1, 2
 
 
 class Descriptors:
-    """Who has what open: descriptors belong to processes, and an open file may have several."""
+    """Open descriptors by process; an open file may have several."""
 
     def __init__(self, time: Time, disk: Disk | None = None) -> None:
         self.time = time
         self.calls = Calls(time)
         self.ttys: dict[str, Tty] = {}
         self.chips: dict[str, Chip] = {}
-        self.clock_off_s = 0.0  #: somebody has set the wall clock
+        self.clock_off_s = 0.0  #: the wall clock was set
         self.disk = disk or Disk(ROOT.rstrip("/"))
         self.output = {STDOUT: Stream(time), STDERR: Stream(time)}
         self.on_said: Callable[[Any, str], None] = lambda _process, _text: None
         self.proc = Proc()
-        self._open: dict[int, tuple[File, set[Any]]] = {}  # the file, and whose descriptor it is
+        self._open: dict[int, tuple[File, set[Any]]] = {}  # the file and the descriptor's process
 
     def add(self, path: str) -> Tty:
         self.ttys[path] = Tty(self.time)
@@ -77,7 +77,7 @@ class Descriptors:
         file = self.file(fd)
         self._drop(fd, self.me)
         if isinstance(file.what, Tty | Inode):
-            self.calls("close", file.path)  # the descriptor is gone, whatever close says
+            self.calls("close", file.path)  # the descriptor is gone, whatever close returns
 
     def _drop(self, fd: int, owner: Any) -> None:
         file, owners = self._open[fd]
@@ -104,12 +104,12 @@ class Descriptors:
                 what.peer.news.wake()
 
     def bury(self, process: Any) -> None:
-        """It has died: what it had open is closed."""
+        """The process died: close its descriptors."""
         for fd in [fd for fd, (_, owners) in self._open.items() if process in owners]:
             self._drop(fd, process)
 
     def new_line(self, name: str, output: Output) -> int:
-        """The descriptor of a line that was requested."""
+        """The descriptor of a requested line."""
         return self._new(File(name, output))
 
     def is_ours(self, path: Any) -> bool:

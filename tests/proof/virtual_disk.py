@@ -1,8 +1,8 @@
-"""A disk in memory: what processes see (the page cache), and what a power cut leaves of it.
+"""A disk in memory: what processes see (the page cache), and what survives a power cut.
 
-Files and directories are made durable by fsync only, each for itself: a file's bytes by its own, its name by that of
-the directory. A power cut leaves what is durable, and of the rest whatever the file system may have written meanwhile:
-nothing, everything, the first part, or any selection in any order, writes torn in the middle.
+Only fsync makes files and directories durable, each separately: a file's bytes by its own fsync, its name by that of
+the directory. A power cut leaves what is durable, plus whatever the file system may have written meanwhile: nothing,
+everything, the first part, or any selection in any order, with torn writes.
 """
 
 import errno
@@ -19,7 +19,7 @@ SECTOR = 512
 
 @dataclass(slots=True, eq=False)
 class Inode:
-    """One file: as it is seen, and as it is on the disk."""
+    """One file, as seen by processes and as stored on the disk."""
 
     number: int
     data: bytearray = field(default_factory=bytearray)
@@ -29,7 +29,7 @@ class Inode:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Something that is not durable yet: a write, a new length, or names (path → file, None: gone)."""
+    """A change not durable yet: a write, a new length, or names (path → file, None: removed)."""
 
     inode: Inode | None = None
     at: int = 0
@@ -43,7 +43,7 @@ def fails(number: int, path: str) -> OSError:
 
 
 class Disk:
-    """All files below the directories that are there from the beginning."""
+    """All files below the directories that exist from the start."""
 
     def __init__(self, *directories: str) -> None:
         self.names: dict[str, Inode] = {}
@@ -97,7 +97,7 @@ class Disk:
         self._pending = left
 
     def rename(self, old: str, new: str) -> None:
-        if old in self.directories:  # durable at once, as when it was made
+        if old in self.directories:  # durable at once, like its creation
             self.directories.remove(old)
             self.directories.add(new)
             return
@@ -119,7 +119,7 @@ class Disk:
         if path in self.directories or path in self.names:
             raise fails(errno.EEXIST, path)
         self._parent(path)
-        self.directories.add(path)  # it is durable at once: a station's directory is not made in its last second
+        self.directories.add(path)  # durable at once: a station's directory is not created in its last second
 
     def listdir(self, path: str) -> list[str]:
         if path not in self.directories:
@@ -150,7 +150,7 @@ class Disk:
     # --- what others do to it ----------------------------------------------------------------------------------------
 
     def damage(self, path: str, how: str) -> None:
-        """Somebody, or a bad card, has made this of a file; for good."""
+        """A person or a bad card has changed a file to this, durably."""
         inode = self.names.get(path)
         if inode is None:
             return
@@ -171,7 +171,7 @@ class Disk:
     # --- what a power cut does ----------------------------------------------------------------------------------------
 
     def cut(self, dice: Random, how: str = "") -> str:
-        """The power fails; in a word what the file system had written by then (by chance, if not said)."""
+        """The power fails; the argument says what the file system had written by then (default: random)."""
         how = how or dice.choice(("nothing more", "everything", "the first part", "some of it", "some of it, torn"))
         pending = self._pending
         chosen: dict[str, list[Change]] = {
@@ -185,7 +185,7 @@ class Disk:
             self._apply(change)
         self._pending = []
         self.names = {}
-        for path, inode in self._kept_names.items():  # what was open before is not what is opened afterwards
+        for path, inode in self._kept_names.items():  # files open before are not those opened afterwards
             self._count += 1
             self.names[path] = Inode(self._count, bytearray(inode.kept), inode.kept)
         self._kept_names = dict(self.names)

@@ -1,4 +1,4 @@
-"""Files, directories and ports of the virtual kernel: what is opened, read, written, renamed, looked at."""
+"""Files, directories and ports of the virtual kernel: open, read, write, rename, stat."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ from tests.proof.virtual_tty_calls import TtyCalls
 
 
 def real(name: str) -> Callable[..., Any]:
-    """The real kernel's, for what is none of ours."""
+    """The real kernel's call, for paths and descriptors that are not ours."""
     return getattr(os, name)  # type: ignore[no-any-return]
 
 
@@ -37,7 +37,7 @@ class FileCalls(TtyCalls):
         tty = self.ttys.get(name)
         if tty is None:
             if name.removeprefix(ROOT).isdigit():
-                raise fails(errno.ENOENT, name)  # an adapter that is not there
+                raise fails(errno.ENOENT, name)  # a missing adapter
             return self._new(File(name, self.disk.open(name, flags), flags))
         if not tty.present:
             raise fails(errno.ENOENT, name)
@@ -71,7 +71,7 @@ class FileCalls(TtyCalls):
             return data
         tty = self._tty(fd)
         if not tty.present:
-            return b""  # as of a USB adapter that was unplugged
+            return b""  # as for an unplugged USB adapter
         data, tty.waiting_bytes = tty.waiting_bytes[:size], tty.waiting_bytes[size:]
         if not data:
             raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))

@@ -1,4 +1,4 @@
-"""What is behind a descriptor of the virtual kernel: open files, sockets, streams, processes, and /proc."""
+"""The objects behind descriptors of the virtual kernel: open files, sockets, streams, processes, and /proc."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from tests.proof.virtual_tty import Tty
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """What is behind an open file that is no tty and no file: `news` where something comes in."""
+    """The object behind an open file that is neither a tty nor a file: `news` signals incoming data."""
 
     time: Time
     news: Waiting = field(init=False)
@@ -29,12 +29,12 @@ class Socket(Node):
     peer: "Socket | None" = None
     heard: deque[tuple[bytes, list[int]]] = field(default_factory=deque)
     closed: bool = False
-    reset: bool = False  #: the other end died with messages of ours unread
+    reset: bool = False  #: the other end died with our messages unread
 
 
 @dataclass(slots=True, eq=False)
 class Stream(Node):
-    """Standard error or output; `stopped`: who reads it stands still (Ctrl-S), and it is full."""
+    """Standard error or output; `stopped`: its reader stands still (Ctrl-S), and it is full."""
 
     stopped: bool = False
 
@@ -48,18 +48,18 @@ class Death(Node):
 
 @dataclass(slots=True, eq=False)
 class File:
-    """An open file; several descriptors, of several processes, may stand for it."""
+    """An open file; several descriptors, of several processes, may refer to it."""
 
     path: str
     what: Tty | Inode | Socket | Stream | Death | Chip | Output | None
     flags: int = 0
     at: int = 0
     owners: int = 0
-    locker: Any = None  #: the process that has locked it
+    locker: Any = None  #: the process holding its lock
 
 
 class Proc:
-    """/proc, as far as the product reads it; without processes of ours it is the real one."""
+    """/proc, as far as the product reads it; without our processes it is the real one."""
 
     def has(self, _path: str) -> bool:
         return False

@@ -1,7 +1,7 @@
-"""GPIO chips in virtual time, ioctl by ioctl, and the contactors that hang on their lines.
+"""GPIO chips in virtual time, ioctl by ioctl, and the contactors on their lines.
 
-What takes the place of gpiod's request is on the same kernel, so that a line is an open file here, too: it is held, it
-is shared with the guardian, and it stays as it is when nobody holds it any more, as a line of a real chip may.
+The substitute for gpiod's request uses the same kernel, so a line is an open file here too: it is held, it is shared
+with the guardian, and it keeps its level when nobody holds it any more, as a real chip's line may.
 """
 
 import errno
@@ -32,17 +32,17 @@ class Output:
 
 @dataclass(slots=True, eq=False)
 class Chip:
-    """A chip, which may be on an adapter that is unplugged."""
+    """A chip, possibly on an unplugged adapter."""
 
     outputs: dict[int, Output] = field(default_factory=dict)
     present: bool = True
 
 
 class Breaker:
-    """A contactor: it follows its line at once, or later, or not at all."""
+    """A contactor: it follows its line at once, later, or not at all."""
 
     def __init__(self, time: Time) -> None:
-        self.closed = False  #: nobody drives the line, and it has its pull-down
+        self.closed = False  #: an undriven line with its pull-down
         self.slow_s = 0.0
         self.stuck = False  #: welded, or jammed
         self.on_moved: Callable[[bool], None] = lambda _closed: None
@@ -77,7 +77,7 @@ def request_line(kernel: "Descriptors", chip: Chip, name: str, argument: bytearr
 
 
 class VirtualLine:
-    """What `link.gpio.OutputLine` is, on the virtual kernel."""
+    """The counterpart of `link.gpio.OutputLine` on the virtual kernel."""
 
     def __init__(self, kernel: "Kernel", fd: int, chip: str, line: int) -> None:
         self._kernel, self._fd, self._chip, self._line = kernel, fd, chip, line

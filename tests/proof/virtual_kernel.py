@@ -1,8 +1,8 @@
 """The kernel below the unchanged service, call by call, in virtual time: serial ports, files, sockets, standard error.
 
-Every call goes past `Calls`, so that any one of them can be made to fail as kernels do, or to take its time: then only
-the thread that called waits. Descriptors belong to processes; a process that is killed loses its threads in the middle
-of what they do, its descriptors and its locks.
+Every call goes through `Calls`, so any of them can be made to fail as in a real kernel, or to take time: then only the
+calling thread waits. Descriptors belong to processes; a killed process loses its threads in the middle of their work,
+its descriptors and its locks.
 """
 
 import fcntl

@@ -1,7 +1,7 @@
-"""The product's modules on the virtual kernel: whatever of the real one they have imported is exchanged by identity.
+"""The product's modules on the virtual kernel: everything they imported from the real one is replaced by identity.
 
-No module is named here, no function of the product: a module that begins to use `os.fsync` is below the virtual kernel
-from then on. What is imported inside of functions, after this, is found in modules that were exchanged already.
+No module or function of the product is named here: a module that starts to use `os.fsync` runs on the virtual kernel
+from then on. Later imports inside functions find modules already replaced.
 """
 
 import fcntl
@@ -35,7 +35,7 @@ from tests.proof.virtual_threads import Condition, Event, Lock, SimpleQueue, Thr
 
 #: The parts of the package that run in the service.
 PARTS = ("orchestrator.service", "orchestrator.lastresort", "orchestrator.link", "orchestrator.devices")
-#: What the wall clock shows when the world begins (1000 s).
+#: The wall clock at the start of the world (1000 s).
 WALL_S = 1_700_000_000.0
 
 
@@ -49,7 +49,7 @@ def modules() -> tuple[ModuleType, ...]:
 
 
 class Raw(io.RawIOBase):
-    """A file as `open` gives it."""
+    """A file as returned by `open`."""
 
     def __init__(self, kernel: Kernel, fd: int) -> None:
         self._kernel, self._fd = kernel, fd
@@ -105,7 +105,7 @@ def open_file(kernel: Kernel, path: Any, mode: str = "r", buffering: int = -1, e
 
 
 def path_class(kernel: Kernel) -> type[pathlib.PosixPath]:
-    """`pathlib.Path` on the virtual disk, for what is below its root."""
+    """`pathlib.Path` on the virtual disk, for paths below its root."""
 
     class DiskPath(pathlib.PosixPath):
         def open(self, mode: str = "r", buffering: int = -1, encoding: str | None = None, *_: Any, **__: Any) -> Any:
@@ -155,7 +155,7 @@ class Output(io.TextIOBase):
 
 
 class _Sys:
-    """`sys` with other streams, and of these others again for each process that exchanges them."""
+    """`sys` with other streams, separate for each process that replaces them."""
 
     def __init__(self, kernel: Kernel) -> None:
         self.__dict__.update(_kernel=kernel, _usual={"stdout": Output(kernel, 1), "stderr": Output(kernel, 2)}, _own={})
@@ -183,7 +183,7 @@ class _Queues:
 
 
 def replacements(kernel: Kernel, processes: Processes) -> dict[Any, Any]:
-    """What is real → what takes its place."""
+    """Real object → replacement."""
     time, fake = kernel.time, kernel.modules()
     processes.extend_os(fake["os"])
     event, thread, condition = partial(Event, time), partial(Thread, time), partial(Condition, time)
@@ -217,7 +217,7 @@ def replacements(kernel: Kernel, processes: Processes) -> dict[Any, Any]:
 
 
 def exchange(stack: ExitStack, replaced: dict[Any, Any], also: dict[Any, Any]) -> None:
-    """Put them in place of the real ones in every module, until the stack is closed; `also` are the product's own."""
+    """Replace the real ones in every module until the stack is closed; `also` are the product's own."""
     by_id = {id(real): fake for real, fake in (*replaced.items(), *also.items())}
     for module in modules():
         values = vars(module)

@@ -1,7 +1,7 @@
 """Processes in virtual time: started, signalled, frozen, killed; and the sockets between them.
 
-A process that is killed loses its threads in the middle of what they do, none of them cleans up. One whose thread is
-in a call that does not return dies only when it does: until then its descriptors and its locks stay.
+A killed process loses its threads in the middle of their work, without clean-up. A process with a thread in a call that
+does not return dies only when it returns: until then its descriptors and locks stay.
 """
 
 import errno
@@ -32,23 +32,23 @@ class Exit(BaseException):
 
 
 class Process:
-    """One process: its threads are the runners that name it."""
+    """One process: its threads are the runners naming it."""
 
     def __init__(self, name: str, kernel: Kernel, words: Sequence[str] = ()) -> None:
         self.name, self.pid, self.words = name, next(PIDS), tuple(words)
         self.parent = 1
         self.frozen = False
-        self.waiting: list[Runner] = []  #: threads that are to go on when it is thawed
+        self.waiting: list[Runner] = []  #: threads to continue when it is thawed
         self.handlers: dict[int, Any] = {}
         self.status: int | None = None  #: exit status, or −signal, as soon as it is dying
-        self.dead = False  #: and gone
+        self.dead = False  #: and reaped
         self.said: list[str] = []  #: standard output and error
         self._kernel = kernel
         self._busy_until_s = 0.0
         self._deaths: list[Death] = []
 
     def run(self, main: Callable[[], object]) -> "Process":
-        """Begin; the exit status is what `main` returns."""
+        """Start; the exit status is the result of `main`."""
         self._kernel.time.start(partial(self._main, main), self)
         return self
 
@@ -59,25 +59,25 @@ class Process:
             status = end.args[0] if end.args else 0
         except StuckError:
             raise
-        except BaseException as error:  # noqa: BLE001 - as the interpreter: a traceback, and status 1
+        except BaseException as error:  # noqa: BLE001 - like the interpreter: a traceback, and status 1
             self.said.append(f"Traceback: {error!r} in {self.name}")
             status = 1
-        # What is left of its threads is ended by the interpreter; this one as well, from outside.
+        # The interpreter ends its remaining threads; this one too, from outside.
         self._kernel.time.call_soon(self.end, int(status or 0))  # type: ignore[call-overload]
         self._kernel.time.wait(inf)
 
     def in_kernel(self, until_s: float, *, interruptible: bool = False) -> None:
-        """A thread is in a call until then, and the process cannot die earlier, unless that can be interrupted."""
+        """A thread is in a call until then; the process cannot die earlier unless the call can be interrupted."""
         if not interruptible:
             self._busy_until_s = max(self._busy_until_s, until_s)
 
     @property
     def hangs(self) -> bool:
-        """A thread is in a call that nothing can interrupt."""
+        """A thread is in an uninterruptible call."""
         return self._busy_until_s > self._kernel.time.now_s
 
     def end(self, status: int) -> None:
-        """It ends with this status, or −signal: not by a thread of its own."""
+        """End it with this status, or −signal. Not for its own threads to call."""
         if self.status is not None:
             return
         self.status = status
@@ -96,7 +96,7 @@ class Process:
             death.news.wake()
 
     def signal(self, number: int) -> None:
-        """As `kill`; not by a thread of its own."""
+        """Like `kill`. Not for its own threads to call."""
         if self.status is not None:
             return
         if number == signal.SIGSTOP:
@@ -122,7 +122,7 @@ class Process:
 
 
 class Processes:
-    """All of them, and the calls of `signal`, `socket`, `os` that are about them."""
+    """All processes, and the calls of `signal`, `socket` and `os` about them."""
 
     def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
@@ -193,7 +193,7 @@ class Processes:
 
     def _kill(self, process: Process, number: int) -> None:
         if process.dead:
-            return  # not waited for: it is there until then
+            return  # not waited for: it exists until then
         self.kernel.time.call_soon(process.signal, number)
         self.kernel.time.wait(self.kernel.time.now_s)
 
@@ -230,7 +230,7 @@ class Link:
         return self._fd
 
     def set_inheritable(self, _flag: bool) -> None:
-        """Only what is named on a command line is inherited here."""
+        """Only descriptors named on a command line are inherited here."""
 
     def settimeout(self, timeout_s: float | None) -> None:
         self._timeout_s = timeout_s
@@ -261,7 +261,7 @@ class Link:
             raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
         if len(end.peer.heard) >= BACKLOG:
             raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
-        # A descriptor on its way is nobody's yet: it is copied for the other end, which takes it when it reads.
+        # A descriptor in transit belongs to no process yet: it is copied for the other end, which gets it on reading.
         fds = [self._kernel.copy(fd, end.peer) for _, _, fds in ancillary for fd in fds]
         end.peer.heard.append((b"".join(messages), fds))
         end.peer.news.wake()
@@ -301,7 +301,7 @@ class Link:
 
 
 class VirtualProc(Proc):
-    """/proc of these processes: who they are, what they have open, what is locked. One that is dying has no words."""
+    """/proc of these processes: names, open files, locks. A dying one has an empty command line."""
 
     def __init__(self, processes: Processes) -> None:
         self._processes = processes

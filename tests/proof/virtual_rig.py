@@ -21,21 +21,21 @@ from tests.proof.virtual_gpio import Breaker
 from tests.proof.virtual_time import Time
 from tests.proof.virtual_tty import Tty
 
-#: A BMU needs this long for an answer.
+#: A BMU's time for an answer.
 ANSWER_S = 0.002
 
 
 @dataclass(frozen=True, slots=True)
 class Nature:
-    """What a bay is made of."""
+    """The parts of a bay."""
 
     pack: Pack
     control: ControlMode = ControlMode.MANUAL
     line: str = "real"
     seed: int = 1
-    speed: float = 1.0  #: model seconds in one second
-    main_loop: bool = False  #: the BMU answers when its main loop comes round to it
-    running: bool = False  #: as the last service left it
+    speed: float = 1.0  #: model seconds per second
+    main_loop: bool = False  #: the BMU answers when its main loop gets to it
+    running: bool = False  #: as left by the last service
     contactor: bool = False  #: between charger and battery
 
 
@@ -59,12 +59,12 @@ class MemoryWire(ChargerWire):
         self._time, self._tty = time, tty
         self._plugged = False
         tty.listener = self._receive
-        self.on_started: Callable[[float], None] = lambda _now_s: None  #: a frame has switched the output on
-        self.on_stranger: Callable[[bool], None] = lambda _ran: None  #: a stranger's has, or has switched it off
-        self.late_s: tuple[float, float] | None = None  #: an answer is whole so long after the question was written
-        self.pieces = 1  #: it comes in so many
+        self.on_started: Callable[[float], None] = lambda _now_s: None  #: a frame switched the output on
+        self.on_stranger: Callable[[bool], None] = lambda _ran: None  #: a foreign frame switched it on or off
+        self.late_s: tuple[float, float] | None = None  #: time from the request's write to the complete answer
+        self.pieces = 1  #: number of pieces of an answer
         self._came_s = 0.0
-        self._strange = False  #: what is heard now is another program's
+        self._strange = False  #: the bytes heard now are another program's
         self._dice = Random(1)
 
     def open(self) -> None:
@@ -119,7 +119,7 @@ class MemoryWire(ChargerWire):
             self.on_started(self._time.now_s)
 
     def hears_stranger(self, frames: bytes) -> None:
-        """Another program writes valid frames to this port. A stop of its own is none of ours."""
+        """Another program writes valid frames to this port. Its stop does not count as ours."""
         if self.mute_rx or not (self._tty.clear and self._tty.present):
             return
         first_stop_s, self._strange = self.counters.first_stop_s, True
@@ -145,11 +145,11 @@ class MemoryWire(ChargerWire):
 
 
 class VirtualRig(Rig):
-    """What `sim.faults` acts upon."""
+    """The object `sim.faults` acts on."""
 
     wire: MemoryWire
-    frozen = False  #: its BMU says what it once said, in all its words
-    apart_v = 0.0  #: so much more than the truth it says most of the time
+    frozen = False  #: all values of its BMU are frozen
+    apart_v = 0.0  #: most of the time it reports this much more than the truth
     steady = False  #: its BMU tells the same lie in every answer
 
     def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:

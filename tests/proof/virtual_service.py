@@ -1,7 +1,7 @@
 """The whole controller in virtual time: the unchanged supervisor, ports, buses, pyserial and core on emulated bays.
 
-Replaced are the kernel below (ttys, the CAN driver, clock, threads) and what is beside the chargers: the journal's
-disk, the control socket and the guardian. `Service.run` ends as the process would: by a signal, every bay stopped.
+It replaces the kernel below (ttys, the CAN driver, clock, threads) and what surrounds the chargers: the journal's disk,
+the control socket and the guardian. `Service.run` ends like the process: by a signal, with every bay stopped.
 """
 
 import signal
@@ -59,7 +59,7 @@ FIRST_NODE = 0x10
 
 
 class Guardian:
-    """Answers every heartbeat; `unwell` are those that the real one would not have been sent."""
+    """Answers every heartbeat; `unwell` are heartbeats the real guardian would not have got."""
 
     unwell = 0
 
@@ -80,7 +80,7 @@ class Guardian:
 
 
 class Contactor:
-    """A bay's GPIO line and what hangs on it: open, the charger sees no battery. Nobody else is in that bay's cable."""
+    """A bay's GPIO line and its contactor: while open, the charger sees no battery. Nothing else is in the cable."""
 
     def __init__(self, rig: VirtualRig) -> None:
         self._rig = rig
@@ -94,11 +94,11 @@ class Contactor:
         return -1
 
     def close(self) -> None:
-        """The line stays as it is."""
+        """The line keeps its level."""
 
 
 class Notebook:
-    """A journal that is read at once."""
+    """A journal read at once."""
 
     def __init__(self, *_: object, **__: object) -> None:
         self.said: list[str] = []
@@ -108,7 +108,7 @@ class Notebook:
         """No disk, no thread."""
 
     def close(self, *_: object) -> None:
-        """Nothing is left to be written."""
+        """Nothing is left to write."""
 
     def stalled(self, _now_s: float) -> bool:
         return False
@@ -122,7 +122,7 @@ class Notebook:
 
 
 class Shelf:
-    """A store whose disk takes everything at once. `memories` are what the last run left, by the bays' names."""
+    """A store on an instantaneous disk. `memories` are those of the last run, by bay name."""
 
     kept_revision = 0
 
@@ -163,7 +163,7 @@ class Silence:
     """A control socket that nobody uses."""
 
     def __init__(self, *_: object) -> None:
-        """Whatever it is given."""
+        """Any argument."""
 
     def start(self) -> None:
         """Nobody comes."""
@@ -182,7 +182,7 @@ def station(
     contactors: bool = False,
     **battery: Any,
 ) -> Station:
-    """A bay of the design's example for each control mode, on one bus; li-ion-48v where there is no other policy."""
+    """A standard test bay for each control mode, on one bus; li-ion-48v where no other policy is given."""
     settings = {"can": "can0", "map": load_map("tabos"), **battery}
     chosen = policies or [load_policy("li-ion-48v")] * len(controls)
     return Station(
@@ -259,7 +259,7 @@ class World:
         self.supervisor._on_signal(signal.SIGTERM, None)
 
     def run(self) -> int:
-        """Until somebody ends it; the exit status. What breaks the world is raised."""
+        """Run until it ends; returns the exit status. Raises whatever breaks the world."""
         try:
             return self.supervisor.run()
         except BaseException:
@@ -345,7 +345,7 @@ def _close_all(closings: Iterable[Callable[[], object]], _within_s: float) -> bo
 
 
 class _Past:
-    """What the last run left, as a memory made by hand."""
+    """The state persisted by the last run, as a hand-made memory."""
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
@@ -363,7 +363,7 @@ def world(
     kept: Mapping[str, Memory] | None = None,
     bus: Bus = PERFECT,
 ) -> Iterator[World]:
-    """A world that is taken down whole, however it ends; `end_s` is its last moment if nobody ends it before."""
+    """A world that is always taken down completely; it ends at `end_s` if nothing ends it before."""
     made = World(Time(end_s), the_station, natures, kept or {}, bus)
     try:
         yield made

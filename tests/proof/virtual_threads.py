@@ -1,4 +1,4 @@
-"""`threading` and `queue` as the service uses them, in virtual time."""
+"""`threading` and `queue`, as used by the service, in virtual time."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class Waiting:
-    """Those who wait for one thing."""
+    """The threads waiting for one event."""
 
     def __init__(self, time: Time) -> None:
         self._time = time

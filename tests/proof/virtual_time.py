@@ -1,8 +1,8 @@
-"""Time that jumps, for the unchanged service: its threads run one at a time, and the clock moves when all of them wait.
+"""Jumping time for the unchanged service: its threads run one at a time, and the clock moves when all of them wait.
 
-A virtual thread is a greenlet. Whoever waits looks for what comes next in one queue of moments: callbacks are run on
-the spot, to a thread is switched. Thus everything happens in one order, the same in every run, and an hour passes as
-quickly as it can be computed.
+A virtual thread is a greenlet. A waiting thread takes the next item from one queue of moments: it runs callbacks on the
+spot and switches to threads. So everything happens in one order, the same in every run, and an hour passes as fast as
+it can be computed.
 """
 
 from collections.abc import Callable
@@ -15,19 +15,19 @@ from typing import Any
 
 from greenlet import getcurrent, greenlet
 
-#: A clock never shows the same time twice; that is also the time that one look at it costs.
+#: A clock never shows the same time twice; this is also the cost of reading it.
 TICK_S = 1e-6
-#: More moments than this within a millisecond: somebody turns without ever waiting.
+#: More moments than this within a millisecond: a thread spins without waiting.
 BUSY = 20_000
 
 
 class StuckError(BaseException):
-    """The world has been ended from outside, or can only be; no boundary of the product may swallow it."""
+    """The world was ended from outside, or only can be; no boundary of the product may swallow this."""
 
 
 @dataclass(slots=True)
 class Handle:
-    """A callback that is still to come."""
+    """A pending callback."""
 
     callback: Callable[..., object] | None
     args: tuple[object, ...]
@@ -41,10 +41,10 @@ class Runner:
     """One virtual thread; `turn` counts its wake-ups, so that a later one for the same wait is void."""
 
     let: greenlet
-    process: Any = None  #: whose thread it is: a `virtual_process.Process`, or nobody's
+    process: Any = None  #: the thread's `virtual_process.Process`, or None
     turn: int = 0
     ended: bool = False
-    killed: bool = False  #: it never runs again, not even its clean-up, until the world itself is closed
+    killed: bool = False  #: it never runs again, not even its clean-up, until the world is closed
 
 
 class Time:
@@ -53,7 +53,7 @@ class Time:
     def __init__(self, end_s: float = inf) -> None:
         self.now_s = 1000.0
         self.end_s = self.now_s + end_s
-        self.failure: BaseException | None = None  #: what ended the world, if anything did
+        self.failure: BaseException | None = None  #: the error that ended the world, if any
         self._moments: list[tuple[float, int, Handle | Runner, int]] = []
         self._order = count()
         self._main = self._running = Runner(getcurrent())
@@ -86,11 +86,11 @@ class Time:
         return self._running
 
     def wake(self, runner: Runner, at_s: float | None = None) -> None:
-        """End the runner's present wait, now or then."""
+        """End the runner's current wait, now or at the given time."""
         heappush(self._moments, (self.now_s if at_s is None else at_s, next(self._order), runner, runner.turn))
 
     def wait(self, until_s: float) -> None:
-        """Let others run until then (`inf`: until somebody wakes me), or until I am woken."""
+        """Let others run until then (`inf`: without a limit), or until woken."""
         me = self._running
         if until_s < inf:
             self.wake(me, max(until_s, self.now_s))
@@ -102,7 +102,7 @@ class Time:
             raise StuckError from self.failure
 
     def start(self, target: Callable[[], object], process: Any = None) -> Runner:
-        """A new thread, of the same process as whoever starts it, unless another is named."""
+        """A new thread, in its starter's process unless another is given."""
         runner = Runner(greenlet(parent=self._main.let), process or self._running.process)
         runner.let.run = partial(self._live, runner, target)
         self._runners.append(runner)
@@ -110,14 +110,14 @@ class Time:
         return runner
 
     def kill(self, process: Any) -> None:
-        """All threads of this process vanish in the middle of what they are doing. Not by a thread of its own."""
+        """All threads of this process vanish in the middle of their work. Not for its own threads to call."""
         for runner in self._runners:
             if runner.process is process and not runner.ended:
                 runner.killed = True
                 runner.turn += 1
 
     def close(self) -> None:
-        """Let every thread that is left run into its end. By the main runner, at the end of a world."""
+        """End every remaining thread. Called by the main runner at the end of a world."""
         self.failure = self.failure or StuckError("closed")
         while left := [runner for runner in self._runners[1:] if not runner.ended]:
             left[0].let.switch()
@@ -130,14 +130,14 @@ class Time:
         try:
             if self.failure is None:
                 target()
-        except BaseException as error:  # noqa: BLE001 - it is shown where the world was started
+        except BaseException as error:  # noqa: BLE001 - it is raised where the world was started
             self.failure = self.failure or error
         runner.ended = True
         following = self._main if self.failure is not None else self._next()
-        runner.let.parent = following.let  # where a greenlet that returns leads to
+        runner.let.parent = following.let  # where a finished greenlet continues
 
     def _next(self) -> Runner:
-        """Let moments happen until one is a thread's; the main one's where nothing may happen any more."""
+        """Run moments until one belongs to a thread; to the main one if nothing can happen any more."""
         try:
             while self.failure is None:
                 at_s, _, what, turn = heappop(self._moments)
@@ -151,7 +151,7 @@ class Time:
                         continue
                     what.turn += 1
                     return what
-        except BaseException as error:  # noqa: BLE001 - a callback belongs to nobody: the world ends
+        except BaseException as error:  # noqa: BLE001 - a callback has no thread: the world ends
             self.failure = self.failure or error
         return self._main
 

@@ -1,4 +1,4 @@
-"""A serial port in memory: bytes in and out, the settings that anybody may change, the lock, who reads and writes."""
+"""A serial port in memory: bytes in and out, settings anyone may change, the lock, its readers and writers."""
 
 import termios
 from collections.abc import Callable
@@ -9,14 +9,14 @@ from orchestrator.sim.line import garbled, is_clear
 from tests.proof.virtual_threads import Waiting
 from tests.proof.virtual_time import Time
 
-#: What a tty takes before it is full.
+#: The capacity of a tty.
 ROOM = 4096
 #: The bits of `c_cflag` that are the speed.
 SPEED = 0o010017
 VMIN, VTIME = termios.VMIN, termios.VTIME
 
-Attributes = list[Any]  #: as of `termios.tcgetattr`
-#: What `stty` calls it → the index of `termios.tcgetattr`, which bits (or which character), and their value.
+Attributes = list[Any]  #: as from `termios.tcgetattr`
+#: Name in `stty` → the index in `termios.tcgetattr`, the bits (or character), and their value.
 STTY: dict[str, tuple[int, int, int]] = {
     "parenb": (2, termios.PARENB | termios.PARODD, termios.PARENB),
     "parodd": (2, termios.PARENB | termios.PARODD, termios.PARENB | termios.PARODD),
@@ -34,7 +34,7 @@ STTY: dict[str, tuple[int, int, int]] = {
 
 
 def fresh_attributes() -> Attributes:
-    """A port that nobody has set up yet: 9600 baud, line by line, as the kernel begins."""
+    """A port not configured yet: 9600 baud, line by line, the kernel's defaults."""
     return [
         termios.ICRNL | termios.IXON,
         termios.OPOST | termios.ONLCR,
@@ -48,23 +48,23 @@ def fresh_attributes() -> Attributes:
 
 @dataclass(slots=True)
 class Tty:
-    """One port. `listener` gets what is written to it; `deliver` brings bytes in."""
+    """One port. `listener` gets the bytes written to it; `deliver` brings bytes in."""
 
     time: Time
     present: bool = True
-    stalled: bool = False  #: takes nothing any more
-    stolen: bool = False  #: another program reads all that comes in
-    suspended: bool = False  #: another program has stopped its output (TCOOFF); what is written waits
+    stalled: bool = False  #: accepts no more output
+    stolen: bool = False  #: another program reads all input
+    suspended: bool = False  #: another program has stopped its output (TCOOFF); writes wait
     held_back: list[bytes] = field(default_factory=list)
     waiting_bytes: bytes = b""
     attributes: Attributes = field(default_factory=fresh_attributes)
-    changed_s: float = 0.0  #: when somebody else changed them
+    changed_s: float = 0.0  #: when another program changed them
     listener: Callable[[bytes], None] = lambda _: None
-    on_written: Callable[[bytes], None] = lambda _: None  #: what a process of ours wrote, heard or not
-    on_delivered: Callable[[int], None] = lambda _: None  #: so many bytes have come in
-    exclusive: bool = False  #: TIOCEXCL: whoever opens it is refused
-    opened: int = 0  #: how many open files
-    lock: object = None  #: the open file that has it locked, or a stranger
+    on_written: Callable[[bytes], None] = lambda _: None  #: bytes written by our processes, received or not
+    on_delivered: Callable[[int], None] = lambda _: None  #: number of bytes received
+    exclusive: bool = False  #: TIOCEXCL: opening is refused
+    opened: int = 0  #: number of open files
+    lock: object = None  #: the open file holding its lock, or a foreign program
     news: Waiting = field(init=False)
 
     def __post_init__(self) -> None:
@@ -72,7 +72,7 @@ class Tty:
 
     @property
     def clear(self) -> bool:
-        """Whether what is said is what is heard."""
+        """Whether both ends have the same settings."""
         return is_clear(self.attributes)
 
     def take(self, data: bytes) -> None:
@@ -92,7 +92,7 @@ class Tty:
 
     @property
     def readable(self) -> bool:
-        """As n_tty has it for poll: without a time (VTIME), VMIN bytes must be there."""
+        """Like n_tty's poll: without a time (VTIME), VMIN bytes must be available."""
         characters = self.shown()[6]
         raw = not self.attributes[3] & termios.ICANON
         least = characters[VMIN] if raw and not characters[VTIME] else 1
@@ -104,7 +104,7 @@ class Tty:
             return
         if not self.clear:
             if self.attributes[3] & termios.ICANON:
-                return  # until a line ends, and garbage ends none
+                return  # until the end of a line, which garbage does not contain
             data = garbled(data)
         self.waiting_bytes = (self.waiting_bytes + data)[:ROOM]
         self.news.wake()
@@ -115,7 +115,7 @@ class Tty:
         self.news.wake()
 
     def plug(self) -> None:
-        """A new device, which nobody has set up or locked."""
+        """A new device, neither configured nor locked."""
         if not self.present:
             self.present, self.attributes, self.exclusive = True, fresh_attributes(), False
 
@@ -146,7 +146,7 @@ class Tty:
         self.attributes = kept
 
     def shown(self) -> Attributes:
-        """`tcgetattr`: VMIN and VTIME are numbers where they mean something."""
+        """`tcgetattr`: VMIN and VTIME are numbers where they apply."""
         kept = [*self.attributes[:6], list(self.attributes[6])]
         if not kept[3] & termios.ICANON:
             for at in (VMIN, VTIME):

@@ -1,4 +1,4 @@
-"""What the virtual kernel does to serial ports, to lines of a GPIO chip, and to locks."""
+"""The virtual kernel's calls for serial ports, GPIO lines and locks."""
 
 import errno
 import fcntl

@@ -1,4 +1,4 @@
-"""Waiting on the virtual kernel, until something comes in or time is up."""
+"""Waiting on the virtual kernel, for input or a time-out."""
 
 import select
 from collections.abc import Iterable, Iterator
@@ -13,7 +13,7 @@ from tests.proof.virtual_tty import Tty
 
 
 class Waits(Descriptors):
-    """`select`, and what a thread sleeps on."""
+    """`select`, and the sleep of threads."""
 
     def select(
         self, readers: Iterable[int], writers: Iterable[int], _: object, timeout: float | None = None
@@ -28,7 +28,7 @@ class Waits(Descriptors):
             self.sleep([*readers, *writers], end_s)
 
     def sleep(self, fds: Iterable[int], end_s: float) -> None:
-        """Until something happens to one of these, or until then."""
+        """Wait until an event on one of these, or until then."""
         with self._listening([what for fd in fds if (what := self._what(fd)) is not None]):
             self.time.wait(end_s)
 

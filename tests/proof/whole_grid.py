@@ -1,4 +1,4 @@
-"""The grid in its long form: every state × every row × each of the line's three conditions, and what all of it used.
+"""The grid in its long form: every state × every row × each of the line's three activities, and the table rows used.
 
 python -m tests.proof.whole_grid
 """
@@ -22,19 +22,19 @@ from tests.proof.play import play as play_script
 from tests.proof.report import say
 
 Order = tuple[Action, int]
-#: The interlock lets it out, no run orders it, and why.
+#: Allowed by the interlock, commanded by no run, and why.
 NEVER_ORDERED: dict[Order, str] = {(Action.SET_MODE, 5): "no policy has a use for mode 5: a charge ends by a stop"}
-#: The station's limit, for each of the charger's steps one of which is then the highest; and the SOC of the charge.
+#: Station limits that each make another current step the highest; and the SOC of the charge.
 CHARGES = ((15.0, None), *((limit_a, 50.0) for limit_a in (2.0, 5.0, 8.0, 11.0, 14.0)))
 
 
 def orders_allowed() -> set[Order]:
-    """The interlock's list; a stop needs no place on it."""
+    """The interlock's list; a stop needs no entry."""
     return {(action, value) for action, values in ALLOWED[ControlMode.MANUAL].items() for value in values}
 
 
 def orders_let_out() -> set[Order]:
-    """What charges under every limit order."""
+    """The commands used in charges under every limit."""
     let_out: set[Order] = set()
     for limit_a, soc_pct in CHARGES:
         let_out |= orders(limit_a, soc_pct)
@@ -47,7 +47,7 @@ def played(cell: Cell) -> tuple[Ended, Used]:
 
 
 def table(chosen: Sequence[Cell], ended: Sequence[Ended]) -> Iterator[str]:
-    """By state, how its cells ended; by phase, how long a stop took."""
+    """By state, the results of its cells; by phase, the time of a stop."""
     words = sorted({one.word for one in ended})
     yield f"{'state':21}" + "".join(f"{word:>28}" for word in words)
     for state in State:
@@ -68,7 +68,7 @@ def table(chosen: Sequence[Cell], ended: Sequence[Ended]) -> Iterator[str]:
 
 
 def unused(used: Used) -> tuple[list[str], bool]:
-    """What no run used, and why; True if there is something that has no reason."""
+    """What no run used, and why; True if something has no reason."""
     rows = {row.id for row in FAULTS}
     changes, allowed, let_out = changes_of_table(), orders_allowed(), orders_let_out()
     made = used.changes
@@ -88,7 +88,7 @@ def unused(used: Used) -> tuple[list[str], bool]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """All of it, and a table; 1 if a cell ended badly or something was never used without a reason."""
+    """The whole grid and a table; 1 if a cell ended badly or something was unused without a reason."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     arguments = parser.parse_args(argv)

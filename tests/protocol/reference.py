@@ -1,8 +1,8 @@
-"""A second decoder, written from the document alone, slow and obvious: what the product's must agree with."""
+"""A second decoder, written from the document alone, slow and obvious: the product's must agree with it."""
 
 
 def good_frame_at(stream: bytes, at: int) -> int:
-    """The size of the good frame that begins at `at`, else 0."""
+    """The size of the good frame starting at `at`, or 0."""
     if stream[at : at + 3] != b"\xaf\xfa\x90" or at + 4 > len(stream):
         return 0
     data_bytes = stream[at + 3] - 3
@@ -14,7 +14,7 @@ def good_frame_at(stream: bytes, at: int) -> int:
 
 
 def frames_in(stream: bytes) -> list[bytes]:
-    """Every good frame, hunting on one byte past whatever begins none."""
+    """Every good frame; where none starts, the search continues at the next byte."""
     found, at = [], 0
     while at < len(stream):
         size = good_frame_at(stream, at)

@@ -1,4 +1,4 @@
-"""Hypothesis strategies for what a serial line can deliver."""
+"""Hypothesis strategies for everything a serial line can deliver."""
 
 from hypothesis import strategies as st
 
@@ -19,7 +19,7 @@ frames = st.builds(
 
 
 def with_byte(wire: bytes, at: int, byte: int, *, sum_mended: bool) -> bytes:
-    """The frame with one byte replaced, and perhaps its checksum made right again."""
+    """The frame with one byte replaced, possibly with a corrected checksum."""
     damaged = bytearray(wire)
     damaged[at % len(wire)] = byte
     if sum_mended:
@@ -29,7 +29,7 @@ def with_byte(wire: bytes, at: int, byte: int, *, sum_mended: bool) -> bytes:
 
 damaged_frames = st.builds(with_byte, frames, st.integers(0, 40), st.integers(0, 255), sum_mended=st.booleans())
 
-#: What a stream is made of: good frames, damaged and cut ones, false starts with and without a plausible header, noise.
+#: The parts of a stream: good frames, damaged and cut ones, false starts with or without a plausible header, noise.
 fragments = st.one_of(
     frames,
     damaged_frames,

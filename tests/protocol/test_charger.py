@@ -42,7 +42,7 @@ from tests.protocol.vectors import GOOD
 
 VECTOR = {vector.name: vector for vector in GOOD}
 
-#: Every order that there is, with its frame worked out by hand from §3.2 and §4.2.
+#: Every command, with its frame worked out by hand from §3.2 and §4.2.
 FRAMES = {
     STOP: "AF FA 90 04 10 90 00 34 AF A0",
     Command(Action.RESUME): "AF FA 90 04 10 90 01 35 AF A0",
@@ -154,7 +154,7 @@ def test_temperatures_are_signed_tenths(raw: int, celsius: float) -> None:
     assert parse_values(reply(raw, raw), 0x0C, 0x00) == {"temperature_1_c": celsius, "temperature_2_c": celsius}
 
 
-#: Where each value of a default reply is, what it may be (§4.1.1), and how its list is printed.
+#: The position of each value in a default reply, its allowed values (§4.1.1), and the printed list of them.
 LISTED = [
     (2, "control_mode", ControlMode, range(2), "control mode {} (documented: 0, 1)"),
     (3, "operation", Operation, range(2), "operation {} (documented: 0, 1)"),

@@ -1,4 +1,4 @@
-"""What a person at a serial log, and a program, are told about pasted frames."""
+"""The explanation of pasted frames, for a person reading a serial log and for a program."""
 
 import json
 from textwrap import dedent
@@ -316,12 +316,12 @@ def test_a_bad_frame_says_what_is_wrong_with_it(text: str, lines: list[str]) -> 
 @pytest.mark.parametrize(
     ("text", "problems"),
     [
-        # What the fields say comes after the reason.
+        # The fields come after the reason.
         (
             "AF FA 91 04 10 91 00 36 AF A0",
             ["address 0x91, expected 0x90", "order 0x91, expected 0x90: it must equal the address"],
         ),
-        # An end in its place is no hint, and none is looked for.
+        # An end byte in its place is no hint, and no search follows.
         ("AF FA 90 04 10 90 00 35 AF A0", ["checksum 0x35, expected 0x34"]),
     ],
 )
@@ -337,11 +337,11 @@ LENGTH_04 = ["an end AF A0 stands after 10 bytes: the length of such a frame is 
     ("text", "hints"),
     [
         (ENDS_EARLY, LENGTH_04),
-        (f"{ENDS_EARLY} {ENDS_EARLY[6:]}", LENGTH_04),  # of two ends the first
-        (f"{ENDS_EARLY} AF FA", LENGTH_04),  # what starts after the end is no matter
-        ("AF FA 90 23 10 AF FA 34 AF A0", []),  # the end of what starts before it
+        (f"{ENDS_EARLY} {ENDS_EARLY[6:]}", LENGTH_04),  # the first of two ends
+        (f"{ENDS_EARLY} AF FA", LENGTH_04),  # a start after the end does not matter
+        ("AF FA 90 23 10 AF FA 34 AF A0", []),  # the end of a frame starting before it
         ("AF FA AF FA 90 FF 00 00 AF A0", []),
-        ("AF FA 90 23 10 90 AF A0 00 00", []),  # nothing so short is a frame
+        ("AF FA 90 23 10 90 AF A0 00 00", []),  # too short for a frame
         ("AF FA 90 23 10 90 33 AF A0 00", ["an end AF A0 stands after 9 bytes: the length of such a frame is 0x03"]),
     ],
 )
@@ -396,7 +396,7 @@ def test_garbage_between_frames_is_shown_where_it_stands() -> None:
 def test_a_good_frame_inside_a_false_start_is_explained_too() -> None:
     false_start, good = explain(f"AF FA 90 23 {STOP}")
     assert (false_start.ok, good.ok, good.facts["offset"]) == (False, True, 4)
-    assert "an end AF A0 stands" not in false_start.text  # that end is another frame's
+    assert "an end AF A0 stands" not in false_start.text  # this end belongs to another frame
 
 
 def test_a_false_start_reaches_to_the_next_start_where_its_length_makes_no_sense() -> None:

@@ -30,12 +30,12 @@ def fed(decoder: FrameDecoder, parts: Iterable[bytes]) -> list[bytes]:
 
 
 def waiting(decoder: FrameDecoder) -> int:
-    """How many bytes wait for the rest of their frame."""
+    """The number of bytes waiting for the rest of their frame."""
     return len(decoder._pending)
 
 
 def all_of(stream: bytes) -> list[bytes]:
-    """Everything found in a stream after which the line falls quiet."""
+    """Everything found in a stream followed by silence."""
     decoder = FrameDecoder()
     return fed(decoder, [stream]) + [frame.encode() for frame in decoder.flush()]
 
@@ -164,7 +164,7 @@ def test_an_incomplete_frame_waits_until_the_line_is_quiet(cut: bytes, why: str)
 
 
 def test_a_good_frame_inside_a_waiting_false_start_comes_out_with_the_flush() -> None:
-    false_start = bytes.fromhex("AFFA9023")  # says that 41 bytes belong to it
+    false_start = bytes.fromhex("AFFA9023")  # claims 41 bytes
     decoder = FrameDecoder()
     assert decoder.feed(false_start + STOP + RUN + false_start) == []
     assert [frame.encode() for frame in decoder.flush()] == [STOP, RUN]
@@ -230,7 +230,7 @@ def test_no_good_frame_is_lost_in_noise_without_starts(mix: list[tuple[bytes, by
 @given(st.integers(3, 35), st.binary(max_size=30).filter(lambda noise: 0xAF not in noise), st.lists(frames, max_size=4))
 def test_no_good_frame_is_lost_behind_or_inside_a_false_start(length: int, noise: bytes, good: list[bytes]) -> None:
     stream = START + bytes([ADDRESS, length]) + noise + b"".join(good)
-    assume(not good_frame_at(stream, 0))  # noise that happens to be a whole frame is one
+    assume(not good_frame_at(stream, 0))  # noise that happens to be a whole frame is a frame
     assert all_of(stream) == good
 
 
@@ -243,7 +243,7 @@ def test_why_bad_agrees_with_the_decoder(candidate: bytes) -> None:
 
 
 def test_a_lossy_line_loses_only_the_frames_that_it_hit() -> None:
-    """One byte in a hundred is lost or doubled; whatever came through whole is found, and nothing else is."""
+    """One byte in a hundred is lost or doubled; exactly the intact frames are found."""
     chance = random.Random(1)
     whole, stream = [], bytearray()
     for _ in range(400):

@@ -1,4 +1,4 @@
-"""The BMU's older protocol, by bytes written by hand from its description."""
+"""The BMU's older protocol, with bytes written by hand from its description."""
 
 import pytest
 from hypothesis import given
@@ -30,7 +30,7 @@ def test_the_request() -> None:
             {"time_to_full_min": None, "time_to_empty_min": 300, "soc_pct": 51, "soh_pct": 100},
         ),
         ("70 03 E8 03 CA 12 F1 FF", {"remaining_ah": 10, "available_wh": 481, "temperature_c": -1.5}),
-        # The lowest and the highest that is believed.
+        # The lowest and highest values believed.
         ("70 01 00 00 44 80 00 00", {"voltage_v": 0, "current_a": -327, "status": 0}),
         ("70 01 10 27 BC 7F 7F 00", {"voltage_v": 100, "current_a": 327, "status": 127}),
         (

@@ -1,4 +1,4 @@
-"""Requests and longer replies of other masters, by CiA 301, §7.2.4.3."""
+"""Requests and longer replies of other masters, from CiA 301, §7.2.4.3."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The bytes of last resort are those of the document, and only a good answer to their own question proves standby."""
+"""The last-resort bytes match the document, and only a good answer to their own poll proves standby."""
 
 import pytest
 from hypothesis import given
@@ -15,7 +15,7 @@ ASKED = (Kind1.CURRENT | Kind1.CONTROL_MODE, int(Kind2.OPERATION))
 
 
 def answer(amps: float, operation: int, kinds: tuple[int, int] = ASKED) -> bytes:
-    """As the emulated charger says it."""
+    """As sent by the emulated charger."""
     return status(Charger(), *kinds, {Kind.CURRENT: round(100 * amps), Kind.OPERATION: operation})
 
 

@@ -1,4 +1,4 @@
-"""Words to measurements by a map."""
+"""Words to measurements through a map."""
 
 import dataclasses
 

@@ -1,10 +1,10 @@
-"""Journals to be replayed: the demo's, in earnest, and those of some fault scripts of the campaign, in virtual time.
+"""Journals for replay: the demo's, in real time, and those of some campaign fault scripts, in virtual time.
 
-    python -m tests.replay.record              all of them anew
+    python -m tests.replay.record              all of them again
     python -m tests.replay.record scripts      only those in virtual time
 
-They are references: record them anew only where a decision was changed on purpose, and look at what the replay says
-before (`orchestrator replay tests/replay/journals/…`). A bug that was found in the field becomes one more of them.
+They are references: record them again only where a decision was changed on purpose, and check the replay's output first
+(`orchestrator replay tests/replay/journals/…`). A bug found in the field becomes another of them.
 """
 
 import gzip
@@ -22,15 +22,15 @@ from tests.proof.script import Script
 from tests.waiting import wait_until
 
 JOURNALS = Path(__file__).parent / "journals"
-#: Fault scripts that together have every state and most faults in them, several bays, automatic and manual chargers.
+#: Fault scripts that together cover every state and most faults, several bays, automatic and manual chargers.
 SEEDS = (14, 20, 21, 22, 27, 41, 46, 79, 102, 105)
-#: Where virtual time lies in real time.
+#: The real time at which virtual time starts.
 BEGAN_S = 1_767_225_600.0
 DEMO_S = 150.0
 
 
 def script(seed: int) -> bytes:
-    """The journal of a script of the campaign."""
+    """The journal of a campaign script."""
     lines: list[bytes] = []
     the_script = Script.of_seed(seed)
     with stage(the_script) as made:
@@ -55,14 +55,14 @@ def demo() -> bytes:
 
 
 def write(name: str, journal: bytes) -> None:
-    """Gzipped without a time, so that the same journal is the same file."""
+    """Gzipped without a timestamp, so the same journal gives the same file."""
     path = JOURNALS / f"{name}.jsonl.gz"
     path.write_bytes(gzip.compress(journal, mtime=0))
     say(f"{path.name}: {journal.count(b'snapshot')} steps, {path.stat().st_size / 1000:.0f} kB")
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Record; the exit status."""
+    """Record; returns the exit status."""
     JOURNALS.mkdir(exist_ok=True)
     names: Iterable[str] = arguments or ("demo", "scripts")
     if "demo" in names:

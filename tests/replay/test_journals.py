@@ -1,4 +1,4 @@
-"""What was decided once is decided again: every journal that ships, taken again with its own rules."""
+"""Recorded decisions are reproduced: every journal here, replayed with its own rules."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A bay of the service without threads: the test is its control loop, its devices obey at once and time jumps."""
+"""A bay of the service without threads: the test is its control loop, devices obey at once, time is simulated."""
 
 import time
 from collections.abc import Callable
@@ -39,7 +39,7 @@ from tests.core.said import into
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 STEP_S = 0.2
-#: What 13 cells have that are half full, or full under no current: it goes with every SOC that the tests set.
+#: The voltage of 13 cells that are half full, or full without current: plausible for every SOC the tests set.
 VOLTS = 50.4
 
 
@@ -49,12 +49,12 @@ def the_bay() -> Bay:
         charger=ChargerConfig(port="/dev/ttyX", control=ControlMode.MANUAL, steps_a=STEPS_A),
         battery=BatteryConfig(can="can0", node_id=0x10, map=load_map("tabos")),
         limits=Limits(voltage_v=58.4, current_a=15.0, temperature_c=Range(0, 45)),
-        policy=load_policy("li-ion-48v", changes={"finish.full.soc_pct": "100"}),  # a test ends a charge by a word
+        policy=load_policy("li-ion-48v", changes={"finish.full.soc_pct": "100"}),  # a test ends a charge by one value
     )
 
 
 class Charger:
-    """Has obeyed by the next time that it is looked at. `orders` are all that it was left."""
+    """Has obeyed by the next look. `orders` has every command it got."""
 
     def __init__(self) -> None:
         self.orders: list[tuple[Command | None, Grant | None]] = []
@@ -70,7 +70,7 @@ class Charger:
             Connection.NORMAL,
         )
         self.link = ChargerLink(online=True)
-        self.deaf = False  #: does not obey any more
+        self.deaf = False  #: disobeys from now on
 
     def order(self, command: Command | None, grant: Grant | None = None) -> None:
         self.orders.append((command, grant))
@@ -80,7 +80,7 @@ class Charger:
         return self.reading, self.link
 
     def pass_time(self, now_s: float) -> None:
-        """Send what was ordered in the middle of the step, then answer a poll."""
+        """Send the command given during the decision, then answer a poll."""
         command = self.orders[-1][0] if self.orders else None
         changes: dict[str, object] = {}
         if command is not None:
@@ -101,7 +101,7 @@ class Charger:
 
 
 class Battery:
-    """Tells `values`, freshly."""
+    """Reports `values`, fresh."""
 
     def __init__(self) -> None:
         self.now_s = 0.0
@@ -121,9 +121,9 @@ class Battery:
 
 
 class Bench:
-    """A bay, its devices, a journal that nobody writes: its lines wait in it, and a store on a real disk.
+    """A bay, its devices, a journal whose lines stay in its queue, and a store on a real disk.
 
-    `persisted` is what the last run has left; the store writes after each step, for as long as its `disk` is well.
+    `persisted` is the state left by the last run; the store writes after each decision while its `disk` works.
     """
 
     def __init__(
@@ -171,7 +171,7 @@ class Bench:
         raise AssertionError(f"{state} not reached, but {self.bay.decision}")
 
     def charging(self) -> None:
-        """Until it charges and the charger has been told everything."""
+        """Run until it charges and the charger has every command."""
         self.until(State.CHARGING)
         self.step(10)
         assert self.charger.reading.current_a > 0

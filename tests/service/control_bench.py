@@ -1,4 +1,4 @@
-"""A control socket with a handler of the test, and its clients."""
+"""A control socket with a test handler, and its clients."""
 
 import json
 import socket
@@ -17,7 +17,7 @@ from tests.core.said import cause
 
 
 def answer(request: Mapping[str, object]) -> Mapping[str, object]:
-    """Says what it heard; refuses and breaks when asked to."""
+    """Repeats the request; refuses or breaks when asked to."""
     if request.get("verb") == "refuse":
         raise RequestError(cause("not today"))
     if request.get("verb") == "break":
@@ -59,7 +59,7 @@ def closing_all() -> Iterator[list[socket.socket]]:
             one.close()
 
 
-#: Far less than a client may take, and far more than an answer takes.
+#: Far less than a client may take, and far more than an answer needs.
 SOON_S = 0.4
 
 
@@ -71,13 +71,13 @@ def answered_soon(path: Path) -> None:
 
 def connected(path: Path) -> socket.socket:
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    connection.connect(str(path))  # which waits where many do
+    connection.connect(str(path))  # which waits in a queue
     connection.settimeout(5 * CLIENT_S)
     return connection
 
 
 class Bays:
-    """A handler that writes down what it was asked, and answers when it is let."""
+    """A handler that records requests and answers when released."""
 
     def __init__(self) -> None:
         self.asked: list[object] = []

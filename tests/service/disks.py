@@ -1,4 +1,4 @@
-"""Disks that are worn: a call of the kernel's that hangs until it is let go, or fails."""
+"""Worn disks: a system call that hangs until released, or fails."""
 
 import errno
 import os
@@ -10,7 +10,7 @@ from orchestrator.service import disk, loading
 
 
 class WornDisk:
-    """`os` for the store: real, but for the calls in `hangs` and `fails`."""
+    """`os` for the store: real, except for the calls in `hangs` and `fails`."""
 
     def __init__(self) -> None:
         self.hangs: set[str] = set()
@@ -34,14 +34,14 @@ class WornDisk:
         return call
 
     def heal(self) -> None:
-        """What hangs goes on, what comes from now on is well."""
+        """Release the hanging calls; later calls work."""
         self.hangs.clear()
         self.fails.clear()
         self.go.set()
 
     @classmethod
     def under(cls, monkeypatch: pytest.MonkeyPatch) -> "WornDisk":
-        """Under everything that the store does from now on."""
+        """Put it under every later call of the store."""
         worn = cls()
         monkeypatch.setattr(disk, "os", worn)
         monkeypatch.setattr(loading, "os", worn)

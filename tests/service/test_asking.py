@@ -1,4 +1,4 @@
-"""The other side of the control socket: who asks is answered, refused, or told why not."""
+"""The client side of the control socket: an answer, a refusal, or the reason for neither."""
 
 import os
 import socket
@@ -37,7 +37,7 @@ def test_a_service_that_ends_in_mid_answer_is_told_as_such(tmp_path: Path) -> No
 
 @contextmanager
 def impostor(path: Path, serve: Callable[[socket.socket], object]) -> Iterator[None]:
-    """Somebody else who answers there."""
+    """Another program answering there."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         listener.bind(str(path))
         listener.listen(1)
@@ -85,7 +85,7 @@ def test_what_is_no_service_is_told_as_such(tmp_path: Path, line: bytes) -> None
 
 
 def test_who_asks_gets_through_when_too_many_wait(tmp_path: Path) -> None:
-    """The kernel's queue is full; there is room after a while."""
+    """The kernel's queue is full, then has room after a while."""
     path = tmp_path / "control.sock"
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener, closing_all() as clients:
         listener.bind(str(path))

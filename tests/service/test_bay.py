@@ -1,4 +1,4 @@
-"""One bay of the service with devices made by hand: orders, answers, and exceptions of our own code."""
+"""One bay of the service with hand-made devices: commands, answers, and internal errors."""
 
 import json
 from dataclasses import replace
@@ -63,7 +63,7 @@ def test_requests_are_answered_one_a_step_in_their_order(bench: Bench) -> None:
 
 
 def test_a_stop_waits_for_nothing_and_what_it_overtook_is_refused(bench: Bench) -> None:
-    """However much was asked before it, and however often it is asked itself: the next step does it."""
+    """However many requests precede it, and however often it is repeated: the next decision does it."""
     bench.charging()
     early = [Asked(Request.PAUSE), *(Asked(Request.START) for _ in range(5))]
     stops, late = [Asked(Request.STOP), Asked(Request.STOP)], Asked(Request.PAUSE)
@@ -117,7 +117,7 @@ def test_an_exception_of_our_own_stops_the_bay_latches_and_is_told(
 
 
 def kept(bench: Bench) -> tuple[bool, str, bool]:
-    """What the disk has of the bay: running, hold, paused."""
+    """The bay's state on disk: running, hold, paused."""
     (entry,) = json.loads(bench.store.path.read_text(encoding="utf-8"))["entries"]
     return entry["running"], say(from_plain(entry["hold"])) if entry["hold"] else "", entry["paused"]
 
@@ -189,7 +189,7 @@ def test_a_refusal_waits_for_no_disk(bench: Bench) -> None:
 
 
 def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A charge that the core intends begins only once that is kept; a write under way counts for nothing."""
+    """A charge intended by the core begins only once that is persisted; a write under way does not count."""
     told: list[bool] = []
 
     def intending(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
@@ -236,7 +236,7 @@ def test_what_was_not_charging_when_the_guardian_died_waits_for_nobody(bench: Be
 
 @pytest.mark.parametrize("before", [True, False])
 def test_the_end_of_the_service_and_an_operators_stop_are_two_things(bench: Bench, *, before: bool) -> None:
-    """The stop may come before the end or, in the same second, after it: the next run keeps to it and nothing else."""
+    """The stop may come before the end or, in the same second, after it: the next run obeys it."""
     bench.charging()
     if before:
         bench.ask(Request.STOP)

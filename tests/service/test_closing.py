@@ -1,4 +1,4 @@
-"""The end of what may hang: side by side, within one time."""
+"""Closing parts that may hang: in parallel, within one time limit."""
 
 import time
 from threading import Event

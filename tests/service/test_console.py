@@ -1,4 +1,4 @@
-"""What people read, on a real pipe that is read, slowly, not at all, or gone."""
+"""Console output on a real pipe whose reader is normal, slow, stopped or gone."""
 
 import os
 import sys
@@ -90,7 +90,7 @@ def test_one_that_takes_nothing_right_now_is_waited_for(pipe: Pipe) -> None:
 def test_a_service_that_was_started_without_it_writes_into_nothing_else(
     pipe: Pipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What has its number by then may be a charger's port."""
+    """Its number may by then belong to a charger's port."""
     reader, writer = pipe
     monkeypatch.setattr(sys, "__stderr__", None)
     console = Console(writer)
@@ -103,7 +103,7 @@ def test_a_service_that_was_started_without_it_writes_into_nothing_else(
 
 
 def test_whoever_prints_waits_for_no_reader_either(pipe: Pipe) -> None:
-    """A traceback of a library's thread, say."""
+    """A traceback from a library's thread, for example."""
     reader, writer = pipe
     before = sys.stderr
     console = Console(writer)

@@ -1,4 +1,4 @@
-"""A bay's contactor in the service: when its line is taken, what a line that fails does, and who hears of it."""
+"""A bay's contactor in the service: when its line is taken, and what a failing line causes and reports."""
 
 import json
 from dataclasses import replace
@@ -19,7 +19,7 @@ GONE = "/dev/gpiochip0 line 17: gone"
 
 
 class Line:
-    """A line as the kernel has it: driven by whoever has taken it, or by nobody."""
+    """A kernel line: driven by its holder, or by nobody."""
 
     def __init__(self) -> None:
         self.taken = 0  #: how often

@@ -1,4 +1,4 @@
-"""The control socket in the file system: who may open it, what else may lie there, and its name."""
+"""The control socket in the file system: permissions, other files in its place, and its name."""
 
 import os
 import socket
@@ -70,7 +70,7 @@ def test_a_service_that_is_behind_with_its_answers_is_alive(tmp_path: Path) -> N
         hanging.bind(str(path))
         hanging.listen(1)
         with suppress(BlockingIOError):
-            while True:  # fill what it lets wait
+            while True:  # fill its backlog
                 waiting = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
                 clients.append(waiting)
                 waiting.setblocking(False)

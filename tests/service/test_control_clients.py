@@ -1,4 +1,4 @@
-"""Clients of the control socket that are slow, rude, silent, strangers, or too many."""
+"""Clients of the control socket that are slow, rude, silent, foreign, or too many."""
 
 import json
 import os
@@ -37,7 +37,7 @@ def test_one_who_leaves_at_once_harms_nobody(path: Path) -> None:
         with client(path):
             pass
     with client(path) as connection:
-        connection.sendall(b"{}\n")  # and does not wait for the answer
+        connection.sendall(b"{}\n")  # without waiting for the answer
     assert ask(path, {})["ok"]
 
 
@@ -67,7 +67,7 @@ def test_idle_clients_do_not_count_however_many_they_are(path: Path) -> None:
         half = connected(path)
         idle.append(half)
         half.sendall(b"{")
-        for _ in range(MAX_CLIENTS - 2):  # those who have been silent for longer go
+        for _ in range(MAX_CLIENTS - 2):  # the longest silent are dropped
             idle.append(connected(path))
         half.sendall(b"}\n")
         assert reply(half)["ok"] is True
@@ -86,7 +86,7 @@ def test_a_crowd_is_served(path: Path) -> None:
 
 
 def test_an_answer_that_nobody_takes_holds_nobody_up_and_ends(tmp_path: Path) -> None:
-    """More than the kernel buffers, to a client that does not read, and to one that reads a byte now and then."""
+    """More than the kernel buffers, to a client that never reads, and to one reading a byte now and then."""
     path, pause = tmp_path / "control.sock", Event()
     control = ControlSocket(path, lambda _: {"much": "x" * 5_000_000}, time.monotonic)
     control.start()
@@ -104,12 +104,12 @@ def test_an_answer_that_nobody_takes_holds_nobody_up_and_ends(tmp_path: Path) ->
         control.close()
 
 
-#: What the first one takes of one processor, and how late a stop may be then: its rest and a few turns.
+#: The first one's share of a processor, and the delay a stop may have: its rest and a few turns.
 SHARE, STOP_S = 0.3, 0.5
 
 
 def test_a_flood_takes_its_share_and_delays_no_stop(tmp_path: Path) -> None:
-    """20 clients that ask without a pause, 100 that say nothing: in processes of their own, as they would be."""
+    """20 clients asking without a pause and 100 silent ones, in separate processes as in reality."""
     bays, path = Bays(), tmp_path / "control.sock"
     bays.ready.set()
     flood = (
@@ -145,7 +145,7 @@ def test_clients_alone_are_no_stall(path: Path) -> None:
 
 
 def test_too_many_open_files_are_no_end(tmp_path: Path) -> None:
-    """accept() fails as soon as it is called; when there is room again, whoever has come meanwhile is answered."""
+    """accept() fails at once; when there is room again, every client that came meanwhile is answered."""
     control = ControlSocket(tmp_path / "control.sock", answer, time.monotonic)
     with client(tmp_path / "control.sock") as early, taken_files():
         control.start()
@@ -162,7 +162,7 @@ def test_too_many_open_files_are_no_end(tmp_path: Path) -> None:
 
 @contextmanager
 def taken_files() -> Iterator[None]:
-    """No file can be opened any more, in the whole process."""
+    """No more files can be opened in the whole process."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     files: list[int] = []
     try:
@@ -191,7 +191,7 @@ def test_a_stranger_is_turned_away_and_that_is_said_once_a_minute(
             with pytest.raises(ServiceError):
                 ask(path, {})
         assert said == ["control socket: turned user 12345 away (process 4711; 1 since last said)"]
-        Event().wait(2 * REST_S)  # the next one comes in another turn
+        Event().wait(2 * REST_S)  # the next one comes in a later turn
         now_s[0] += SAY_S
         with pytest.raises(ServiceError):
             ask(path, {})

@@ -1,4 +1,4 @@
-"""In which order the control socket answers: a stop first, one status for many, requests at their pace."""
+"""The order of answers at the control socket: stops first, one status for many, requests at a limited rate."""
 
 import json
 import socket
@@ -52,7 +52,7 @@ def say(path: Path, clients: list[socket.socket], verb: str, bays: list[str] | N
 def test_a_stop_goes_first_and_what_it_overtook_is_not_done_after_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever asked for a start before the stop must ask again; what is for other bays stays."""
+    """A start requested before the stop must be requested again; requests for other bays stay."""
     monkeypatch.setattr(reception_module, "PAUSE_S", 0.5)
     bays, path = Bays(), tmp_path / "control.sock"
     bays.ready.set()

@@ -1,4 +1,4 @@
-"""What counts as a request at the control socket."""
+"""Valid and invalid requests at the control socket."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""The journal on real files: bounded, on disks that are full, gone or hanging, and never in anybody's way."""
+"""The journal on real files: bounded, on full, missing or hanging disks, and never blocking anyone."""
 
 import json
 import os
@@ -43,7 +43,7 @@ def problem(journal: Journal) -> str:
 
 
 def read(directory: Path, stream: str = "events") -> list[dict[str, Any]]:
-    """What was put into a stream, the oldest first."""
+    """The entries of a stream, the oldest first."""
     return [line for line in every(directory, stream) if line["kind"] not in ("run", "lost")]
 
 
@@ -134,7 +134,7 @@ def test_a_full_disk_is_told_and_nothing_is_lost_when_it_has_room_again(tmp_path
 
 
 def test_what_a_full_disk_took_in_part_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A limit on the size of files breaks a write in the middle, as a disk with a few bytes left does."""
+    """A file size limit cuts a write in the middle, like a disk with a few bytes left."""
     import resource
 
     path = tmp_path / "some.jsonl"
@@ -179,7 +179,7 @@ def test_what_no_disk_takes_is_dropped_the_oldest_first_and_counted(tmp_path: Pa
 
 
 def test_nobody_waits_for_a_disk_that_hangs(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "events.jsonl")  # to open it for writing hangs until somebody reads
+    os.mkfifo(tmp_path / "events.jsonl")  # opening it for writing hangs until it has a reader
     with writing(tmp_path) as journal:
         journal.put("bay-1", ("decision", {"n": 0}))
         wait_until(lambda: not journal._waiting, what="the writer")
@@ -194,7 +194,7 @@ def test_nobody_waits_for_a_disk_that_hangs(tmp_path: Path) -> None:
         began_s = time.monotonic()
         journal.close()
         assert time.monotonic() - began_s < 2
-        os.close(os.open(tmp_path / "events.jsonl", os.O_RDONLY | os.O_NONBLOCK))  # lets the thread go
+        os.close(os.open(tmp_path / "events.jsonl", os.O_RDONLY | os.O_NONBLOCK))  # releases the thread
 
 
 def test_a_journal_that_is_not_written_says_so(tmp_path: Path) -> None:
@@ -243,7 +243,7 @@ def test_whatever_a_power_cut_leaves_swallows_no_line_of_the_next_run(tmp_path: 
 
 
 def test_events_are_on_the_disk_when_they_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The record of the accident outlives a power cut right after it; of the snapshots there are too many for that."""
+    """The record of the accident survives a power cut right after it; snapshots are too many for that."""
     synchronised: list[Path] = []
     monkeypatch.setattr(
         "orchestrator.service.rotating.os.fsync", lambda fd: synchronised.append(Path(f"/proc/self/fd/{fd}").readlink())

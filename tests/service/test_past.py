@@ -1,4 +1,4 @@
-"""What a bay makes of what was written down: its own past, another's, none."""
+"""A bay's use of the persisted state: its own past, another bay's, or none."""
 
 import json
 from dataclasses import replace
@@ -94,7 +94,7 @@ def test_a_port_under_another_name_is_the_same_port(tmp_path: Path) -> None:
 
 
 def run(entries: list[Entry], number: int, *places: Place) -> list[Entry]:
-    """One run of the service, in which nothing happens; a person lets everything go on."""
+    """One uneventful run of the service; a person lets everything continue."""
     pasts = {place: past_of(place, entries, FILE) for place in places}
     return [
         replace(entry, persisted=replace(entry.persisted, hold=None)) if entry.place in pasts else entry
@@ -230,7 +230,7 @@ NOW = Stamp(1_800_000_000.0, 500.0, "this boot")
 
 @given(entry_lists)
 def test_what_is_written_is_read(entries: list[Entry]) -> None:
-    moment = replace(NOW, clock_s=NOW.clock_s + 2**-30)  # none at all would be an age that cannot be told
+    moment = replace(NOW, clock_s=NOW.clock_s + 2**-30)  # without one its age would be unknown
     run, read = decode(encode(NOW, 7, entries), moment)
     assert run == 7
     assert [(one.place, one.persisted.gist, one.run) for one in read] == [

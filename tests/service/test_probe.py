@@ -1,4 +1,4 @@
-"""`orchestrator probe` on the emulated station: what it shows, what it leaves alone, what it says of the silent."""
+"""`orchestrator probe` on the emulated station: what it shows, what it leaves alone, its report on silent devices."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -29,7 +29,7 @@ def no_change(_: Document) -> None:
 
 
 class Site:
-    """A plant, and station files for it."""
+    """A plant with station files for it."""
 
     def __init__(self, directory: Path, *plant_args: str) -> None:
         self.directory = directory
@@ -49,7 +49,7 @@ class Site:
     def probe(
         self, *bays: str, nmt: str | None = None, old: bool = False, change: Callable[[Document], None] = no_change
     ) -> tuple[int, str]:
-        """The exit status and what was shown."""
+        """The exit status and the output."""
         shown: list[str] = []
         status = probe(self.station(change), bays or ("bay-1",), nmt, old_protocol=old, show=shown.append)
         return status, "\n".join(shown)
@@ -64,7 +64,7 @@ def _site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 @pytest.fixture(name="other_site", scope="module")
 def _other_site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """Its BMUs have the first-named value in the low bits, its chargers are in automatic mode."""
+    """Its BMUs have the first value in the low bits; its chargers are in automatic mode."""
     site = Site(tmp_path_factory.mktemp("other"), "--soc", "50", "--layout", "first-low", "--automatic")
     yield site
     site.plant.close()
@@ -177,7 +177,7 @@ def test_silent_devices_are_told_what_to_check(site: Site) -> None:
 
 
 def test_a_wrong_node_id_is_told_from_a_silent_bus(site: Site) -> None:
-    """Somebody else's frames say that wiring and bit rate are right."""
+    """Foreign frames prove that wiring and bit rate are right."""
 
     def wrong_node(document: Document) -> None:
         document["bays"][0]["battery"]["node_id"] = 0x33

@@ -1,4 +1,4 @@
-"""What the journal says of a bay: readable for people, complete for a replay."""
+"""A bay's journal records: readable for people, complete for a replay."""
 
 import json
 from collections.abc import Iterable
@@ -46,7 +46,7 @@ HOT = ActiveFault("hot_trip", Effect.TRIP, cause("the pack has 56.0 °C"), 3.0)
 
 
 def both(text: str, name: str = "reason") -> dict[str, object]:
-    """The sentence and the cause of it."""
+    """The sentence and its cause."""
     said = {"id": "said", "params": {"text": text}, "key": "", "place": "", "advice": ""}
     return {name: text, "cause": said}
 
@@ -136,7 +136,7 @@ def causes_plain(value: Any) -> Any:
 
 
 def rebuilt(lines: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The snapshots that a reader makes of the lines, which it only knows as JSON."""
+    """The snapshots a reader builds from the lines, knowing them only as JSON."""
     snapshots: list[dict[str, Any]] = []
     for line in lines:
         fields = json.loads(json.dumps(line))
@@ -209,7 +209,7 @@ def test_a_quiet_bay_says_nothing_until_something_happens() -> None:
 
 
 def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
-    """From the first step to the end of a charge: every line is JSON, and none of the snapshots in it is lost."""
+    """From the first decision to the end of a charge: every line is JSON, and no snapshot is lost."""
     bench = Bench(tmp_path)
     journal, seen = bench.journal, list[dict[str, Any]]()
 
@@ -233,7 +233,7 @@ def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
 
 
 def test_a_countdown_is_no_news() -> None:
-    """The reason of a backoff says when it goes on: new words each second, and not one line of the journal."""
+    """The reason of a backoff says when it ends: a new text each second, but not a single journal line."""
     world = charging()
     world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
     world.tick()

@@ -1,4 +1,4 @@
-"""A policy that is changed while a bay charges: read anew when asked, in force at the next standby, never half."""
+"""A policy changed while a bay charges: reread on request, in force at the next standby, never half."""
 
 import threading
 import time
@@ -30,7 +30,7 @@ journal: {directory: run/journal}
 
 
 class Site:
-    """A station file with a policy beside it, and its bay."""
+    """A station file with a policy next to it, and its bay."""
 
     def __init__(self, directory: Path) -> None:
         self.station_file, self.policy_file = directory / "station.yaml", directory / "mine.yaml"
@@ -94,7 +94,7 @@ def test_what_stands_by_takes_it_over_at_once(site: Site) -> None:
 
 
 def test_many_hangups_are_one_thread_and_one_more_reading(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The disk hangs while it is asked for again and again: nobody waits, nothing piles up."""
+    """The disk hangs during repeated requests: nobody waits, nothing piles up."""
     readings, go = [], threading.Event()
 
     def hanging(file: Path) -> Station:
@@ -135,7 +135,7 @@ def test_a_comment_changes_the_lines_that_reasons_name(site: Site) -> None:
     line = (
         site.policy_file.read_text()
         .splitlines()
-        .index("  soc_below_pct: 98                    # with less than this; a fuller one is left alone")
+        .index("  soc_below_pct: 98                    # below this; a fuller one is left alone")
         + 1
     )
     assert f"mine.yaml:{line}" in str(site.bench.bay.status()["reason"])

@@ -1,4 +1,4 @@
-"""The table that `orchestrator status` prints."""
+"""The table printed by `orchestrator status`."""
 
 from collections.abc import Mapping
 from typing import cast

@@ -1,4 +1,4 @@
-"""Whose turn it is to begin, and whose BMU moves: what each bay is told, from what each bay showed."""
+"""Whose turn it is to start, and whose BMU moves: the facts each bay gets, from the views of all bays."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def shows(charger_a: float = 0.0, bmu_a: float = 0.0) -> Snapshot:
 
 
 def turns(stagger_s: float = 3.0) -> Starts:
-    """bay-1 has the turn, bay-2 is there, too."""
+    """It is bay-1's turn; bay-2 is there too."""
     starts = Starts(stagger_s, "station.yaml:9")
     starts.follow("bay-2", 10.0, Memory(), shows())
     starts.follow("bay-1", 10.0, READY, shows())

@@ -1,4 +1,4 @@
-"""The status document: its names are fixed, its values are JSON, unknown is null."""
+"""The status document: fixed names, JSON values, null for unknown."""
 
 import json
 from pathlib import Path
@@ -63,7 +63,7 @@ KNOWN = Snapshot(
 
 
 def document(snapshot: Snapshot, decision: Decision) -> dict[str, Any]:
-    """As a program on the other side of the socket gets it."""
+    """The document as received by a client of the socket."""
     status: dict[str, Any] = json.loads(json.dumps(bay_status("bay-1", snapshot, decision, 100.0, 1000.0)))
     return status
 

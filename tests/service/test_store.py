@@ -1,4 +1,4 @@
-"""The store on real files: what is on the disk when, what no disk takes, what the next run finds."""
+"""The store on real files: what is on the disk when, failing disks, what the next run finds."""
 
 import json
 import os
@@ -32,7 +32,7 @@ CALLS = ("open", "write", "fsync", "replace", "close")
 
 
 class Clock:
-    """Monotonic time that stands still until somebody moves it."""
+    """Monotonic time that moves only when told to."""
 
     def __init__(self) -> None:
         self.now_s = 1000.0
@@ -43,7 +43,7 @@ class Clock:
 
 @contextmanager
 def running(directory: Path, *places: Place, clock: Clock | None = None) -> Iterator[Store]:
-    """A store that has read what is there."""
+    """A store that has read the existing files."""
     store = Store(directory, places or (A, B), clock or time.monotonic, time.time, boot="this")
     store.start()
     assert store.wait(5)
@@ -67,7 +67,7 @@ def entries(directory: Path) -> dict[str, dict[str, object]]:
 
 
 def left(directory: Path, **pasts: Persisted) -> None:
-    """What an earlier run has left: bay_1=…"""
+    """State left by an earlier run: bay_1=…"""
     places = {place.bay.replace("-", "_"): place for place in (A, B, C)}
     with running(directory, *(places[name] for name in pasts)) as store:
         for name, past in pasts.items():
@@ -95,7 +95,7 @@ def test_a_change_is_on_the_disk_when_its_revision_is_kept(tmp_path: Path) -> No
 
 
 def test_file_and_directory_are_synchronised_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a power cut it is the old file or the new one; and once `kept_revision` says so, the new one."""
+    """After a power cut it is the old file or the new one; once `kept_revision` confirms it, the new one."""
     worn = WornDisk.under(monkeypatch)
     with running(tmp_path) as store:
         kept(store, 1)
@@ -223,7 +223,7 @@ def test_a_change_that_comes_during_a_write_has_its_own_time(tmp_path: Path, mon
 
 
 def test_what_a_write_under_way_may_turn_round_is_not_certain(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The last charge has ended, its end is being written, and the next one begins: that is on the disk only later."""
+    """The last charge has ended, its end is being written, and the next one begins: this reaches the disk later."""
     worn = WornDisk.under(monkeypatch)
     with running(tmp_path) as store:
         kept(store, store.put(A, Persisted(running=True)))
@@ -325,7 +325,7 @@ def test_the_first_format_is_read_once_and_moved_away(tmp_path: Path) -> None:
 
 
 def test_a_hold_of_a_version_before_held_loses_the_end_that_said_what_to_do(tmp_path: Path) -> None:
-    """The bay says it now; the rest is what the operator did, and no alarm."""
+    """The bay reports it now; the rest are the operator's actions and no alarm."""
     with running(tmp_path, A) as store:
         kept(store, store.put(A, HELD))
     path, said = tmp_path / FILE, "stopped by the operator; start to go on"

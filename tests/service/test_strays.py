@@ -1,4 +1,4 @@
-"""A charger in hand that no bay has any more: stopped, verified by two replies, watched, and then let go."""
+"""A charger in hand without a bay: stopped, verified by two replies, watched, then released."""
 
 import time
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ READING = ChargerReading(
 
 
 class Port:
-    """A charger's port, moved by hand."""
+    """A charger port driven by hand."""
 
     def __init__(self) -> None:
         self.orders: list[Command | None] = []
@@ -45,7 +45,7 @@ class Port:
 
 
 class Case:
-    """One stray, and what is seen of it."""
+    """One stray, and its view."""
 
     def __init__(self, directory: Path) -> None:
         self.now_s = 100.0
@@ -59,7 +59,7 @@ class Case:
     def sees(
         self, *, runs: bool = False, stopped_s: float | None = None, amps: float = 0.0, online: bool = True
     ) -> bool:
-        """A reply that was asked for now, after a stop that was sent then; whether it counts as verified."""
+        """A reply requested now, after a stop sent then; whether it counts as verified."""
         self.now_s += 0.2
         operation = Operation.RUNNING if runs else Operation.STOPPED
         link = ChargerLink(online=online, stop_sent_s=stopped_s)

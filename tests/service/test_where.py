@@ -1,4 +1,4 @@
-"""Which service is asked, when nobody says which."""
+"""Which service is asked when none is named."""
 
 import os
 from collections.abc import Callable
@@ -44,7 +44,7 @@ def test_a_station_file_that_names_none_is_passed_over(folder: Path, content: by
 
 
 def as_nobody(folder: Path, do: Callable[[Path], object]) -> str:
-    """What it complains of when a user who may not look into the folder `closed` does it; in a process of its own."""
+    """The complaints when a user without access to the directory `closed` does it, in a separate process."""
     closed = folder / "closed"
     closed.mkdir(mode=0o700)
     folder.chmod(0o711)

@@ -1,4 +1,4 @@
-"""The emulated bus without a network, against python-can's own `serial` interface at its other end."""
+"""The emulated bus without a network, against python-can's own `serial` interface at the other end."""
 
 import os
 from collections.abc import Iterator

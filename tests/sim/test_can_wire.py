@@ -1,4 +1,4 @@
-"""A bus that fails is left alone for a while and served again; it neither spins nor dies."""
+"""A failing bus is left alone for a while and then served again; the wire neither spins nor dies."""
 
 import os
 
@@ -11,7 +11,7 @@ from tests.waiting import wait_until
 
 
 class FailingBus(can.BusABC):
-    """Every other receive fails, as on a bus that goes down and comes up; readable for ever."""
+    """Every other receive fails, as on a bus going down and up; always readable."""
 
     def __init__(self, *, has_fd: bool) -> None:
         super().__init__(channel="failing")

@@ -1,4 +1,4 @@
-"""The charger's model: what it obeys, in which mode, and what it does with a battery."""
+"""The charger's model: the commands it obeys in each mode, and its effect on a battery."""
 
 from itertools import groupby
 

@@ -1,4 +1,4 @@
-"""The emulated charger's own codec, against the bytes printed in the charger's document."""
+"""The emulated charger's own codec, against the bytes in the charger's document."""
 
 import pytest
 from hypothesis import given
@@ -46,9 +46,9 @@ def test_no_bytes_break_it_or_fill_it(chunks: list[bytes]) -> None:
         ("AF FA 90 05 01 90 03 04 2E AF A0", 0b1000),  # checksum
         (framed("90 05 07 90 03 04"), 0b0010),  # command
         (framed("90 05 01 91 03 04"), 0b0100),  # order
-        (framed("90 06 01 90 03 04 00"), 0b0001),  # one byte too many for a poll
-        ("AF FA 90 05 01 90 03 04 2D AF A1", 0b0001),  # the end is not where the length says
-        ("AF FA 90 02 01 90 03 04 2D AF A0", 0b0001),  # a length that no request has
+        (framed("90 06 01 90 03 04 00"), 0b0001),  # one byte too long for a poll
+        ("AF FA 90 05 01 90 03 04 2D AF A1", 0b0001),  # the end is not at the place given by the length
+        ("AF FA 90 02 01 90 03 04 2D AF A0", 0b0001),  # a length no request has
         ("AF FA 90 05 08 91 03 04 00 AF A0", 0b1110),
     ],
 )

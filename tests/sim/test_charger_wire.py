@@ -1,4 +1,4 @@
-"""The emulated charger on a real pty: the document's bytes, and what each kind of line makes of them."""
+"""The emulated charger on a real pty: the document's bytes, and the effect of each kind of line on them."""
 
 import contextlib
 import os

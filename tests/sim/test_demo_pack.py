@@ -1,4 +1,4 @@
-"""The demo's pack, led through a charge by the rules of li-ion-48v: about a minute, every stage to be seen."""
+"""The demo's pack in a charge by the rules of li-ion-48v: about a minute, with every stage visible."""
 
 import pytest
 
@@ -13,7 +13,7 @@ TICK_S = 0.1
 
 
 class Charge:
-    """One charge, with what was seen on the way."""
+    """One charge and its observations."""
 
     def __init__(self) -> None:
         self.bay = Bay(Charger(), demo())
@@ -26,7 +26,7 @@ class Charge:
         self.bay.charger.push(Push.OPERATION, 1)
 
     def until_v(self, volts: float) -> float:
-        """Until the pack has had this voltage for the dwell; returns how long it took."""
+        """Run until the pack has had this voltage for the dwell; returns how long it took."""
         began_s, reached_s = self.t_s, 0.0
         while reached_s < DWELL_S:
             self.tick()

@@ -1,4 +1,4 @@
-"""Every fault does what its sentence says, seen from the lines or in the model, and healing takes it away."""
+"""Every fault does what its description says, on the lines or in the model, and healing removes it."""
 
 import asyncio
 import termios
@@ -26,7 +26,7 @@ CHANNELS = count()
 
 @dataclass
 class Scene:
-    """A rig that charges at step 2 (8 A), in a loop that nobody runs: its time is passed in."""
+    """A rig charging at step 2 (8 A), in a loop that does not run: time is passed in."""
 
     rig: Rig
 
@@ -61,7 +61,7 @@ def after(seconds: float, seen: Callable[[Rig], object]) -> Callable[[Rig], obje
 
 
 def heating(rig: Rig) -> bool:
-    """4 K at once, then 4 K/s, then there it stays."""
+    """4 K at once, then 4 K/s, then it stays."""
     first_c = rig.bay.readout().temperature_c
     rig.bay.advance(1)
     second_c = rig.bay.readout().temperature_c
@@ -205,7 +205,7 @@ SEEN: dict[str, Callable[[Rig], object]] = {
     "another_pack": lambda rig: 36 < rig.bay.readout().voltage_v < 40,
     "heal": lambda _: True,
 }
-#: One frame is all that there is of them: test_bmu.py and test_plant.py wait for it.
+#: They show in a single frame: test_bmu.py and test_plant.py wait for it.
 ON_THE_BUS = {"emergency", "bmu_reboot", "heal"}
 
 

@@ -1,4 +1,4 @@
-"""What the lines do to frames: as often as they say, and always the same with the same seed."""
+"""What the lines do to frames: at the configured rates, and reproducibly with the same seed."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The emulated others on a bus, and the BMU that they meet: a main loop, a second master, a forger."""
+"""The emulated others on a bus, and the BMU they meet: a main loop, a second master, a forger."""
 
 import random
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ TRUE, FORGED = "43 04 60 00 E7 FF 00 00", "43 04 60 00 C8 00 00 00"
 
 @dataclass
 class Scene:
-    """A BMU on a bus in virtual time, and all that is heard there."""
+    """A BMU on a bus in virtual time, and all frames on it."""
 
     main_loop: bool = False
     time: Time = field(default_factory=Time)
@@ -137,12 +137,12 @@ def test_a_node_that_is_guarded_answers_with_a_bit_that_alternates() -> None:
     assert scene.run(0.01) == ["710 00"]
     scene.master.nmt(0x01, 0)
     scene.master.guard()
-    assert scene.run(0.01) == ["710 05"]  # it starts with 0 again
+    assert scene.run(0.01) == ["710 05"]  # starting with 0 again
 
 
 def test_lss_and_emergencies_of_any_length() -> None:
     scene = Scene()
-    scene.master.look_for_unconfigured()  # a node with an id does not answer
+    scene.master.look_for_unconfigured()  # a node that has an id does not answer
     scene.bmu.short_emergency(0x4210)
     scene.bmu.emergency(0)
     frames = scene.run(0.05)

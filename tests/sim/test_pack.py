@@ -1,4 +1,4 @@
-"""The battery's model keeps charge, energy and heat, and has plausible numbers."""
+"""The battery's model conserves charge, energy and heat, and has plausible numbers."""
 
 import pytest
 from hypothesis import given
@@ -90,7 +90,7 @@ def test_resistance_grows_in_the_cold(celsius: float, times: float) -> None:
 
 
 def test_warming_is_the_same_however_it_is_cut() -> None:
-    """As it warms, its resistance falls, and with it the heat: by 0.07 K in these five minutes."""
+    """As it warms, its resistance and so its heating fall: by 0.07 K in these five minutes."""
     whole, cut = (Pack(temperature_c=0, ambient_c=0, arrhenius_k=4000) for _ in range(2))
     whole.advance(300, 14)
     for _ in range(300):

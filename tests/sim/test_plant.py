@@ -1,4 +1,4 @@
-"""The emulated station as the product meets it: another process, real ptys, a bus between processes."""
+"""The emulated station as the product sees it: another process, real ptys, a bus between processes."""
 
 import json
 import signal

@@ -1,4 +1,4 @@
-"""A bare client for each of the two emulated lines; it knows nothing of the product."""
+"""A bare client for each of the two emulated lines; it shares no code with the product."""
 
 import contextlib
 import os
@@ -13,7 +13,7 @@ import can
 
 from orchestrator.sim.pack import Readout
 
-#: Chosen so that 0x6000 reads as in the manual's sample (§4.1.2), and every field of the others can be told apart.
+#: Chosen so that 0x6000 reads as in the manual's sample (§4.1.2), and every field of the others is distinct.
 TOLD = Readout(
     voltage_v=23.68,
     current_a=-0.08,
@@ -44,14 +44,14 @@ class Port:
         os.write(self.fd, bytes.fromhex(text))
 
     def read(self, count: int, within_s: float = DEADLINE_S) -> str:
-        """Exactly `count` bytes as hex, or what came within the time."""
+        """Exactly `count` bytes as hex, or what came before the time-out."""
         heard, deadline_s = b"", time.monotonic() + within_s
         while len(heard) < count and select.select([self.fd], [], [], max(deadline_s - time.monotonic(), 0))[0]:
             heard += os.read(self.fd, count - len(heard))
         return heard.hex(" ").upper()
 
     def read_until(self, text: str, within_s: float = DEADLINE_S) -> str:
-        """Until `text` (hex) has come, or all that came within the time."""
+        """Everything up to `text` (hex), or what came before the time-out."""
         heard, deadline_s = "", time.monotonic() + within_s
         while text not in heard and time.monotonic() < deadline_s:
             heard = f"{heard} {self.read(1, 0.05)}".strip()
@@ -66,13 +66,13 @@ class Port:
 
 
 def framed(body: str) -> str:
-    """A whole frame around address, length, command, order and data, worked out as §3.2 says."""
+    """A whole frame around address, length, command, order and data, computed as in §3.2."""
     data = bytes.fromhex(body)
     return (b"\xaf\xfa" + data + bytes((sum(data) % 256,)) + b"\xaf\xa0").hex(" ").upper()
 
 
 def udp_keys() -> dict[str, object]:
-    """A multicast bus of our own that does not leave this machine."""
+    """A private multicast bus that does not leave this machine."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("", 0))
         port = probe.getsockname()[1]
@@ -89,7 +89,7 @@ def on_bus(**keys: object) -> Iterator["Client"]:
 
 
 class Client:
-    """A CAN node that sends what it is told and waits for frames."""
+    """A CAN node that sends given frames and waits for frames."""
 
     def __init__(self, bus: can.BusABC) -> None:
         self.bus = bus
@@ -98,7 +98,7 @@ class Client:
         self.bus.send(can.Message(arbitration_id=cob_id, data=bytes.fromhex(text), is_extended_id=False))
 
     def wait(self, cob_id: int, within_s: float = DEADLINE_S) -> str | None:
-        """The next frame with this COB-ID as hex, None when there is none in time."""
+        """The next frame with this COB-ID as hex; None if there is none in time."""
         deadline_s = time.monotonic() + within_s
         while (left_s := deadline_s - time.monotonic()) > 0:
             message = self.bus.recv(left_s)
@@ -107,7 +107,7 @@ class Client:
         return None
 
     def wait_for(self, cob_id: int, text: str) -> bool:
-        """Whether this frame comes, behind others with its COB-ID perhaps."""
+        """Whether this frame comes, possibly after others with its COB-ID."""
         while (heard := self.wait(cob_id)) is not None:
             if heard == text:
                 return True

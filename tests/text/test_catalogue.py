@@ -1,4 +1,4 @@
-"""Every id says the same in both languages, and nothing that is said can fail."""
+"""Every id says the same in both languages, and no text can fail to format."""
 
 import re
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ HOT = Cause.of("over_temperature", key="pack.temperature_c", place="p.yaml:3", p
 
 
 def params(template: str) -> Iterator[tuple[str, str]]:
-    """The parameters that a template names, and their formats; of a word or a list only that it is one."""
+    """A template's parameters and their formats; for a word or a list only its kind."""
     for _, name, form, _ in Formatter().parse(template):
         if name is not None:
             yield name, "" if form in ("word", "and", "then", "nth") else form or ""

@@ -1,4 +1,4 @@
-"""A whole station for tests: its file, the emulated plant and the service, as processes that never outlive the test."""
+"""A whole station for tests: its file, the emulated plant and the service, in processes that never outlive the test."""
 
 import ctypes
 import json
@@ -20,21 +20,21 @@ from tests.waiting import wait_until
 Document = dict[str, Any]
 
 POLICY = Path(__file__).with_name("policy.yaml")
-#: Python starts, imports everything and opens the socket within this, also on a machine that does other things.
+#: Python starts, imports everything and opens the socket within this, even on a busy machine.
 START_S = 20.0
-#: The service gives every charger 3 s at its end, then closes its ports.
+#: At its end the service gives every charger 3 s, then closes its ports.
 END_S = 10.0
-#: How often a wait looks: to be asked for the status of many bays all the time slows a service down.
+#: Polling interval of waits: constant status requests for many bays slow a service down.
 LOOK_S = 0.05
 
 
 def die_with_parent() -> None:
-    """In a child, before it becomes another program: let the kernel kill it when the tests end, however they end."""
+    """In a child before exec: have the kernel kill it when the tests end, however they end."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
 def station_document(directory: Path, cans: Sequence[Mapping[str, object]], bays: int) -> Document:
-    """A station of bays `bay-1`, `bay-2`, … on the ports of a plant in `directory`, as its file would have it."""
+    """The document of a station with bays `bay-1`, `bay-2`, … on the ports of a plant in `directory`."""
     per_bus = -(-bays // len(cans))
     return {
         "station": "whole",
@@ -59,7 +59,7 @@ def station_document(directory: Path, cans: Sequence[Mapping[str, object]], bays
 
 
 class Service:
-    """`python -m orchestrator run` on a station file; what it says is in `directory`/service.log."""
+    """`python -m orchestrator run` on a station file; its output is in `directory`/service.log."""
 
     def __init__(self, directory: Path, document: Document, run: Sequence[str] = ("-m", "orchestrator", "run")) -> None:
         self.directory = directory
@@ -74,7 +74,7 @@ class Service:
     # --- the process ---
 
     def start(self, stderr: int | None = None) -> Self:
-        """Until it answers; what it says goes into its log, or to `stderr`."""
+        """Start it and wait for an answer; its output goes into its log, or to `stderr`."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
                 [sys.executable, *self._run, str(self.file)],
@@ -96,19 +96,19 @@ class Service:
             return False
 
     def edit(self, change: Callable[[Document], None]) -> None:
-        """Change the station file, as a person with an editor does."""
+        """Change the station file, like a person with an editor."""
         document: Document = json.loads(self.file.read_text(encoding="utf-8"))
         change(document)
         self.file.write_text(json.dumps(document, indent=1), encoding="utf-8")
 
     def signal(self, number: signal.Signals) -> None:
-        """To the process that was started: the guardian."""
+        """Send a signal to the started process: the guardian."""
         assert self._process is not None
         self._process.send_signal(number)
 
     @property
     def guardian(self) -> int:
-        """The process that was started."""
+        """The started process."""
         assert self._process is not None
         return self._process.pid
 
@@ -121,14 +121,14 @@ class Service:
         os.kill(self.controller, signal.SIGKILL)
 
     def kill_all(self) -> None:
-        """Guardian and controller at one moment, as a power failure does."""
+        """Kill guardian and controller together, like a power failure."""
         assert self._process is not None
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
 
     def ended(self) -> int:
-        """Wait for its end; the exit status."""
+        """Wait for its end; returns the exit status."""
         assert self._process is not None
         return self._process.wait(END_S)
 
@@ -139,16 +139,16 @@ class Service:
     # --- asking it ---
 
     def ask(self, verb: str, *bays: str) -> dict[str, str]:
-        """What each bay answers to a request; "" is yes."""
+        """Each bay's answer to a request; "" is yes."""
         return cast("dict[str, str]", ask(self.socket, {"verb": verb, "bays": list(bays) or None})["results"])
 
     def status(self, only: str | None = None) -> dict[str, Document]:
-        """The status of every bay, or of one, by its name."""
+        """The status of every bay, or of one, by name."""
         bays = cast("list[Document]", ask(self.socket, {"verb": "status", "bay": only})["bays"])
         return {bay["name"]: bay for bay in bays}
 
     def strays(self) -> list[Document]:
-        """The chargers in hand that the station file has not any more."""
+        """The chargers in hand no longer in the station file."""
         return cast("list[Document]", ask(self.socket, {"verb": "status", "bay": None})["strays"])
 
     def bay(self, name: str = "bay-1") -> Document:
@@ -176,7 +176,7 @@ class Service:
         return arrived
 
     def cli(self, *args: str) -> subprocess.CompletedProcess[str]:
-        """One verb on the real command line, with this service's socket in the environment."""
+        """Run one verb on the real command line, with this service's socket in the environment."""
         return orchestrator(*args, env={"ORCHESTRATOR_SOCKET": str(self.socket)})
 
     # --- what it wrote ---
@@ -193,7 +193,7 @@ class Service:
         return [record for record in records if record["bay"] == bay and record["kind"] == kind]
 
     def path_of(self, bay: str) -> list[str]:
-        """The states that the journal says the bay went through."""
+        """The bay's states according to the journal."""
         return [record["to"] for record in self.journal(bay, "transition")]
 
 
@@ -221,7 +221,7 @@ def whole_station(
     change: Callable[[Document], None] = lambda _: None,
     buses: int = 1,
 ) -> Iterator[tuple[PlantProcess, Service]]:
-    """A plant that runs and a service that is not started yet, on buses and ports of their own.
+    """A running plant and a service not started yet, on separate buses and ports.
 
     `change` may alter the station's document before it is written.
     """

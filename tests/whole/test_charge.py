@@ -1,4 +1,4 @@
-"""A deeply discharged pack is charged full by the running service, over every kind of serial line."""
+"""The running service charges a deeply discharged pack to full, over every kind of serial line."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -10,13 +10,13 @@ from orchestrator.sim.line import LINES
 from tests.waiting import wait_until
 from tests.whole.station import Service, whole_station
 
-#: What a bad line may raise, and rightly a SOC that goes up by 8 % in a second; all else would be a false alarm.
+#: Faults a bad line may raise, and rightly an 8 % jump of SOC in a second; all others would be false alarms.
 ALLOWED = {"noisy_line", "soc_jump"}
 
 
 @pytest.fixture(name="stations", scope="module")
 def _stations(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tuple[PlantProcess, Service]]]:
-    """One station a line, all charging at one time; their packs live four times as fast as real ones."""
+    """One station per line, all charging at once; their packs run four times as fast as real ones."""
     with ExitStack() as stack:
         stations = {
             line: stack.enter_context(

@@ -1,4 +1,4 @@
-"""A whole station that names a contactor: without its chip nothing charges, without the library nothing starts."""
+"""A whole station with a contactor: without its chip nothing charges, without the library nothing starts."""
 
 import json
 import os

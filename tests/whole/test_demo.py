@@ -1,4 +1,4 @@
-"""The demo as people start it: it ends as it should, and nothing of it can be reached from outside the machine."""
+"""The demo as people start it: it ends properly, and cannot be reached from outside the machine."""
 
 import os
 import subprocess
@@ -11,7 +11,7 @@ from orchestrator.demo.stage import Stage
 from tests.waiting import wait_until
 from tests.whole.station import die_with_parent
 
-#: Every socket of this machine that speaks to a network, by the kernel's tables; their column with the inode.
+#: The kernel's tables of all network sockets on this machine; their inode column.
 TABLES = {"tcp": 9, "tcp6": 9, "udp": 9, "udp6": 9, "raw": 9, "raw6": 9, "packet": 8}
 
 

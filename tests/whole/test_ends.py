@@ -1,4 +1,4 @@
-"""How the service begins and ends: signals, a sudden death, chargers found running, files that cannot be used."""
+"""How the service starts and ends: signals, sudden death, chargers found running, unusable files."""
 
 import json
 import signal
@@ -37,7 +37,7 @@ def test_a_charger_that_does_not_stop_makes_the_end_a_bad_one(tmp_path: Path) ->
         service.signal(signal.SIGTERM)
         assert service.ended() == 1
         assert service.log().splitlines()[-1] == "ended: NOT verified: bay-1"
-        assert plant.state()["stops"] > 5  # it went on trying, each 500 ms
+        assert plant.state()["stops"] > 5  # it kept trying, every 500 ms
 
 
 def test_a_charger_that_was_left_running_is_stopped_first_and_held(tmp_path: Path) -> None:
@@ -45,8 +45,8 @@ def test_a_charger_that_was_left_running_is_stopped_first_and_held(tmp_path: Pat
         charging(plant, service.start())
         wait_until(lambda: kept(service)["running"], what="what is kept")
         service.kill_all()
-        assert plant.state()["operation"] == 1  # nobody stopped it: that is what a charger does
-        plant.inject("heal")  # wait anew for the first byte
+        assert plant.state()["operation"] == 1  # nobody stopped it: chargers keep running
+        plant.inject("heal")  # wait again for the first byte
         service.start()
         wait_until(lambda: plant.state()["operation"] == 0, what="the stop")
         truth = plant.state()
@@ -99,7 +99,7 @@ def test_a_restart_is_neither_a_reset_nor_a_start(tmp_path: Path) -> None:
             service.wait("HELD", ["bay-2"])["bay-2"]["reason"]
             == "stopped by the operator; to go on: orchestrator start bay-2"
         )
-        service.wait("CHARGING", ["bay-3"])  # its stop was the service's own
+        service.wait("CHARGING", ["bay-3"])  # its stop came from the service
         wait_until(lambda: not service.ask("reset", "bay-1")["bay-1"], what="a reset that is accepted")
         service.ask("start", "bay-1", "bay-2")
         service.wait("CHARGING", ["bay-1", "bay-2"])

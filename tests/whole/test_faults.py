@@ -1,4 +1,4 @@
-"""Every fault that the emulated station can have, each in a bay of its own, all at once in one running service."""
+"""Every fault the emulated station can have, each in its own bay, all at once in one running service."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,26 +11,26 @@ from orchestrator.sim.faults import FAULTS
 from tests.waiting import wait_until
 from tests.whole.station import Document, Service, whole_station
 
-#: What must be cut off at once, with a poll, a sweep and a busy machine in between.
+#: For faults that stop at once, with a poll, a sweep and a busy machine in between.
 AT_ONCE_S = 2.0
-#: What is noticed by silence (DESIGN §6: 2 s), on a busy machine.
+#: For faults noticed by silence (2 s), on a busy machine.
 SILENCE_S = 3.0
 
 
 @dataclass(frozen=True)
 class Case:
-    """A fault, where its bay ends, the fault that the journal must name, and how soon the charger must see a stop."""
+    """A fault, its bay's final state, the fault the journal must name, and how soon the charger must get a stop."""
 
     name: str
     state: str
     fault: str
-    stop_s: float | None = AT_ONCE_S  #: None: no stop can come through, or none is due
-    before: str = "charging"  #: what the bay does when it happens: charging, stopped or precharge
+    stop_s: float | None = AT_ONCE_S  #: None: no stop can get through, or none is due
+    before: str = "charging"  #: the bay's activity at that time: charging, stopped or precharge
     instead: str = ""  #: another fault that may be noticed first
 
 
 CASES = (
-    Case("bmu_reboot", "SUSPENDED", "bmu_rebooted"),  # goes on after 20 s, so it is looked at first
+    Case("bmu_reboot", "SUSPENDED", "bmu_rebooted"),  # resumes after 20 s, so it is checked first
     Case("line_taken_over", "SUSPENDED", "line_taken_over", SILENCE_S, instead="line_changed"),  # so does this
     Case("reverse_polarity", "TRIPPED", "reverse_polarity"),
     Case("error_stop", "TRIPPED", "error_stop"),
@@ -46,16 +46,16 @@ CASES = (
     Case("temperature_jump", "TRIPPED", "temperature_invalid"),
     Case("over_temperature", "SUSPENDED", "over_temperature", 10.0),
     Case("under_temperature", "SUSPENDED", "under_temperature", 10.0),
-    Case("over_voltage", "TRIPPED", "over_voltage", instead="status_trip"),  # the BMU may say it first
+    Case("over_voltage", "TRIPPED", "over_voltage", instead="status_trip"),  # the BMU may report it first
     Case("over_current", "TRIPPED", "over_current"),
     Case("volts_disagree", "TRIPPED", "volts_disagree", 3 + AT_ONCE_S),
-    # The BMU goes on seeing 3 A that nobody ordered: nobody can know that it is the one that is wrong.
+    # The BMU keeps seeing 3 A that nobody commanded: nobody can know that it is the one that is wrong.
     Case("amps_disagree", "UNCONTROLLABLE", "amps_disagree", 5 + AT_ONCE_S),
     Case("says_standby", "HELD", "stopped_by_itself"),
     Case("says_standby_now_and_then", "HELD", "stopped_by_itself", SILENCE_S),
-    Case("stopped_elsewhere", "HELD", "stopped_by_itself"),  # its mode 5 is no full: nothing had tapered off
+    Case("stopped_elsewhere", "HELD", "stopped_by_itself"),  # its mode 5 does not mean full: nothing had tapered off
     Case("pack_collapsed", "TRIPPED", "pack_collapsed"),
-    Case("another_pack", "TRIPPED", "pack_collapsed", instead="volts_disagree"),  # in mid-charge its volts fall first
+    Case("another_pack", "TRIPPED", "pack_collapsed", instead="volts_disagree"),  # in mid-charge its volts drop first
     Case("status_bits", "TRIPPED", "status_trip"),
     Case("emergency", "HELD", "emergency"),
     Case("rogue_run", "TRIPPED", "rogue_run", 2 + AT_ONCE_S, before="stopped"),
@@ -70,14 +70,14 @@ CASES = (
     Case("port_gone", "UNCONTROLLABLE", "charger_silent", None),
 )
 BAYS = {case.name: number for number, case in enumerate(CASES, 1)}
-#: In these the charger goes on, whatever we do: that is what the alarm is for.
+#: In these the charger runs on whatever we do: the alarm is for this.
 GOES_ON = {"charger_cut_off", "charger_error_frames", "ignore_stop", "port_gone"}
-#: This one shows only when somebody stops the bay.
+#: This one shows only when the bay is stopped.
 STOPPED_BY = "stopped by the operator"
 
 
 def leisurely(document: Document) -> None:
-    """One emulator serves them all; it must not become the slow device that is found. All of them begin at once."""
+    """One emulator serves them all and must not become the slow device itself. All of them start at once."""
     document["stagger_s"] = 0
     for bay in document["bays"]:
         bay["battery"]["sweep_s"] = 0.2
@@ -93,7 +93,7 @@ def bay_of(case: Case) -> str:
 
 @pytest.fixture(name="station", scope="module")
 def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PlantProcess, Service]]:
-    """Every bay in the middle of a charge, one more than there are faults; then everything happens at once."""
+    """Every bay in mid-charge, one more than there are faults; then everything happens at once."""
     directory = tmp_path_factory.mktemp("faults")
     bays = len(CASES) + 1
     with whole_station(directory, bays, "--line", "perfect", change=leisurely, buses=2) as (plant, service):
@@ -117,7 +117,7 @@ def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[PlantPr
 
 
 def named(service: Service, case: Case) -> bool:
-    """The journal has the fault, and as the reason of the stop."""
+    """The journal has the fault, as the reason of the stop."""
     bay = bay_of(case)
     texts = {line["text"]: line["id"] for line in service.journal(bay, "fault") if line["event"] == "raised"}
     stops = [line["reason"] for line in service.journal(bay, "transition") if line["to"] == "STOPPING"]
@@ -127,8 +127,8 @@ def named(service: Service, case: Case) -> bool:
 
 
 def test_every_fault_is_tried() -> None:
-    # A sensor that goes on saying the temperature of now cannot be told from a pack that keeps it; a charger that goes
-    # on saying its volts and amps takes a minute to be found out (tests/core), as a BMU does; a SOC that jumps stops
+    # A stuck temperature sensor cannot be told from a pack at constant temperature; a charger that keeps
+    # reporting the same volts and amps takes a minute to detect (tests/core), as does a BMU; a SOC jump stops
     # nothing. The others need a second act: another start, a lower limit, a second stop (tests/proof/scenes.py).
     later = {"port_locked", "limit_reverts", "runs_again", "obeys_once"}
     slow = {"frozen_temperature", "frozen_charger", "bmu_frozen", "soc_jump"}

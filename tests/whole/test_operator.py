@@ -1,4 +1,4 @@
-"""What an operator does with the real command line, and with the plugs."""
+"""An operator's actions, with the real command line and with the plugs."""
 
 import json
 import resource
@@ -21,7 +21,7 @@ Station = tuple[PlantProcess, Service]
 
 
 def one_automatic(document: Document) -> None:
-    """The third bay's charger is said to be in automatic mode; the fourth one's port does not exist."""
+    """The third bay's charger is configured as automatic; the fourth one's port does not exist."""
     document["bays"][2]["charger"]["control"] = "automatic"
     document["bays"][3]["charger"]["port"] += "-missing"
 
@@ -34,7 +34,7 @@ def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
 
 
 def charging(station: Station, bay: int = 1) -> None:
-    """Bring a bay to where most of these tests begin, and wait until its current is up."""
+    """Bring a bay to the start of most of these tests, and wait until its current is up."""
     plant, service = station
     service.ask("start", f"bay-{bay}")
     service.wait("CHARGING", [f"bay-{bay}"])
@@ -66,7 +66,7 @@ def test_pause_and_start(station: Station) -> None:
     charging(station)
     plant, service = station
     done = service.cli("pause", "bay-1")
-    assert plant.state()["operation"] == 0  # as soon as the command line says so
+    assert plant.state()["operation"] == 0  # as soon as the command line confirms it
     assert (done.returncode, done.stdout) == (0, "bay-1: pause accepted; stands by, verified\n")
     service.wait("SUSPENDED")
     assert service.bay("bay-2")["state"] == "CHARGING"
@@ -105,7 +105,7 @@ def test_stop_holds_until_start(station: Station) -> None:
 
 
 def test_a_stop_that_nobody_could_verify_is_no_success(station: Station) -> None:
-    """The fourth bay's port is not there: what stands behind it may be doing anything."""
+    """The fourth bay's port is missing: its charger may be doing anything."""
     _, service = station
     done = service.cli("stop", "bay-4", "bay-2")
     assert done.returncode == 1
@@ -204,7 +204,7 @@ def test_a_second_service_cannot_take_the_ports(station: Station, tmp_path: Path
     charging(station)
     plant, service = station
     document = json.loads(service.file.read_text(encoding="utf-8"))
-    document["can"]["can0"] |= udp_keys()  # two masters on one bus would stop the charge, and rightly so
+    document["can"]["can0"] |= udp_keys()  # two masters on one bus would rightly stop the charge
     thief = Service(tmp_path, document)
     try:
         bay = thief.start().wait("OFFLINE")["bay-1"]
@@ -236,7 +236,7 @@ def test_an_adapter_that_is_unplugged_and_plugged_in_again(station: Station) -> 
     service.wait("SUSPENDED")
     truth = plant.state()
     assert (truth["operation"], truth["resting"]) == (0, True)
-    assert truth["first_stop_s"] == truth["first_byte_s"]  # the first that came over the new line was a stop
+    assert truth["first_stop_s"] == truth["first_byte_s"]  # the first frame on the new line was a stop
     service.wait("CHARGING", timeout_s=40)  # by itself, after the backoff
 
 
@@ -249,7 +249,7 @@ def test_a_battery_that_leaves_and_another_that_comes(station: Station) -> None:
     plant.inject("heal")
     wait_until(lambda: "SOC 99 % is not below 98 %" in service.bay()["reason"], 10, "the fuller battery is left alone")
     plant.set(soc_pct=40)
-    service.wait("CHARGING", timeout_s=40)  # after the backoff of a battery that left in mid-charge
+    service.wait("CHARGING", timeout_s=40)  # after the backoff of a battery removed in mid-charge
 
 
 def test_who_watches_goes_on_when_the_service_is_started_anew(tmp_path: Path) -> None:

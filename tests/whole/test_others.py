@@ -1,4 +1,4 @@
-"""The running service beside others on its bus: a BMU with a main loop, a second master, a forger."""
+"""The running service next to others on its bus: a BMU with a main loop, a second master, a forger."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -15,7 +15,7 @@ from orchestrator.sim.second_master import SecondMaster
 from tests.waiting import wait_until
 from tests.whole.station import Document, whole_station
 
-#: What only says that somebody else is there.
+#: Faults that only report somebody else's presence.
 SAID = {"other_master", "heartbeat_set", "soc_jump"}
 NODE_ID = 0x10
 

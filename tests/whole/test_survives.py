@@ -1,4 +1,4 @@
-"""What a restart must not forget, by real processes: disks that are full, readers that stand still, edited files."""
+"""What must survive a restart, with real processes: full disks, stopped readers, edited files."""
 
 import json
 import os
@@ -58,14 +58,14 @@ def test_an_accepted_stop_outlives_a_kill_right_after_it(station: Station) -> No
 
 
 def test_a_stop_while_the_service_ends_is_kept(station: Station) -> None:
-    """systemctl restart, and somebody presses stop in the same second."""
+    """systemctl restart, with an operator's stop in the same second."""
     plant, service = station
     charging(plant, service.start(), 1, 2)
     service.signal(signal.SIGTERM)
     try:
         accepted = service.ask("stop", "bay-1") == {"bay-1": ""}
     except ServiceError:
-        accepted = False  # it was late: nobody has told that it was accepted
+        accepted = False  # too late: nobody was told it was accepted
     assert service.ended() == 0
     service.start()
     if accepted:
@@ -74,7 +74,7 @@ def test_a_stop_while_the_service_ends_is_kept(station: Station) -> None:
 
 
 def test_a_reader_that_stands_still_delays_neither_the_stop_nor_what_is_kept(station: Station) -> None:
-    """Ctrl-S on the terminal, or a log collector that hangs: the pipe is full before the service says a word."""
+    """Ctrl-S on the terminal, or a hanging log collector: the pipe is full before the service writes anything."""
     plant, service = station
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -114,7 +114,7 @@ def test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one(station: Station) -
 
 @pytest.mark.parametrize("call", ["fsync", "write"])
 def test_a_disk_that_hangs_delays_no_stop_and_is_named_at_the_end(station: Station, call: str) -> None:
-    """A worn SD card. The charger stops at once, who asked is told that it is not kept, and the end has an end."""
+    """A worn SD card. The charger stops at once, the operator is told it is not persisted, and shutdown finishes."""
     plant, healthy = station
     service = Service(healthy.directory, json.loads(healthy.file.read_text()), ("-m", "tests.whole.worn", call))
     try:

@@ -1,7 +1,7 @@
-"""The unchanged service on a disk that hangs from SIGUSR1 on: `python -m tests.whole.worn CALL [FD] STATION`.
+"""The unchanged service on a disk that hangs after SIGUSR1: `python -m tests.whole.worn CALL [FD] STATION`.
 
-CALL is the call of the kernel's that does not return any more, for the store and for the journal; with "now-" before it
-it never does. Without FD it is the guardian, and starts itself as its controller.
+CALL is the system call that stops returning, for the store and the journal; with "now-" before it it never returns.
+Without FD it is the guardian, and starts itself as its controller.
 """
 
 import os
@@ -16,7 +16,7 @@ ARMED = threading.Event()
 
 
 class Worn:
-    """`os`, but for one call."""
+    """`os`, except for one call."""
 
     def __init__(self, call: str) -> None:
         self._call = call.removeprefix("now-")

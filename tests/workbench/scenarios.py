@@ -8,7 +8,7 @@ from orchestrator.config.scenario import BatteryModel, Cell, Scenario, Visit, We
 
 
 def battery(**changes: Any) -> BatteryModel:
-    """A small 13S pack that is full in about half an hour."""
+    """A small 13S pack, full in about half an hour."""
     values: dict[str, Any] = {
         "cells": Cell.NMC, "cells_in_series": 13, "capacity_ah": 8.0, "resistance_ohm": 0.05, "arrhenius_k": 2200.0,
         "polarisation_ohm": 0.03, "heat_j_per_k": 6000.0, "cooling_w_per_k": 2.0,

@@ -1,4 +1,4 @@
-"""`orchestrator simulate`, as it is typed."""
+"""`orchestrator simulate` on the command line."""
 
 import subprocess
 import sys

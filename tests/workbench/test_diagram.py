@@ -1,4 +1,4 @@
-"""The picture of the state machine: all of the table is in it, and what a policy says of it."""
+"""The diagram of the state machine: it shows the whole table, with the values of a policy."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ Transitions = set[tuple[str, str, str]]
 
 
 def shown(of: Diagram) -> Transitions:
-    """Every transition that the picture shows, as a person would read it."""
+    """Every transition in the diagram, as a person would read it."""
     members: dict[str, tuple[State, ...]] = {group.name: group.states for group in of.groups}
     inside = {
         (group.name, *line.split(" → ")) for group in of.groups for line in group.lines if " → " in line

@@ -1,4 +1,4 @@
-"""`check --exhaustive`: what it says of policies that break something, and of one that does not."""
+"""`check --exhaustive`: its findings on policies that break something, and on one that does not."""
 
 from multiprocessing import get_context
 from pathlib import Path
@@ -17,7 +17,7 @@ from orchestrator.workbench.prove.lasting import reaches
 from tests.proof.exploring import small, walk_on
 
 ROOT = Path(__file__).parent
-#: Policy → what it breaks, and how the story ends. All three are fine by every rule of `check`.
+#: Policy → what it breaks, and the end of the counterexample. All three pass every rule of `check`.
 BROKEN = {
     "odd/narrow": (
         "charges",
@@ -61,9 +61,9 @@ def test_bays_that_differ_in_wiring_only_are_proved_once() -> None:
 def test_the_command_explores_on_every_core(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The whole way, on a bay with few inputs: the same findings as in one process."""
+    """The complete run, on a bay with few inputs: the same findings as in one process."""
     monkeypatch.setattr(exhaustive, "StationInputs", SimpleNamespace(of=small))
-    monkeypatch.setattr(processes, "get_context", lambda _: get_context("fork"))  # children have those few, too
+    monkeypatch.setattr(processes, "get_context", lambda _: get_context("fork"))  # children have those few too
     assert main(["check", "--exhaustive", "--jobs", "2", str(ROOT / "broken" / "automatic.yaml")]) == 1
     said, told = capsys.readouterr()
     assert said.startswith(f"{ROOT}/broken/automatic.yaml, bay-1: 32 properties, 2 BROKEN; ")

@@ -1,4 +1,4 @@
-"""The figures are those of the moments and spans that they are drawn from."""
+"""The figures match the moments and spans they are drawn from."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Time that stretches changes no decision: hours in leaps and hours in ticks end alike."""
+"""Leaps in time change no decision: hours in leaps and hours in ticks end alike."""
 
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future
@@ -19,7 +19,7 @@ from orchestrator.workbench.simulate.leap import outline
 from orchestrator.workbench.simulate.simulation import Run, Simulation, simulate
 from tests.workbench.scenarios import battery, scenario
 
-#: Hours of each shipped scenario that are stepped through tick by tick: up to behind what is special to it.
+#: Hours of each shipped scenario simulated tick by tick: until after its special event.
 SHIPPED = {
     "aged-pack": 2.2,
     "agv-day": 2.1,
@@ -33,7 +33,7 @@ SAME_S = 4 * TICK_S
 
 
 def same(leaps: Run, ticks: Run) -> None:
-    """Every state, step, rule and fault, in the same order and at the same time."""
+    """Every state, current step, rule and fault, in the same order and at the same time."""
     assert [span.rule for span in leaps.trail.spans] == [span.rule for span in ticks.trail.spans]
     for leapt, ticked in zip(leaps.trail.spans, ticks.trail.spans, strict=True):
         assert leapt.from_s == pytest.approx(ticked.from_s, abs=SAME_S), (leapt, ticked)
@@ -50,7 +50,7 @@ def leaps_and_ticks(name: str) -> tuple[Run, Run]:
 
 @pytest.fixture(name="played", scope="module")
 def _played() -> Iterator[Mapping[str, Future[tuple[Run, Run]]]]:
-    """Tens of thousands of steps each, on all cores."""
+    """Tens of thousands of decisions each, on all cores."""
     with cores() as pool:
         yield {name: pool.submit(leaps_and_ticks, name) for name in SHIPPED}
 
@@ -69,7 +69,7 @@ def test_leaps_decide_what_ticks_decide_to_the_end_of_a_charge() -> None:
 
 
 def test_leaps_decide_what_ticks_decide_where_limits_are_held_and_left() -> None:
-    """A policy with many bands, a sensor that drifts, an operator who pauses, and the Ah limit at the end."""
+    """A policy with many bands, a drifting sensor, an operator's pause, and the Ah limit at the end."""
     policy = load_policy("lfp-48v", changes={"pack.cells_in_series": "13", "pack.voltage_v[1]": "55.2",
                                              "current.voltage_v.rows[2].to": "56.5", "finish.max_ah": "3",
                                              "pack.chemistry": "nmc",
@@ -87,7 +87,7 @@ def test_leaps_decide_what_ticks_decide_where_limits_are_held_and_left() -> None
 
 
 def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sums and kept temperatures too: what the fault table looks at, a leap must not lose."""
+    """Sums and remembered temperatures too: a leap must not lose what the fault table uses."""
     memories: list[Memory] = []
 
     def recorded(*arguments: object) -> tuple[Decision, Memory]:

@@ -1,4 +1,4 @@
-"""What is allowed and can hardly be meant: every warning on a file of its own, and none on what ships."""
+"""Allowed but hardly intended: every warning on its own file, and none on the shipped files."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def test_each_is_told_at_its_key(
 
 
 def test_the_files_have_every_warning() -> None:
-    """Each text of the lint appears in one of them."""
+    """Each text of the lint occurs in one of them."""
     said = "\n".join(path.read_text(encoding="utf-8") for path in ODD.glob("*.txt"))
     for words in (
         "precharge never begins", "the pulse stage ends as it begins", "the taper is never seen", "only the BMU's own",

@@ -1,6 +1,6 @@
-"""What ships charges: each policy through a grid of ordinary charges, in a hall of 2 to 38 °C.
+"""The shipped policies charge: each one in a grid of ordinary charges, in a hall of 2 to 38 °C.
 
-Full or at the target, nothing latches, and the step changes a few times at most. `python -m
+Full or at the target, nothing latches, and the current step changes a few times at most. `python -m
 tests.workbench.test_ordinary_charges` plays the fine grid.
 """
 
@@ -32,12 +32,12 @@ from orchestrator.model import State
 from orchestrator.workbench.simulate.figures import figures
 from orchestrator.workbench.simulate.simulation import Run, simulate
 
-#: A charger for a pack of this current: its steps, as shares of that.
+#: A charger for a pack of this current: its steps, as shares of it.
 STEPS = (0.05, 0.2, 0.4, 0.7, 1.0)
-#: End voltage of a charger, V a cell.
+#: End voltage of a charger, V per cell.
 CV_V = {CellType.NMC: 4.20, CellType.NCA: 4.20, CellType.LFP: 3.60}
 MOST_CHANGES = 6
-#: A pack that is full, or at its target, is there to within this: the resolution of a BMU, and what a taper leaves.
+#: Tolerance of "full" or "at the target": the resolution of a BMU, and the rest left by a taper.
 WITHIN_PCT = 2.5
 
 
@@ -69,7 +69,7 @@ class Ordinary:
 
 
 def charger_for(policy: Policy) -> ChargerModel:
-    """What one would put beside such a pack: the charger of the shipped stations, or one in proportion."""
+    """A suitable charger for such a pack: that of the shipped stations, or one in proportion."""
     pack = policy.pack
     shipped = pack.current_a <= 14
     steps_a = (2.0, 5.0, 8.0, 11.0, 14.0) if shipped else tuple(share * pack.current_a for share in STEPS)
@@ -94,7 +94,7 @@ def pack_for(policy: Policy, model: BatteryModel) -> BatteryModel:
 
 
 def problems(ordinary: Ordinary) -> Iterator[str]:
-    """What is not as it should be about a charge."""
+    """Everything wrong with a charge."""
     run = simulate(load_policy(ordinary.policy), ordinary.scenario)
     found = figures(run)
     target_pct = run.policy.finish.target_soc_pct - (
@@ -111,7 +111,7 @@ def problems(ordinary: Ordinary) -> Iterator[str]:
 
 
 def changes(run: Run) -> int:
-    """Of the whole charge, over every pause."""
+    """For the whole charge, across every pause."""
     steps = [span.step for span in run.trail.spans if span.step is not None]
     return sum(before != now for before, now in pairwise(steps))
 
@@ -131,12 +131,12 @@ def test_an_ordinary_charge_ends_as_it_should(ordinary: Ordinary) -> None:
 @pytest.mark.parametrize("told_more_pct", [-8.0, 8.0])
 @pytest.mark.parametrize("policy", ["li-ion-48v", "li-ion-24v", "lfp-48v", "telecom-lfp-15s"])
 def test_a_bmu_that_reads_wrong_does_not_end_a_full_charge(policy: str, told_more_pct: float) -> None:
-    """8 % too much left a pack at 91.5 %."""
+    """A SOC reading 8 % too high left a pack at 91.5 %."""
     assert list(problems(Ordinary(policy, 20.0, 30.0, told_more_pct=told_more_pct))) == []
 
 
 def test_nothing_chatters_on_a_hot_afternoon() -> None:
-    """67 changes of the step they were, around a bound at 35 °C."""
+    """There were once 67 changes of the step, around a bound at 35 °C."""
     for policy in ("long-life-48v", "li-ion-48v"):
         run = simulate(load_policy(policy), load_scenario("hot-afternoon"))
         assert changes(run) <= 4, policy
@@ -154,7 +154,7 @@ def main() -> int:
         ordinary = Ordinary(policy, hall_c, soc_pct, soh_pct)
         if found := list(problems(ordinary)):
             wrong += 1
-            print(ordinary, *found, sep="\n    ")  # noqa: T201 - it is its purpose
+            print(ordinary, *found, sep="\n    ")  # noqa: T201 - it is the purpose
     print(f"{wrong} of them are not as they should be")  # noqa: T201
     return int(wrong > 0)
 

@@ -1,4 +1,4 @@
-"""The page stands alone, tells everything, and takes no text for markup."""
+"""The page is self-contained and complete, and escapes all text."""
 
 import re
 from dataclasses import replace
@@ -14,12 +14,12 @@ from orchestrator.workbench.draw.present import save
 from orchestrator.workbench.simulate.simulation import Run, simulate
 from tests.workbench.scenarios import scenario
 
-#: Tags that have no end.
+#: Tags without an end tag.
 VOID = {"meta", "br"}
 
 
 class Tags(HTMLParser):
-    """Whether every tag is closed, and what text stands outside of scripts and styles."""
+    """Checks that every tag is closed, and collects the text outside scripts and styles."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The physics come out right, however coarsely time is cut."""
+"""The physics are right, however coarse the time steps."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from tests.workbench.scenarios import battery, scenario
 
 
 def charging(soc_pct: float = 30.0, **changes: float) -> Plant:
-    """A plant whose charger runs on its highest step."""
+    """A plant with its charger on the highest step."""
     plant = Plant(scenario(batteries={"pack-1": battery(**changes)}))
     plant.arrive(Visit(battery="pack-1", from_h=0, soc_pct=soc_pct))
     plant.charger.push(Push.CURRENT_LIMIT, 4)
@@ -22,7 +22,7 @@ def charging(soc_pct: float = 30.0, **changes: float) -> Plant:
 
 @pytest.mark.parametrize("hours", [0.2, 0.45])
 def test_the_size_of_the_pieces_does_not_show(hours: float) -> None:
-    """With the constant current, and deep in the taper, where it falls by a third in a minute."""
+    """At constant current, and deep in the taper, where it falls by a third in a minute."""
     coarse, fine = charging(), charging()
     for _ in range(round(hours * 60)):
         coarse.advance(60)

@@ -1,4 +1,4 @@
-"""A journal, read back and decided again: the same decisions from the same rules, and what others would have been."""
+"""A journal, read and replayed: the same decisions from the same rules, and the differences with other rules."""
 
 import gzip
 import json
@@ -24,7 +24,7 @@ from tests.service.bench import STEP_S, Bench
 
 @pytest.fixture(name="journal", scope="module")
 def _journal(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A charge to full, with a cold hour in it, a pause and a quiet night behind it."""
+    """A charge to full, with a cold hour, a pause and a quiet night after it."""
     bench = Bench(tmp_path_factory.mktemp("journal"), max_mb=100.0)
 
     def pass_s(seconds: float) -> None:
@@ -85,7 +85,7 @@ def test_a_core_that_decides_otherwise_is_seen(
 
 
 def test_a_value_that_was_altered_is_seen_in_the_memory(journal: Path, tmp_path: Path) -> None:
-    """Where the sentences do not show it, the memory that it leads to does."""
+    """Where the sentences do not show it, the resulting memory does."""
     copy = tmp_path / "copy"
     shutil.copytree(journal, copy)
     (path,) = (one for one in copy.glob("snapshots*.jsonl") if '"voltage_v":50.4,"current_a":2.0' in one.read_text())
@@ -179,7 +179,7 @@ def test_a_line_that_a_power_failure_cut_off_is_passed_over(journal: Path, tmp_p
 
 
 def one_run(directory: Path, began_s: float, wall_s: float, *, trip: bool = False) -> None:
-    """The service runs for a while, from this monotonic time on, and ends; or it trips, and is still there."""
+    """The service runs for a while from this monotonic time and ends; or it trips and stays."""
     bench = Bench(directory, max_mb=100.0, now_s=began_s, wall=lambda: wall_s + bench.now_s - began_s)
     bench.charging()
     if trip:
@@ -192,7 +192,7 @@ def one_run(directory: Path, began_s: float, wall_s: float, *, trip: bool = Fals
 
 
 def replayed(directory: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """What `replay` says of it; it must be as recorded."""
+    """The output of `replay` on it; decisions must be as recorded."""
     code = main(["replay", str(directory)])
     out = capsys.readouterr().out
     assert code == 0, out
@@ -201,7 +201,7 @@ def replayed(directory: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def texts(directory: Path) -> set[str]:
-    """The faults that the record has, in words, with the day on which they came."""
+    """The recorded faults in words, with their dates."""
     steps = read([directory]).bays["bay-1"]
     return {
         f"{step.wall[:10]} {fields['id']}" for step in steps for kind, fields in step.events if kind == "fault"
@@ -225,7 +225,7 @@ def test_a_restart_is_as_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_a_reboot_loses_nothing_of_either_boot(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], began_s: float
 ) -> None:
-    """The monotonic clock begins anew, and may come to the same times again."""
+    """The monotonic clock starts again and may repeat times."""
     one_run(tmp_path, 1000.0, MONDAY_S)
     one_run(tmp_path, began_s, MONDAY_S + DAY_S, trip=True)
     replayed(tmp_path, capsys)
@@ -276,7 +276,7 @@ def test_steps_that_no_disk_took_are_a_gap_and_no_other_decision(
 
 
 def _continues(text: str) -> int:
-    """How many lines at the beginning continue a file that is not there."""
+    """The number of lines at the start that continue a missing file."""
     lines = [json.loads(line) for line in text.splitlines()]
     return next(number for number, line in enumerate(lines) if line.get("whole"))
 

@@ -1,4 +1,4 @@
-"""A scenario comes to the bay as it is written: batteries come and go, sensors lie, an operator asks."""
+"""A scenario reaches the bay as written: batteries come and go, sensors lie, an operator makes requests."""
 
 from itertools import pairwise
 
@@ -16,7 +16,7 @@ POLICY = load_policy("li-ion-48v")
 
 
 def states(run: Run) -> list[State]:
-    """The states that lasted, each once in a row."""
+    """The lasting states, without consecutive repeats."""
     lasting = [span.state for span in run.trail.spans if span.to_s - span.from_s > 5]
     return [now for before, now in zip([None, *lasting], lasting, strict=False) if now is not before]
 
@@ -90,7 +90,7 @@ def test_the_weather_is_straight_between_its_rows() -> None:
     ],
 )
 def test_a_sensor_fault_is_seen(defect: Defect, sensor: Sensor, by: float, fault: str) -> None:
-    """A current that is stuck when the charge begins is one of 0 A."""
+    """A current reading stuck at the start of the charge is 0 A."""
     lie = SensorFault(sensor=sensor, defect=defect, by=by, from_h=0.0003 if defect is Defect.STUCK else 0.1)
     run = simulate(POLICY, scenario(0.3, sensors=(lie,)))
     raised = [span for span in run.trail.spans if fault in span.faults]

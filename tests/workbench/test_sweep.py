@@ -1,4 +1,4 @@
-"""Keys of a policy are swept: every combination, on all cores or a cluster, and what may not be is said."""
+"""Sweeps over policy keys: every combination, on all cores or a cluster, with messages for invalid ones."""
 
 import csv
 from dataclasses import replace

@@ -1,1 +1,1 @@
-"""Strict YAML into frozen dataclasses, with file, line and column for each mistake."""
+"""Reads strict YAML into frozen dataclasses, with file, line and column for each mistake."""

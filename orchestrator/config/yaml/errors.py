@@ -1,10 +1,10 @@
-"""What YAML's parser complains about, said so that a person knows what to mend."""
+"""Translates the YAML parser's complaints into messages that tell a person what to fix."""
 
 import re
 
 import yaml
 
-#: (pattern in the parser's problem, pattern in its context, point at where the construct began?, what we say)
+#: (pattern in the parser's problem, pattern in its context, point to where the construct began?, our message)
 _EXPLANATIONS: tuple[tuple[str, str, bool, str], ...] = (
     (
         "mapping values are not allowed here",
@@ -90,7 +90,7 @@ _EXPLANATIONS: tuple[tuple[str, str, bool, str], ...] = (
 
 
 def explain(error: yaml.MarkedYAMLError) -> tuple[int, int, str]:
-    """Line and column (from 1), and what to do about a YAML error."""
+    """The line and column (from 1) of a YAML error, and what to do about it."""
     problem, context = str(error.problem), str(error.context)
     began = error.context_mark or error.problem_mark
     for pattern, within, at_start, text in _EXPLANATIONS:

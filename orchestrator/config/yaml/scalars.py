@@ -1,7 +1,7 @@
-"""One scalar's text into the type that its key expects, or a sentence that says what should have been written.
+"""Converts a scalar's text to the type that its key expects, or says what should have been written.
 
-YAML's own guessing is not used: to it `on` is true, `1:30` is 90, `012` is 10, `19:20:00` is 69600 and `1e3` is a text.
-Here the key decides what is expected; whatever other YAML readers would take differently is refused.
+YAML's own type resolution is not used: it reads `on` as true, `1:30` as 90, `012` as 10, `19:20:00` as 69600 and `1e3`
+as text. Here the key determines the type; anything that other YAML readers would read differently is refused.
 """
 
 import math
@@ -19,18 +19,18 @@ _NULL = re.compile(r"~|null", re.IGNORECASE)
 _TRUE = {"true", "yes", "on", "y", "1"}
 _FALSE = {"false", "no", "off", "n", "0"}
 _RANGE = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:\.\.+|…|-|–|~|to|,|;|:|/)\s*([-+]?\d+(?:\.\d+)?)", re.ASCII)
-_MAX_DIGITS = 40  #: of a number; more is nonsense
-_ALIKE = 0.6  #: of 1; below, two words are not a slip of each other
-_MAX_WORD = 64  #: that is compared with others
+_MAX_DIGITS = 40  #: in a number; more is nonsense
+_ALIKE = 0.6  #: out of 1; below it, one word is not a typo of the other
+_MAX_WORD = 64  #: the longest word that is compared with others
 _MAX_PATH = 4096  #: bytes, Linux' PATH_MAX
 
 
 class UnfitError(ValueError):
-    """The text does not fit its key; the message says what does."""
+    """The text does not fit its key; the message says what would."""
 
 
 def is_null(node: object) -> bool:
-    """Whether this was written as `null`."""
+    """Whether the value was written as `null`."""
     return isinstance(node, Scalar) and node.plain and _NULL.fullmatch(node.text) is not None
 
 
@@ -45,7 +45,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """`did you mean X? ` if one is near, and all that is allowed."""
+    """`did you mean X?` if a known word is close, followed by all allowed words."""
     known = tuple(known)
     near = nearest(word, known)
     return (f"did you mean {near}? Allowed: " if near else "allowed: ") + ", ".join(known)
@@ -76,7 +76,7 @@ def bounded(value: float, key: Key) -> float:
 
 
 def read_float(node: Scalar, key: Key) -> float:
-    """A decimal number, written out."""
+    """A decimal number without exponent."""
     if node.plain and len(node.text) <= _MAX_DIGITS and _NUMBER.fullmatch(node.text):
         return bounded(float(node.text), key)
     raise UnfitError(_why_no_number(node, key))
@@ -104,7 +104,7 @@ def read_bool(node: Scalar, _key: Key) -> bool:
 
 
 def read_str(node: Scalar, key: Key) -> str:
-    """One line of text that is not empty."""
+    """One non-empty line of text."""
     if not node.text.strip():
         raise UnfitError(f"needs a text: {key.about}")
     if not node.text.isprintable():
@@ -113,7 +113,7 @@ def read_str(node: Scalar, key: Key) -> str:
 
 
 def read_path(node: Scalar, key: Key) -> str:
-    """A path; one for a device that is no more than a bare name is not believed."""
+    """A path; a bare name is refused for a device."""
     text = read_str(node, key)
     if len(text) > _MAX_PATH:
         raise UnfitError(f"a path has at most {_MAX_PATH} characters, this one {len(text)}")
@@ -124,7 +124,7 @@ def read_path(node: Scalar, key: Key) -> str:
 
 
 def range_meant(text: str) -> str:
-    """`[low, high]` for a range that was written in another way; "" if it is none."""
+    """`[low, high]` for a range written in another notation; "" if it is not a range."""
     match = _RANGE.fullmatch(text.strip()) if len(text) <= _MAX_DIGITS else None
     return f"[{match[1]}, {match[2]}]" if match else ""
 
@@ -138,7 +138,7 @@ def read_enum(node: Scalar, kind: type[Enum]) -> Enum:
 
 
 def read_any(node: Scalar, key: Key) -> object:
-    """A value for a library that is handed it as it is: null, true/false, a number or a text."""
+    """A value to be passed unchanged to a library: null, true/false, a number or a text."""
     if not node.plain:
         return read_str(node, key) if node.text else ""
     if is_null(node):
@@ -160,12 +160,12 @@ _AMBIGUOUS = re.compile(r"[-+]?(0\d+|0o\d+|0b[01]+|\d[\d_]*_\d*|\d+\.|\.\d+|\d+(
 
 
 def shown(text: str) -> str:
-    """A text from the file, quoted and shortened for a message."""
+    """Text from the file, quoted and shortened for a message."""
     return repr(text if len(text) <= _MAX_DIGITS else text[: _MAX_DIGITS - 1] + "…")
 
 
 def _number(text: str) -> str:
-    """A number that was written in another way, as it should be written; "" if it is not one."""
+    """The correct form of a number written in another notation; "" if it is not a number."""
     try:
         value = float(text)
     except ValueError:
@@ -190,7 +190,7 @@ def _base60(parts: list[float]) -> float:
     return total
 
 
-#: How numbers are written that we do not take, and what we say; the first that fits is used.
+#: Number notations that we refuse, and the message for each; the first match is used.
 _HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"\d+(:\d+(\.\d+)?)+", re.A), _sexagesimal),
     (re.compile(r"[-+]?\.(nan|inf)|[-+]?(nan|inf|infinity)", re.I), lambda m: f"{m[0]} is not a number to charge by"),

@@ -1,4 +1,4 @@
-"""What a record's YAML looks like: its keys, read from the dataclass once."""
+"""The shape of a record's YAML: its keys, read once from the dataclass."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -8,12 +8,12 @@ from typing import Any, Final, get_args, get_type_hints
 
 from orchestrator.keys import Key, Range
 
-INVALID: Final = object()  #: stands for a value that is already a finding
+INVALID: Final = object()  #: stands in for a value that is already a finding
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One key of a record: its name in YAML, its field, its type and what is known of it."""
+    """One key of a record: its name in YAML, its field, its type and its description."""
 
     name: str
     field: str
@@ -24,7 +24,7 @@ class Slot:
 
 @cache
 def slots(record: type) -> dict[str, Slot]:
-    """The keys that a record has in YAML, in the order of its fields."""
+    """A record's keys in YAML, in the order of its fields."""
     hints = get_type_hints(record)
     found = {}
     for field in dataclasses.fields(record):
@@ -41,7 +41,7 @@ def slots(record: type) -> dict[str, Slot]:
 
 @cache
 def places(record: type, elsewhere: frozenset[type], prefix: str = "") -> tuple[str, ...]:
-    """Dotted paths of all keys below a record's own ones, without those of other files."""
+    """Dotted paths of all keys nested below a record's own, excluding those of other files."""
     found: list[str] = []
     for slot in slots(record).values():
         for inner in _types(slot.hint):

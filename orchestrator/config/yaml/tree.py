@@ -1,8 +1,8 @@
-"""YAML text into a tree of marked nodes: the small, unambiguous part of YAML that a configuration needs.
+"""Parses YAML text into a tree of nodes with positions: the small, unambiguous subset that a configuration needs.
 
-Nothing is resolved or constructed here. A scalar stays the text that was written; what it means is decided by the type
-that its key expects (`scalars.py`), so that `on`, `1:30` or `012` cannot turn into something else on the way. Anchors,
-aliases, tags, merge keys, duplicate keys and further documents are findings. Input is bounded in size, depth and count.
+Nothing is resolved or constructed here. A scalar keeps its text; the type that its key expects (`scalars.py`) gives it
+its meaning, so that `on`, `1:30` or `012` cannot turn into something else on the way. Anchors, aliases, tags, merge
+keys, duplicate keys and further documents are findings. Input is bounded in size, depth and count.
 """
 
 import re
@@ -19,15 +19,15 @@ MAX_BYTES = 512 * 1024  #: 128 bays with comments are about 80 KiB
 MAX_DEPTH = 16  #: the deepest key of any of our files is at 7
 MAX_NODES = 50_000  #: 128 bays are about 6 000
 MAX_KEY = 128  #: characters
-MAX_FINDINGS = 50  #: of one kind, so that a binary file does not fill the screen
+MAX_FINDINGS = 50  #: per file, so that a binary file does not fill the screen
 
-#: libyaml is ten times as fast; what it refuses is read again by the pure parser, whose messages we translate.
+#: libyaml is ten times as fast; what it rejects is parsed again by the pure parser, whose messages we translate.
 _LOADERS: tuple[Any, ...] = (*((yaml.CSafeLoader,) if yaml.__with_libyaml__ else ()), yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Mark:
-    """A place in a file; both count from 1."""
+    """A position in a file; line and column count from 1."""
 
     line: int
     column: int
@@ -35,7 +35,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """One value as it was written. `plain`: without quotes."""
+    """One value as written. `plain`: without quotes."""
 
     mark: Mark
     text: str
@@ -60,7 +60,7 @@ class Entries:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """Stands where something was that is already a finding."""
+    """Stands in for something that is already a finding."""
 
     mark: Mark
 
@@ -69,7 +69,7 @@ Node = Scalar | Items | Entries | Refused
 
 
 def parse(file: str, data: bytes) -> tuple[Node | None, list[Finding]]:
-    """The tree of `data`, and all that is wrong with it as YAML; no tree if it cannot be read to its end."""
+    """The tree of `data`, and everything wrong with it as YAML; no tree if it cannot be parsed to the end."""
     if len(data) > MAX_BYTES:
         text = f"the file has more than {MAX_BYTES} bytes: this is not one of our files"
         return None, [Finding(file, 1, 1, text)]
@@ -93,7 +93,7 @@ _CHARACTERS: tuple[tuple[re.Pattern[str], str], ...] = (
 
 
 def _unfit_characters(file: str, text: str) -> Iterator[Finding]:
-    """What an editor shows as a blank, or not at all, but YAML or a person would trip over."""
+    """Characters that an editor shows as a blank, or not at all, and that trip up YAML or a person."""
     for number, line in enumerate(text.split("\n"), start=1):
         for pattern, problem in _CHARACTERS:
             if match := pattern.search(line.removesuffix("\r")):
@@ -111,7 +111,7 @@ def _compose(file: str, text: str) -> tuple[Node | None, list[Finding]]:
         except yaml.MarkedYAMLError as error:
             line, column, problem = explain(error)
             failed = [*composer.findings, Finding(file, line, column, problem)]
-        except (ValueError, OverflowError):  # the pure parser's own, of an escape or a %YAML beyond all numbers
+        except (ValueError, OverflowError):  # raised by the pure parser for an escape or a %YAML number out of range
             failed = failed or [Finding(file, 1, 1, "an escape, or the number behind %YAML, is beyond all bounds")]
         except _TooMuchError:
             return None, composer.findings
@@ -123,11 +123,11 @@ def _compose(file: str, text: str) -> tuple[Node | None, list[Finding]]:
 
 
 class _TooMuchError(Exception):
-    """The file is not worth reading on; why is already a finding."""
+    """Parsing further is pointless; the reason is already a finding."""
 
 
 class _Composer:
-    """Builds the tree from the parser's events, without recursion and without resolving anything."""
+    """Builds the tree from parser events, without recursion and without resolving anything."""
 
     def __init__(self, file: str) -> None:
         self.root: Node | None = None

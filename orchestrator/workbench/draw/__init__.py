@@ -1,1 +1,1 @@
-"""Pictures: the state machine, simulations, sweeps."""
+"""Pictures of the state machine, simulations and sweeps."""

@@ -1,7 +1,8 @@
-"""The state machine as a picture, from its own table; with a policy, the arrows say when this policy takes them.
+"""The state machine as a picture, drawn from its own table; with a policy, arrows show when that policy takes them.
 
-The table has some seventy transitions, but few rules. So states are drawn in their groups, and what holds for a whole
-group is one arrow; what leads from anywhere in a group to one of its own states stands in the group's heading.
+The table has more than seventy transitions, but few rules. So states are drawn in groups, and a transition common to a
+whole group is one arrow; a transition from anywhere in a group to one of its own states is listed in the group's
+heading.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -13,13 +14,13 @@ from orchestrator.core.machine import TABLE, Trigger
 from orchestrator.core.states import ENERGISED, PRECHARGING, RESTING, UNVERIFIED, ordered
 from orchestrator.model import State
 
-Says = Callable[[Policy], Iterator[tuple[str, str]]]  #: when, and the key of the policy that sets it
+Says = Callable[[Policy], Iterator[tuple[str, str]]]  #: the condition, and the policy key that sets it
 Link = tuple[str, Trigger, State]  #: from a state or a group
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """States of which the table says the same; `lines` is its heading."""
+    """States with the same rows in the table; `lines` is the heading."""
 
     name: str
     states: tuple[State, ...]
@@ -28,7 +29,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Arrow:
-    """From a state or a group to another; `lines` says by which triggers, and when."""
+    """From a state or a group to another; `lines` lists the triggers and their conditions."""
 
     source: str
     dest: str
@@ -37,7 +38,7 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """What is to be drawn; `single` are the states outside of groups, `initial` is where a bay begins."""
+    """The content of the picture; `single` are the states outside groups, `initial` is where a bay begins."""
 
     groups: tuple[Group, ...]
     single: tuple[State, ...]
@@ -54,7 +55,7 @@ GROUP_OF = {state: group.name for group in GROUPS for state in group.states}
 
 
 def diagram(policy: Policy | None = None) -> Diagram:
-    """The machine; with a policy, without the states that it does not use, and with its thresholds."""
+    """The machine; with a policy, only the states that it uses, and with its thresholds."""
     used = [state for state in State if policy is None or policy.precharge is not None or state not in PRECHARGING]
     inside: dict[str, list[str]] = {group.name: [] for group in GROUPS}
     arrows: dict[tuple[str, str], list[str]] = {}
@@ -78,7 +79,7 @@ def diagram(policy: Policy | None = None) -> Diagram:
 
 
 def _links(used: list[State]) -> Iterator[Link]:
-    """The table's transitions between these states; those that every state of a group has count for the group."""
+    """The table's transitions between these states; one shared by every state of a group belongs to the group."""
     for trigger, sources, dest in TABLE:
         if dest is None or dest not in used:
             continue
@@ -146,7 +147,7 @@ SAYS: Mapping[tuple[str, Trigger], Says] = {
 
 
 def _when(source: str, trigger: Trigger, policy: Policy | None) -> Iterator[str]:
-    """When the policy takes this arrow, each with the line that sets it; default values have none."""
+    """The conditions under which the policy takes this arrow, each with the line that sets it, unless a default."""
     says = SAYS.get((source, trigger))
     if policy is None or says is None:
         return
@@ -159,7 +160,7 @@ def _when(source: str, trigger: Trigger, policy: Policy | None) -> Iterator[str]
 
 
 def mermaid(of: Diagram) -> str:
-    """A Mermaid state diagram, as Markdown pages show it."""
+    """A Mermaid state diagram, for Markdown pages."""
     lines = ["stateDiagram-v2", f"    [*] --> {of.initial}"]
     for group in of.groups:
         lines.append(f'    state "{", ".join(group.lines)}" as {group.name} {{')

@@ -33,5 +33,5 @@ def draw(of: Diagram, form: str) -> bytes:
             **{end: f"cluster_{name}" for end, name in ends.items() if name in inside},
         )
     picture = graph.draw(format=form, prog="dot")
-    assert isinstance(picture, bytes)  # it is None only where a file was named
+    assert isinstance(picture, bytes)  # None only if a file was named
     return picture

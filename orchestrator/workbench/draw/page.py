@@ -1,4 +1,4 @@
-"""One self-contained HTML page of one or more simulations: it needs no network, and opens from a mail."""
+"""One self-contained HTML page for one or more simulations: it needs no network, and opens from an e-mail."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from orchestrator.workbench.simulate.figures import clock_s, figures, table
 from orchestrator.workbench.simulate.simulation import Run
 from orchestrator.workbench.simulate.trail import Moment, bounds
 
-#: Moments that a page keeps of each policy for what is shown under the pointer.
+#: Moments kept per policy for the values shown under the pointer.
 MAX_MOMENTS = 1500
 
 
@@ -34,7 +34,7 @@ def save_page(runs: Sequence[Run], path: Path) -> None:
 
 
 def _policy(run: Run, number: int) -> dict[str, object]:
-    """What the page tells of one policy."""
+    """The page's data about one policy."""
     moments = run.trail.moments
     every = -(-len(moments) // MAX_MOMENTS)
     return {

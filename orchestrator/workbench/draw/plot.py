@@ -1,4 +1,4 @@
-"""The picture of one or more simulations on one scenario: what was measured, the step, the state and the rule."""
+"""The picture of one or more simulations on one scenario: measured values, step, state and limiting rule."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -19,7 +19,7 @@ from orchestrator.workbench.simulate.figures import clock_s
 from orchestrator.workbench.simulate.simulation import Run
 from orchestrator.workbench.simulate.trail import Bound, Moment, Span, bounds
 
-#: One colour for each policy, told apart by everybody (Okabe and Ito); more policies begin again with other dashes.
+#: One colour per policy, safe for colour-blind readers (Okabe and Ito); further policies repeat them with other dashes.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 DASHES: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
 STATE_COLOURS: dict[State, str] = {
@@ -37,7 +37,7 @@ STATE_COLOURS: dict[State, str] = {
     State.TRIPPED: "#e57373",
     State.UNCONTROLLABLE: "#b71c1c",
 }
-#: The curves, top down: what it is, and its value at a moment.
+#: The curves, top down: title, and value at a moment.
 PANELS: tuple[tuple[str, Callable[[Moment], float | None]], ...] = (
     ("state of charge, %", lambda m: m.soc_pct),
     ("pack voltage, V", lambda m: m.voltage_v),
@@ -47,19 +47,19 @@ PANELS: tuple[tuple[str, Callable[[Moment], float | None]], ...] = (
 )
 HEIGHTS = (3.0, 2.4, 2.4, 2.4, 1.3)
 WIDTH_IN = 12.0
-#: Rules that have room in the picture, of all policies and of each; characters of one; a rule that is worth telling.
+#: Rules that fit in the picture, in total and at least per policy; characters per rule; share of time worth showing.
 MAX_RULES, MIN_RULES, MAX_CHARACTERS, TELLING_SHARE = 16, 5, 190, 0.001
-#: A stretch of the band that has room for a number or a state's name, as a share of the whole.
+#: The width of a stretch of the band that fits a number, or a state's name, as a share of the whole.
 NUMBER_SHARE, NAME_SHARE = 0.012, 0.08
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A picture as SVG text, and where its time axis lies in it."""
+    """A picture as SVG text, and the position of its time axis."""
 
     svg: str
-    left: float  #: share of the width at which hour 0 is
-    right: float  #: … and the last hour
+    left: float  #: position of hour 0, as a share of the width
+    right: float  #: … and of the last hour
 
 
 def _style() -> AbstractContextManager[None]:
@@ -71,20 +71,20 @@ def _style() -> AbstractContextManager[None]:
             "axes.spines.right": False,
             "axes.grid": True,
             "grid.color": "#e6e6e6",
-            "svg.fonttype": "none",  # text stays text: it can be searched and copied
-            "svg.hashsalt": "orchestrator",  # the same picture each time
+            "svg.fonttype": "none",  # keep text as text, for searching and copying
+            "svg.hashsalt": "orchestrator",  # make the picture reproducible
         }
     )
 
 
 def save_png(runs: Sequence[Run], path: Path) -> None:
-    """The picture with the rules below it."""
+    """Save the picture with the rules below it."""
     with _style():
         _draw(runs, whole=True).savefig(path, dpi=130)
 
 
 def svg(runs: Sequence[Run]) -> Drawing:
-    """The picture without title and rules, for a page that has them as text."""
+    """The picture without title and rules, for a page that shows them as text."""
     with _style():
         figure, text = _draw(runs, whole=False), StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
@@ -118,7 +118,7 @@ def _draw(runs: Sequence[Run], *, whole: bool) -> Figure:
 
 
 def _worth_telling(run: Run, room: int) -> list[Bound]:
-    """The rules that bound it for a while, the longest if there are too many."""
+    """The rules in force for a noticeable time; the longest if there are too many."""
     told = [bound for bound in bounds(run.trail.spans) if bound.total_s > run.scenario.hours * 3600 * TELLING_SHARE]
     longest = sorted(told, key=lambda bound: -bound.total_s)[:room]
     return [bound for bound in told if bound in longest]
@@ -129,7 +129,7 @@ def _look(number: int) -> tuple[str, Literal["-", "--", ":"]]:
 
 
 def colour(number: int) -> str:
-    """Of the policy with this number, from 0."""
+    """The colour of the policy with this number, from 0."""
     return COLOURS[number % len(COLOURS)]
 
 
@@ -157,7 +157,7 @@ def _curves(axes: Sequence[Axes], run: Run, number: int) -> None:
 
 
 def _band(ax: Axes, run: Run, number: int) -> None:
-    """The states as a band, from top to bottom a policy each; a number stands for the rule."""
+    """The states as a band, one row per policy from top to bottom; numbers refer to the rules."""
     whole_h = run.scenario.hours
     for bound in bounds(run.trail.spans):
         boxes = [(span.from_s / 3600, (span.to_s - span.from_s) / 3600) for span in bound.spans]
@@ -200,7 +200,7 @@ def _rules(
 
 
 def when(bound: Bound) -> str:
-    """From when to when; and how often between, for how long."""
+    """The first and last time of a rule; with its count and total duration, if it was in force several times."""
     first, last, times = bound.spans[0], bound.spans[-1], len(bound.spans)
     often = f" ({times} times, {clock_s(bound.total_s / 3600)})" if times > 1 else ""
     return f"{clock_s(first.from_s / 3600)} … {clock_s(last.to_s / 3600)}{often}"

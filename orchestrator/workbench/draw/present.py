@@ -1,4 +1,4 @@
-"""What a simulation is shown as: a page and a picture in a directory. Needs the extra `workbench`."""
+"""Writes a simulation's results: a page and a picture in a directory. Needs the extra `workbench`."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -16,13 +16,13 @@ T = TypeVar("T")
 
 
 def save(runs: Sequence[Run], directory: Path) -> list[Path]:
-    """Write page and picture of the runs; their paths. Raises OrchestratorError when that place cannot be written."""
+    """Write page and picture of the runs; returns their paths. Raises OrchestratorError if they cannot be written."""
     name = runs[0].scenario.scenario
     return write(runs, {directory / f"{name}.html": save_page, directory / f"{name}.png": save_png})
 
 
 def save_sweep(sweep: Sweep, directory: Path) -> list[Path]:
-    """Write picture and figures of a sweep; their paths. Raises OrchestratorError when that place cannot be written."""
+    """Write picture and figures of a sweep; returns their paths. Raises OrchestratorError if that is impossible."""
     name = f"{sweep.scenario}-sweep"
     return write(sweep, {directory / f"{name}.png": save_tradeoff, directory / f"{name}.csv": _save_csv})
 
@@ -36,7 +36,7 @@ def _save_csv(sweep: Sweep, path: Path) -> None:
 
 
 def write(what: T, files: dict[Path, Callable[[T, Path], None]]) -> list[Path]:
-    """Write `what` to each file in its way; the paths. Raises OrchestratorError when a place cannot be written."""
+    """Write `what` to each file with its function; returns the paths. Raises OrchestratorError if one fails."""
     for path, save_as in files.items():
         try:
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The picture of a sweep: what faster charging costs in heat and in time at high voltage."""
+"""The picture of a sweep: the cost of faster charging in heat and in time at high voltage."""
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import cycle
@@ -13,18 +13,18 @@ from matplotlib.figure import Figure
 from orchestrator.workbench.simulate.figures import Figures
 from orchestrator.workbench.simulate.sweep import Point, Sweep, best
 
-#: What time to full is held against.
+#: The costs plotted against time to full.
 COSTS: tuple[tuple[str, Callable[[Figures], float | None]], ...] = (
     ("peak temperature, °C", lambda f: f.peak_c),
     ("time at high voltage, h", lambda f: f.high_voltage_h),
 )
-#: So many points can still be told apart by their labels.
+#: With at most this many points, labels stay readable.
 MAX_LABELS = 15
 MARKERS = "os^Dv<>PX*"
 
 
 def save_tradeoff(sweep: Sweep, path: Path) -> None:
-    """Draw it into a PNG."""
+    """Draw the sweep into a PNG."""
     figure = Figure(figsize=(12, 5.4), layout="constrained")
     figure.suptitle(f"{sweep.policy} on {sweep.scenario}: what time to full costs", weight="bold", x=0.02, ha="left")
     known = [point for point in sweep.points if point.figures is not None and point.figures.full_h is not None]
@@ -45,7 +45,7 @@ def save_tradeoff(sweep: Sweep, path: Path) -> None:
 def _scatter(
     ax: Axes, sweep: Sweep, known: Sequence[Point], cost: Callable[[Figures], float | None], colours: Normalize
 ) -> None:
-    """Colour for the first key, the form of the marker for the second."""
+    """Colour encodes the first key, marker shape the second."""
     places = {point.values: (_value(point, lambda f: f.full_h), _value(point, cost)) for point in known}
     seconds = sweep.axes[1].values if len(sweep.axes) > 1 else ("",)
     for second, marker in zip(seconds, cycle(MARKERS), strict=False):

@@ -1,1 +1,1 @@
-"""What a policy can never do, and what it can hardly mean."""
+"""Proves what a policy can never do, and warns of what is probably unintended."""

@@ -1,4 +1,4 @@
-"""What a battery can show, cut by a policy's thresholds."""
+"""The classes of battery inputs, cut at a policy's thresholds."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,16 +12,16 @@ from orchestrator.core.rules import Rules
 from orchestrator.model import BatteryLink, BatteryReading, BatteryStatus, Measurement
 from orchestrator.model.cause import said
 
-#: A value that was asked for right before the step, and one that is far too old.
+#: The age of a value requested right before the decision, and of one that is far too old.
 FRESH_S, OLD_S = 0.05, 30.0
 HEARTBEAT_S = 0.5
-#: How far beside a bound "just below" and "just above" lie: the resolution of what a BMU sends.
+#: The distance from a bound to "just below" and "just above": the resolution of a BMU's values.
 NEAR = {"voltage_v": 0.01, "temperature_c": 0.1, "soc_pct": 1.0, "soh_pct": 1.0}
 
-#: Two volts of a cell that are no farther apart are of one state of charge.
+#: Cell voltages this close belong to the same state of charge.
 NEAR_CELL_V = 0.02
 
-#: What two instruments of this kind may differ by, measuring the same: cable, resolution, offset.
+#: How much two honest instruments may differ on the same quantity: cable, resolution, offset.
 WITHIN_V, WITHIN_A = 0.5, 0.5
 
 Link = Mapping[str, Any]
@@ -29,24 +29,24 @@ Link = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """One class: the true values, and how what the BMU says differs from them."""
+    """One class: the true values, and how the BMU's readings differ from them."""
 
     values: Mapping[str, float]
-    takes: float = 0.9  #: of the charger's limit, what flows
+    takes: float = 0.9  #: the current, as a share of the charger's limit
     differs_v: float = 0.0  #: how much more the charger reads than the BMU
     differs_a: float = 0.0  #: how much more the BMU reads than the charger
     connected: bool = True
     old: frozenset[str] = frozenset()  #: values that are too old
     link: Callable[[float, Memory], Link] = field(default=lambda _now_s, _memory: {})
-    at_work: bool = False  #: only rows that allow a step tell it from others: it is another one while there are steps
+    at_work: bool = False  #: only rows that allow a step distinguish it, so it is a class only where steps matter
 
     @property
     def volts(self) -> float:
-        """At the terminals."""
+        """The terminal voltage."""
         return self.values["voltage_v"]
 
     def at(self, now_s: float, memory: Memory, charger_a: float) -> tuple[BatteryReading, BatteryLink]:
-        """As it is read at this moment."""
+        """The reading and the link at this moment."""
         values = {**self.values, "current_a": charger_a + self.differs_a}
         reading = BatteryReading(
             **{
@@ -78,13 +78,13 @@ SLOW = frozenset({"soc_pct", "soh_pct"})
 
 
 def fitting_v(rules: Rules, soc_pct: float) -> float:
-    """What the policy's pack has at this state of charge."""
+    """The voltage of the policy's pack at this state of charge."""
     pack = rules.policy.pack
     return round(chemistry(pack).ocv_v(soc_pct) * pack.cells_in_series, 2)
 
 
 def fitting_pct(rules: Rules, pack_v: float) -> float:
-    """A state of charge that the policy's pack may have at this voltage; an empty one has any that is low."""
+    """A state of charge that fits this voltage for the policy's pack; below the curve, a low one."""
     pack = rules.policy.pack
     kind = chemistry(pack)
     fits = (soc for soc in range(100) if abs(kind.ocv_v(soc) - pack_v / pack.cells_in_series) < NEAR_CELL_V)
@@ -92,7 +92,7 @@ def fitting_pct(rules: Rules, pack_v: float) -> float:
 
 
 def healthy(rules: Rules) -> Shown:
-    """In the middle of everything."""
+    """A battery in the middle of all ranges."""
     soc = min(rules.policy.start.soc_below_pct, rules.policy.recharge.soc_below_pct) / 2
     return Shown(
         {
@@ -103,7 +103,7 @@ def healthy(rules: Rules) -> Shown:
 
 
 def batteries(rules: Rules) -> dict[str, Shown]:
-    """Every class for this bay, by its name."""
+    """Every class for this bay, by name."""
     base = healthy(rules)
     classes = {"healthy": base}
     rows = _rows(rules)
@@ -119,7 +119,7 @@ def batteries(rules: Rules) -> dict[str, Shown]:
 
 
 def _with(rules: Rules, field_name: str, value: float) -> dict[str, float]:
-    """This value, and what goes with it: volts and SOC of one pack hang together."""
+    """This value and the values that depend on it: a pack's voltage and SOC go together."""
     if field_name == "soc_pct":
         return {"soc_pct": value, "voltage_v": fitting_v(rules, value)}
     if field_name == "voltage_v":
@@ -128,7 +128,7 @@ def _with(rules: Rules, field_name: str, value: float) -> dict[str, float]:
 
 
 def _bounds(rules: Rules) -> dict[str, set[float]]:
-    """The thresholds of policy and station, by field, but for those of the tables of steps."""
+    """The thresholds of policy and station, by field, except those of rows that allow a step."""
     policy = rules.policy
     volts = {policy.pack.voltage_v.low, rules.max_v}
     if policy.precharge is not None:
@@ -151,7 +151,7 @@ Span = Mapping[str, tuple[float, float]]
 
 
 def _spans(rules: Rules) -> Iterator[tuple[Span, float]]:
-    """Every row of the policy: which values it is about, and what it allows, in amperes."""
+    """Every row of the policy: its ranges, and the amperes that it allows."""
     current, pack = rules.policy.current, rules.policy.pack
     for name, table in tables(current):
         for band in table.rows:
@@ -167,7 +167,7 @@ def _pauses(rules: Rules) -> Iterator[Span]:
 
 
 def _rows(rules: Rules) -> dict[str, set[float]]:
-    """The bounds of all rows: what only they tell apart decides nothing at rest."""
+    """The bounds of all rows: a difference that only they see decides nothing at rest."""
     rows: dict[str, set[float]] = {name: set() for name in NEAR}
     for span, _ in _spans(rules):
         for name, (low, high) in span.items():
@@ -176,7 +176,7 @@ def _rows(rules: Rules) -> dict[str, set[float]]:
 
 
 def _beyond(limits: Limits) -> dict[str, dict[str, float]]:
-    """What a station allows under no policy."""
+    """Values that a station allows under no policy."""
     return {
         "beyond the station's voltage": {"voltage_v": limits.voltage_v + NEAR["voltage_v"]},
         "colder than the station allows": {"temperature_c": limits.temperature_c.low - NEAR["temperature_c"]},
@@ -185,7 +185,7 @@ def _beyond(limits: Limits) -> dict[str, dict[str, float]]:
 
 
 def _full(base: Shown, rules: Rules) -> Shown:
-    """At the target, or full: its current has tapered off at the end voltage."""
+    """A battery at the target, or full: its current has tapered off at the end voltage."""
     full = {**base.values, **_with(rules, "soc_pct", rules.policy.finish.target_soc_pct)}
     if rules.policy.finish.target_soc_pct < 100 or rules.taper is None:
         return replace(base, values=full)
@@ -194,7 +194,7 @@ def _full(base: Shown, rules: Rules) -> Shown:
 
 
 def _events(base: Shown, rules: Rules) -> dict[str, Shown]:
-    """What no threshold cuts: a battery that leaves, falls silent, complains or lies."""
+    """Classes independent of thresholds: a battery that leaves, falls silent, complains or lies."""
     pack, precharge = rules.policy.pack, rules.policy.precharge
     status = {**base.values, "status": float(1 << BatteryStatus.BMU_ERROR)}
     limit = {**base.values, "status": float(1 << BatteryStatus.LOW_TEMPERATURE)}

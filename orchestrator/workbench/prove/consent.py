@@ -1,7 +1,7 @@
-"""The safety properties about people: what only they may undo, and what they are told of.
+"""The safety properties about people: what only they may undo, and what they must be told.
 
-As in `properties.py`, nothing here asks the core's own predicates; of the fault table it takes what a row says of
-itself.
+As in `properties.py`, nothing here uses the core's own predicates; from the fault table it takes only the rows' own
+attributes.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ NOT_YET = frozenset({"refused_while", "refused_until", "refused_for", "reset_loc
 
 
 def operator_stops(taken: Taken) -> str | None:
-    """A stop or a pause of the operator takes effect in the same step, unless it is answered with a reason."""
+    """An operator's stop or pause takes effect in the same decision, unless it is refused with a reason."""
     asked = taken.snapshot.request
     if asked not in (Request.STOP, Request.PAUSE) or taken.decision.answer:
         return None
@@ -26,7 +26,7 @@ def operator_stops(taken: Taken) -> str | None:
 
 
 def held_until_started(taken: Taken) -> str | None:
-    """What an operator stopped, only an operator starts."""
+    """Only an operator starts what an operator stopped."""
     before, after = taken.before, taken.after
     if before.operator.hold and not after.operator.hold and taken.snapshot.request is not Request.START:
         return "the hold was lifted without a start"
@@ -34,7 +34,7 @@ def held_until_started(taken: Taken) -> str | None:
 
 
 def _waiting(memory: Memory) -> set[str]:
-    """The faults in force that only a person's start ends."""
+    """The active faults that only a person's start ends."""
     return {
         name for name, fault in memory.faults.items()
         if fault.raised_s is not None and ROW[name].clear is Clear.OPERATOR
@@ -44,7 +44,7 @@ def _waiting(memory: Memory) -> set[str]:
 def waits_for_a_start(taken: Taken) -> str | None:
     """HELD is left by a person's start only, or to verify the stop anew; it says what to type, once, or why not yet.
 
-    A battery that leaves takes with it the faults that its leaving explains, and no others.
+    A battery that leaves clears the faults that its leaving explains, and no others.
     """
     before, after, asked = taken.before, taken.after, taken.snapshot.request
     gone = _waiting(before) - _waiting(after)
@@ -69,7 +69,7 @@ def _says_what_to_type(taken: Taken, *, waits: bool) -> str | None:
 
 
 def _parts(cause: Cause) -> Iterator[Cause]:
-    """A cause and all those that are parameters in it."""
+    """A cause and all causes among its parameters."""
     yield cause
     for _, value in cause.params:
         for part in value if isinstance(value, tuple) else (value,):
@@ -78,16 +78,16 @@ def _parts(cause: Cause) -> Iterator[Cause]:
 
 
 def tripped_until_reset(taken: Taken) -> str | None:
-    """TRIPPED is left by a person's reset, or to stop a charger that runs."""
+    """TRIPPED ends only with a person's reset, or to stop a running charger."""
     if taken.before.state is not State.TRIPPED or taken.after.state in (State.TRIPPED, State.STOPPING):
         return None
     if taken.move.restart and taken.after.state in UNVERIFIED:
-        return None  # the stop is verified anew; what has latched is looked after by its own property
+        return None  # the stop is verified again; latches have their own property
     return None if taken.snapshot.request is Request.RESET else f"left for {taken.after.state} without a reset"
 
 
 def latched_until_reset(taken: Taken) -> str | None:
-    """A fault that has latched, only a reset takes away."""
+    """Only a reset clears a latched fault."""
     gone = [
         name for name, fault in taken.before.faults.items()
         if fault.latched and (name not in taken.after.faults or not taken.after.faults[name].latched)
@@ -96,7 +96,7 @@ def latched_until_reset(taken: Taken) -> str | None:
 
 
 def a_death_in_mid_charge_holds(taken: Taken) -> str | None:
-    """A charge that nobody ended waits for a person."""
+    """An interrupted charge waits for a person."""
     ran = taken.before.state in ENERGISED or taken.before.stop.unverified
     if not taken.move.restart or not ran:
         return None
@@ -104,9 +104,9 @@ def a_death_in_mid_charge_holds(taken: Taken) -> str | None:
 
 
 def alarmed(taken: Taken) -> str | None:
-    """People are told of a charger that is out of control, and of one that a run before left and nobody verified.
+    """The alarm is danger for a charger out of control, or left unverified by an earlier run of the service.
 
-    And of one that stands by until a person has seen to a fault; but not of what an operator has stopped.
+    It is attention for one in standby with a fault that waits for a person, and none after an operator's stop.
     """
     after, alarm = taken.after, taken.decision.alarm
     left = after.stop.unverified and after.state in UNSEEN

@@ -1,4 +1,4 @@
-"""Everything that a bay can come to, explored on all cores: does every property hold, and end all that must end?"""
+"""Explores every situation that a bay can reach, on all cores: every property must hold, and every charge must end."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
@@ -24,24 +24,24 @@ from orchestrator.workbench.prove.story import Counterexample
 
 T = TypeVar("T")
 
-#: A charger for a policy that no station names: what the shipped station files have.
+#: The steps of a charger for a policy without a station: those of the shipped station files.
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """What came of it."""
+    """The result of a proof."""
 
-    memories: int  #: that differ in what a bay can come to from there
-    steps: int  #: that led there; those that look for an end are not counted
-    counterexamples: Sequence[Counterexample]  #: at most one for each property
+    memories: int  #: situations that differ in what a bay can reach from them
+    steps: int  #: decisions that led there; those of the search for endings are not counted
+    counterexamples: Sequence[Counterexample]  #: at most one per property
     properties: int = len(PROPERTIES) + len(ENDINGS) + 2  #: and: no exception, no livelock
 
 
 def prove(rules: Rules, watch: Callable[[int], None], jobs: int | None = None) -> Proof:
-    """Every class of inputs that the bay's policy and limits cut, in every order.
+    """Try every class of inputs cut by the bay's policy and limits, in every order.
 
-    In so many processes; None: one for each core. `watch` is called now and then with the number of steps so far.
+    `jobs` is the number of processes; None: one per core. `watch` is called regularly with the number of decisions.
     """
     with cores(jobs, _begin, rules) as pool:
         explorer = Explorer(walk_of(rules), partial(_on, pool), watch)
@@ -52,12 +52,12 @@ def prove(rules: Rules, watch: Callable[[int], None], jobs: int | None = None) -
 
 
 def walk_of(rules: Rules) -> Walk:
-    """All inputs, all properties."""
+    """A walk with all inputs and all properties."""
     return Walk(rules, StationInputs.of(rules), PROPERTIES)
 
 
 def here(walk: Walk) -> Each:
-    """In this process, with this walk."""
+    """An `Each` that runs in this process, with this walk."""
 
     def each(function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
         return (function(walk, *job) for job in jobs)
@@ -69,11 +69,11 @@ def _on(pool: Executor, function: Callable[..., T], jobs: Iterable[tuple[Any, ..
     return pool.map(partial(_with_the_walk, function), jobs)
 
 
-_walk: Walk | None = None  # of this process, so that it tells nothing twice
+_walk: Walk | None = None  # one per process, so that it reports nothing twice
 
 
 def _begin(rules: Rules) -> None:
-    global _walk  # noqa: PLW0603 - what a process begins with
+    global _walk  # noqa: PLW0603 - set once, when the process starts
     _walk = walk_of(rules)
 
 
@@ -82,7 +82,7 @@ def _with_the_walk(function: Callable[..., T], job: tuple[Any, ...]) -> T:
 
 
 def bay_of(policy: Policy) -> Bay:
-    """A bay for a policy that no station names: its limits are just as wide as the policy's, and all steps allowed."""
+    """A bay for a policy without a station: its limits are exactly as wide as the policy's, and all steps allowed."""
     return Bay(
         name=policy.policy,
         charger=ChargerConfig(port="explored", control=ControlMode.MANUAL, steps_a=STEPS_A),
@@ -96,11 +96,11 @@ def bay_of(policy: Policy) -> Bay:
 
 
 def bays_in(file: str) -> Iterator[tuple[str, Bay]]:
-    """What there is to prove in a policy or a station file without errors, and how it is called."""
+    """The bays to prove in a policy or station file without errors, each with its title."""
     try:
         station = load_station(file)
     except ConfigError:
-        with suppress(ConfigError):  # an object map or a scenario decides nothing
+        with suppress(ConfigError):  # an object map or a scenario contains no policy
             yield file, bay_of(load_policy(file))
         return
     for bays in _alike(station):
@@ -108,7 +108,7 @@ def bays_in(file: str) -> Iterator[tuple[str, Bay]]:
 
 
 def _alike(station: Station) -> Iterable[Sequence[Bay]]:
-    """The bays in groups that differ in nothing that is decided by: in name, port, bus or node only."""
+    """The bays, grouped by what affects decisions: within a group only name, port, bus or node differ."""
     groups: dict[object, list[Bay]] = {}
     for bay in station.bays:
         what = (bay.policy.source.file, bay.charger.control, bay.charger.steps_a, bay.limits)

@@ -1,8 +1,8 @@
-"""Walks everything that `step()` can come to, breadth-first, and holds properties against every step on the way.
+"""Walks everything that `decide()` can reach, breadth-first, and checks properties against every decision on the way.
 
-What goes in is cut into classes (`inputs.py`) and jumps of time; what is remembered is cut by `gist.py`, and the first
-memory of each gist stands for all of them. So what is found is real, with the shortest story that leads to it, and what
-is not found is absent up to these cuts. Properties are data (`properties.py`); nothing here knows what they mean.
+Inputs are cut into classes (`inputs.py`) and jumps of time; memories are grouped by `gist.py`, and the first memory of
+each gist represents the others. So every finding is real, with the shortest story that leads to it, and anything not
+found is absent up to these cuts. Properties are data (`properties.py`); nothing here knows their meaning.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -23,27 +23,27 @@ T = TypeVar("T")
 
 
 class Inputs(Protocol):
-    """The classes that inputs are cut into."""
+    """The classes of inputs."""
 
     def moves(self, state: State) -> Iterable[Move]:
-        """All that may happen next in a state, one thing at a time."""
+        """Everything that may happen next in a state, one thing at a time."""
 
     def pairs(self, state: State) -> Iterable[Move]:
-        """All that may happen next, a charger's and a battery's at once."""
+        """Every combination of a charger's and a battery's next input."""
 
     def constants(self) -> Iterable[tuple[str, str]]:
-        """Charger and battery of each surrounding that may last for ever."""
+        """Charger and battery of each situation that may last for ever."""
 
     def tells(self, battery: str, state: State) -> bool:
-        """Whether this battery is a class of its own in that state."""
+        """Whether this battery is a separate class in that state."""
 
     def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
-        """What the step is given."""
+        """The input of the decision."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A memory and its moment: where a step can be taken from."""
+    """A memory and its time: the starting point of a decision."""
 
     memory: Memory
     now_s: float
@@ -51,10 +51,10 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Expanded:
-    """What lies one step from a place."""
+    """Everything one decision away from a place."""
 
     reached: Sequence[tuple[object, Move, Place]]  #: the first place of each gist, and the move that leads there
-    broken: Sequence[tuple[str, str, Move]]  #: properties that do not hold, by what, and the move that shows it
+    broken: Sequence[tuple[str, str, Move]]  #: each violated property, how it is violated, and the move that shows it
     changes: frozenset[tuple[State, State]]
     steps: int
     soon: Mapping[tuple[str, str], object]  #: the gist after the next moment in lasting surroundings
@@ -62,17 +62,17 @@ class Expanded:
 
 @dataclass(slots=True)
 class Walk:
-    """What may happen, and what must hold: takes steps, and keeps nothing but what it need not tell again."""
+    """The possible inputs and the required properties; makes decisions, and remembers only what it has reported."""
 
     rules: Rules
     inputs: Inputs
     properties: Sequence[Property]
     gist: Callable[[Memory], object] = gist
     step: Step = step
-    _told: set[object] = field(default_factory=set)  # gists that were reached, and names of what was found broken
+    _told: set[object] = field(default_factory=set)  # gists already reached, and names of violated properties
 
     def take(self, place: Place, move: Move) -> Taken:
-        """One step from there."""
+        """Make one decision from there."""
         now_s = place.now_s + move.dt_s
         memory = Persisted.of(place.memory, now_s).memory(now_s) if move.restart else place.memory
         snapshot = self.inputs.snapshot(move, now_s, memory)
@@ -84,7 +84,7 @@ class Walk:
         return Taken(move, now_s, snapshot, place.memory, decision, after, self.rules)
 
     def broken(self, taken: Taken) -> Iterator[tuple[str, str]]:
-        """Name of each property that the step breaks, and by what."""
+        """The name of each property that the decision violates, and how."""
         if taken.error:
             yield "no exception", f"step() raised {taken.error}"
             return
@@ -94,14 +94,14 @@ class Walk:
                 yield rule.name, wrong
 
     def news(self, taken: Taken) -> Iterator[tuple[str, str]]:
-        """What the step breaks and was not told of before."""
+        """Violations that have not been reported before."""
         for name, text in self.broken(taken):
             if name not in self._told:
                 self._told.add(name)
                 yield name, text
 
     def follow(self, place: Place, moves: Iterable[Move]) -> Iterator[Taken]:
-        """Steps one after another from there, as far as none raises an exception."""
+        """Make one decision after another from there, until one raises an exception."""
         for move in moves:
             taken = self.take(place, move)
             yield taken
@@ -110,14 +110,14 @@ class Walk:
             place = Place(taken.after, taken.now_s)
 
     def expand(self, place: Place, *, in_pairs: bool) -> Expanded:
-        """Every move from there. What it has told of before, it leaves out."""
+        """Try every move from there; omits whatever was reported before."""
         reached, broken, changes, steps = [], [], set(), 0
         state, soon = place.memory.state, {}
         for move in (*self.inputs.moves(state), *(self.inputs.pairs(state) if in_pairs else ())):
             taken = self.take(place, move)
             steps += 1
             broken += [(name, text, move) for name, text in self.news(taken)]
-            if taken.before.state is not taken.after.state and not move.restart:  # another life is no change of state
+            if taken.before.state is not taken.after.state and not move.restart:  # a restart is not a change of state
                 changes.add((taken.before.state, taken.after.state))
             if taken.error:
                 continue
@@ -131,15 +131,15 @@ class Walk:
 
 
 class Each(Protocol):
-    """Does one thing to each of many, in their order: here, or in many processes."""
+    """Applies a function to many jobs, in order: here, or in several processes."""
 
     def __call__(self, function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
-        """`function(walk, *job)` of each job."""
+        """`function(walk, *job)` for each job."""
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A place that was reached, and how; the very first one has no way."""
+    """A place that was reached, and how; the first has no parent."""
 
     place: Place
     move: Move | None = None
@@ -153,20 +153,20 @@ class Node:
 
 @dataclass(slots=True)
 class Explorer:
-    """`run` explores; then `nodes` has what was reached, `found` at most one counterexample for each property."""
+    """`run` explores; then `nodes` has what was reached, `found` at most one counterexample per property."""
 
     walk: Walk
     each: Each
-    watch: Callable[[int], None] = lambda _: None  #: is called now and then with the number of steps so far
+    watch: Callable[[int], None] = lambda _: None  #: called regularly with the number of decisions so far
     nodes: list[Node] = field(default_factory=list)
     steps: int = 0
     found: dict[str, Counterexample] = field(default_factory=dict)
-    changes: set[tuple[State, State]] = field(default_factory=set)  #: changes of state that were seen
+    changes: set[tuple[State, State]] = field(default_factory=set)  #: changes of state seen
     soon: dict[object, Mapping[tuple[str, str], object]] = field(default_factory=dict)  #: by gist, as in `Expanded`
     _paired: set[object] = field(default_factory=set)  # outlines
 
     def run(self, until: str = "", most: int = 1_000_000) -> None:
-        """Everything that can be reached; or until the property `until` is found not to hold, or `most` nodes."""
+        """Explore everything reachable, or until the property `until` is violated, or up to `most` nodes."""
         first = Node(Place(Memory(), BEGIN_S))
         level, seen = [first], {self.walk.gist(first.place.memory)}
         self.nodes = [first]
@@ -180,7 +180,7 @@ class Explorer:
             level = following
 
     def _first_of_its_outline(self, node: Node) -> bool:
-        """Pairs are tried only once for each outline: they are many."""
+        """Pairs are tried only once per outline, because there are so many."""
         shape = outline(node.place.memory)
         new = shape not in self._paired
         self._paired.add(shape)
@@ -201,7 +201,7 @@ class Explorer:
                 yield new
 
     def find(self, name: str, text: str, node: Node, more: Sequence[Move]) -> None:
-        """Keep a counterexample: the way to the node, and what followed."""
+        """Record a counterexample: the way to the node, and what followed."""
         if name not in self.found:
             story = self.walk.follow(Place(Memory(), BEGIN_S), (*node.way, *more))
             self.found[name] = Counterexample(name, text, tuple(story))

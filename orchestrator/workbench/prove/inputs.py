@@ -1,8 +1,8 @@
-"""The classes of inputs: what a charger and a battery can show at the moment of a step, as tables.
+"""The classes of inputs: everything that a charger and a battery can show at the moment of a decision, as tables.
 
-A battery's classes are cut by the policy's own thresholds: each bound, just below, at, just above. A charger's classes
-are what it may do with the order that it was given, and what it may say. Both are made fresh for each step, so that a
-story can leave any of them at any time.
+A battery's classes are cut at the policy's own thresholds: just below, at, and just above each bound. A charger's
+classes are its possible reactions to a command, and its possible reports. Both are made fresh for each decision, so
+a story can leave any of them at any time.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -32,14 +32,14 @@ from orchestrator.model.cause import said
 from orchestrator.workbench.prove.batteries import Shown, batteries
 from orchestrator.workbench.prove.story import TICK_S, Move
 
-#: Ages at the moment of the step: an order and a stop were written this long ago, readings were asked for after that.
+#: Ages at the moment of the decision: of the last command and stop, of readings requested after them, of old values.
 SENT_AGE_S, READ_AGE_S, OLD_S = 0.1, 0.05, 30.0
-#: Of two timers that are no farther apart than this, a jump past the longer one is past both.
+#: If two timers differ by no more than this factor, one jump past the longer covers both.
 ALIKE = 1.1
-#: Where the tables of steps are looked at, or may be at the end of the step.
-#: What flows in precharge.
+#: The states in which the policy's tables are used, or may be by the end of the decision.
+#: The current in precharge.
 PRECHARGE_A = 1.0
-#: What a charger shows in each stage.
+#: What a charger reports in each stage.
 STAGES = {
     State.PRECHARGE_PULSE: (ChargeMode.PRECHARGE, Precharge.PULSE),
     State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
@@ -49,7 +49,7 @@ STAGES = {
 
 @dataclass(slots=True)
 class Said:
-    """What a charger's port shows, on the way to a snapshot."""
+    """A charger's reading and link, from which a snapshot is made."""
 
     reading: dict[str, Any]
     link: dict[str, Any]
@@ -95,7 +95,7 @@ def _switched(said: Said, _: float) -> None:
 
 _STANDBY = _reading(operation=Operation.STOPPED, charge_mode=ChargeMode.FULL, current_a=0.0)
 
-#: How a charger differs from one that has just obeyed.
+#: How each class of charger differs from one that has just obeyed.
 CHARGERS: Mapping[str, Charger] = {
     "obeys": _reading(),
     "stands by, whatever it is told": _STANDBY,
@@ -137,11 +137,11 @@ class StationInputs:
 
     @classmethod
     def of(cls, rules: Rules) -> "StationInputs":
-        """All classes that the bay's policy and station file cut."""
+        """All classes cut by the bay's policy and station file."""
         return cls(rules, jumps(rules), CHARGERS, batteries(rules))
 
     def moves(self, state: State) -> Iterator[Move]:
-        """Each class in the next moment and after each jump, and every request in the plainest surroundings."""
+        """Each class in the next moment and after each jump, and every request in simple surroundings."""
         constants = [(charger, battery) for charger, battery in self.constants() if self.tells(battery, state)]
         for dt_s in (TICK_S, *self.jumps_s):
             for charger, battery in constants:
@@ -168,11 +168,11 @@ class StationInputs:
         yield from (("obeys", battery) for battery in self.batteries if battery != "healthy")
 
     def tells(self, battery: str, state: State) -> bool:
-        """Whether it is a class of its own in this state: at rest nobody looks at the tables of steps."""
+        """Whether it is a separate class in this state: at rest, the policy's tables are not used."""
         return state in AT_WORK or not self.batteries[battery].at_work
 
     def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
-        """What the step is given."""
+        """The input of the decision."""
         shown = self.batteries[move.battery]
         said = self._obedient(shown, now_s, memory)
         self.chargers[move.charger](said, now_s)
@@ -185,7 +185,7 @@ class StationInputs:
         return Snapshot(reading, link_of_charger, values, link, move.request, move.internal, ending=move.ending)
 
     def _obedient(self, shown: Shown, now_s: float, memory: Memory) -> Said:
-        """A charger that has just done what the last step ordered."""
+        """A charger that has just carried out the last decision's command."""
         order = memory.sequence.order
         values = {
             "voltage_v": shown.volts + shown.differs_v if shown.connected else 0.0,
@@ -204,12 +204,12 @@ class StationInputs:
         )
 
 
-#: The orders of a sequence, in its order; what stands before the present one has been obeyed.
+#: The commands of a sequence, in order; those before the present one have been obeyed.
 SEQUENCE = (Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE, Action.RUN)
 
 
 def _setpoint(memory: Memory, *, manual: bool) -> dict[str, Any]:
-    """What an obedient charger shows of the setpoint: all of it up to the present order."""
+    """The setpoint as reported by an obedient charger: everything up to the present command."""
     action = memory.sequence.order.action if memory.sequence.order is not None else Action.RUN
     running = memory.stage.ran or action is Action.RUN or (action is Action.RESUME and not manual)
     done = len(SEQUENCE) if running or not manual else SEQUENCE.index(action)
@@ -222,7 +222,7 @@ def _setpoint(memory: Memory, *, manual: bool) -> dict[str, Any]:
 
 
 def jumps(rules: Rules) -> tuple[float, ...]:
-    """Just beyond every timer of core and policy, so that none of them is walked through in steps."""
+    """Jumps just beyond every timer of core and policy, so that no timer is waited out tick by tick."""
     policy = rules.policy
     timers = [2.0, 3.0, 5.0, 10.0, 70.0, 310.0, 3600.0]
     timers.append(rules.max_hours * 3600)

@@ -13,11 +13,11 @@ from orchestrator.workbench.prove.explore import Explorer, Node, Place, Walk
 from orchestrator.workbench.prove.gist import details
 from orchestrator.workbench.prove.story import TICK_S, Move, Taken
 
-#: While nothing changes: so many steps of each length. Beyond the last one all timers have run out.
+#: While nothing changes: this many steps of each length. After the last one all timers have run out.
 LADDER = ((16, TICK_S), (10, 1.0), (12, 5.0), (12, 30.0), (10, 300.0), (4, 3600.0), (12, 6 * 3600.0))
 #: More changes of state than this without news: the longest orderly story is three backoffs and a latch.
 PATIENCE = 60
-#: … of which a story tells so many steps.
+#: … of which a story shows this many steps.
 SHOWN = 40
 #: So many surroundings are looked at in one job: its places are many, and go to another process with it.
 TOGETHER = 8

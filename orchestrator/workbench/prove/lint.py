@@ -1,7 +1,7 @@
-"""What is allowed in a policy and can hardly be meant: warnings, each at its key, for `orchestrator check`.
+"""Warnings about policy entries that are valid but probably unintended, each at its key, for `orchestrator check`.
 
-A rule here looks at what the core does with the keys: rows that no value can reach, amperes that another table never
-allows, an end that cannot come. What cannot be at all, the rules of `config` refuse.
+The rules here look at what the core does with the keys: rows that no value can reach, amperes that another table never
+allows, an end that cannot come. Invalid entries are refused by the rules in `config`.
 """
 
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ def _taper(above_v: float, voltage_v: Range) -> Problems:
 
 
 def _window(allowed: Range) -> Problems:
-    """Between the limits there must be room for the hysteresis of the pauses."""
+    """The window between the limits must be wider than the pauses' hysteresis."""
     again_c = allowed.high - HEAT_HYSTERESIS_K
     if again_c <= allowed.low:
         text = f"too narrow: after a pause for heat it charges again below {again_c:g} °C, where it pauses for cold"
@@ -43,7 +43,7 @@ def _window(allowed: Range) -> Problems:
 
 
 def _end(values: Mapping[str, object]) -> Problems:
-    """Without a second way to be full, a BMU that stays at 99 % leads into the time limit, which latches."""
+    """Without a second sign of full, a BMU that stays at 99 % runs into the time limit, which latches."""
     full = "finish.full"
     taper = values.get(f"{full}.taper") or (values.get("pack.capacity_ah") and values.get(f"{full}.needs") == "any")
     if values.get("finish.target_soc_pct") == 100 and not taper and values.get(f"{full}.charger") is False:
@@ -51,7 +51,7 @@ def _end(values: Mapping[str, object]) -> Problems:
 
 
 def _chemistry(kind: CellType, cells: int, voltage_v: Range) -> Problems:
-    """Volts that are too low for the chemistry: allowed, since that is the gentle side."""
+    """A voltage too low for the chemistry: allowed, because it errs on the gentle side."""
     least_v = CELL_VOLTS[kind].least_v
     if voltage_v.high < least_v * cells:
         text = f"{voltage_v.high / cells:.2f} V a cell are few for {kind} ({least_v:g} V or more): is it another one?"
@@ -59,7 +59,7 @@ def _chemistry(kind: CellType, cells: int, voltage_v: Range) -> Problems:
 
 
 def _awake(below_v: float, kind: CellType, cells: int) -> Problems:
-    """Volts, chemistry and SOC hang together: what is precharged must be empty."""
+    """Voltage, chemistry and SOC go together: a pack that is precharged must be empty."""
     empty_v = CHEMISTRIES[kind].ocv_v(EMPTY_PCT)
     if below_v > round(empty_v * cells, 2):
         yield (
@@ -79,7 +79,7 @@ def _refuses(voltage_v: Range, kind: CellType, cells: int) -> Problems:
 
 
 def _differ(volts: float, share_pct: float, voltage_v: Range) -> Problems:
-    """Two thresholds of one thing: which of them is in force."""
+    """Two thresholds on one quantity, of which one never takes effect."""
     low_v, high_v = (share_pct / 100 * end_v for end_v in (voltage_v.low, voltage_v.high))
     if volts <= low_v:
         yield "faults.volts_differ_pct", f"never in force: {volts:g} V is stricter than {share_pct:g} % everywhere"
@@ -95,7 +95,7 @@ def _recharge(recharge_pct: float, target_pct: float) -> Problems:
 
 
 def _rows(name: str, rows: Rows, low: float, high: float, why: str) -> Problems:
-    """Rows of which no value can come up: only `low` … `high` can."""
+    """Rows that no value can reach: only `low` … `high` can occur."""
     for number, row in enumerate(rows):
         if row.to <= low or row.from_ >= high:
             yield f"current.{name}.rows[{number}]", f"this row is never used: {why}"
@@ -118,7 +118,7 @@ def _voltages(rows: Rows, allowed: Range) -> Problems:
 
 
 def _tables(values: Mapping[str, object]) -> Problems:
-    """Rows that are too narrow to be hit for long, and amperes that another table never allows."""
+    """Rows so narrow that the step will flap, and amperes that another table never allows."""
     current_a, capacity_ah = values.get("pack.current_a"), values.get("pack.capacity_ah")
     if not isinstance(current_a, float):
         return
@@ -158,7 +158,7 @@ _RULES = (
 
 
 def policy_lint(values: Mapping[str, object]) -> Problems:
-    """What a policy can hardly mean, by the paths of its keys."""
+    """Probably unintended entries of a policy, by the paths of its keys."""
     yield from problems(_RULES, values)
     target_pct, rows = values.get("finish.target_soc_pct"), values.get("current.soc_pct.rows")
     if isinstance(target_pct, float) and isinstance(rows, tuple) and values.get("finish.full_every_days") is None:

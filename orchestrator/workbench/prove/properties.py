@@ -1,7 +1,7 @@
-"""What every step of every bay must fulfil: the safety properties, as data.
+"""The safety properties that every decision of every bay must satisfy, as data.
 
-Each check reads snapshot, decision and memory, and works out for itself what it needs: it asks none of the core's own
-predicates, so that a mistake in one of those does not hide here.
+Each check derives what it needs from snapshot, decision and memory. It uses none of the core's own predicates, so that
+a mistake in one of those cannot hide here.
 """
 
 from collections.abc import Callable
@@ -20,12 +20,12 @@ from orchestrator.workbench.prove.consent import (
 )
 from orchestrator.workbench.prove.story import Taken
 
-#: The ages that evidence may have (DESIGN §6): a charger's silence is noticed within 2 s, fast values of a BMU go stale
-#: after 1.5 s, slow ones after three readings.
+#: The greatest ages of evidence: a charger's silence is noticed within 2 s, a BMU's fast values go stale after 1.5 s,
+#: slow ones after three readings.
 CHARGER_S, FAST_S, SLOW_S = 2.0, 1.5, 3.0
-#: Current into the pack of more than this is one, and for how long a BMU may average it.
+#: More than this into the pack counts as current; and how long a BMU may average it.
 BMU_SEES_A, UNORDERED_S = 1.0, 2.0
-#: From the order to stop until it must be proved, and a margin of steps.
+#: The time from the stop command until standby must be verified.
 VERIFY_S = 3.0
 
 FAST, SLOW = ("voltage_v", "current_a", "status", "temperature_c"), ("soc_pct", "soh_pct")
@@ -35,7 +35,7 @@ RUNS = frozenset({Action.RESUME, Action.SET_LIMIT, Action.SET_MODE, Action.SET_P
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """What every step must fulfil; `check` returns what is wrong, or None."""
+    """A requirement on every decision; `check` returns the violation, or None."""
 
     name: str
     about: str
@@ -47,12 +47,12 @@ def _orders_run(decision: Decision) -> bool:
 
 
 def _runs(taken: Taken) -> bool:
-    """The charger shall run, whether it is told so in this very step or was before."""
+    """Whether the charger should run: commanded in this very decision or before."""
     return taken.decision.setpoint.run or _orders_run(taken.decision)
 
 
 def no_run_without_fresh_readings(taken: Taken) -> str | None:
-    """DESIGN §2: unknown means no."""
+    """Unknown means no."""
     if not _runs(taken):
         return None
     charger, battery = taken.snapshot.charger, taken.snapshot.battery
@@ -67,7 +67,7 @@ def no_run_without_fresh_readings(taken: Taken) -> str | None:
 
 
 def stop_at_once(taken: Taken) -> str | None:
-    """A fault of effect STOP or worse that is new commands a stop in the same step."""
+    """A new fault of effect STOP or worse commands a stop in the same decision."""
     new = [f for f in taken.decision.faults if f.since_s == taken.now_s and f.effect >= Effect.STOP]
     if new and taken.decision.command != STOP:
         return f"{new[0].id} ({new[0].effect.name}) is new, the order is {taken.decision.command}"
@@ -75,7 +75,7 @@ def stop_at_once(taken: Taken) -> str | None:
 
 
 def no_current_under_a_fault(taken: Taken) -> str | None:
-    """While a fault of effect PAUSE or worse is in force, nothing runs."""
+    """While a fault of effect PAUSE or worse is active, nothing runs."""
     worst = max((fault.effect for fault in taken.decision.faults), default=Effect.WARN)
     if worst >= Effect.PAUSE and _runs(taken):
         return f"runs with {taken.decision.faults[0].id} in force"
@@ -83,18 +83,18 @@ def no_current_under_a_fault(taken: Taken) -> str | None:
 
 
 def charge_begins_qualified(taken: Taken) -> str | None:
-    """Current begins after QUALIFYING, or from one stage to the next, and nowhere else."""
+    """Current begins only after QUALIFYING, or from one stage to the next."""
     if taken.after.state not in ENERGISED or taken.before.state in ENERGISED:
         return None
     return None if taken.before.state is State.QUALIFYING else f"{taken.before.state} → {taken.after.state}"
 
 
 def rest_is_verified(taken: Taken) -> str | None:
-    """A state of standby is entered only with a reading, asked for after the state's first stop, that shows it.
+    """A standby state is entered only on a reading that shows standby, requested after the state's first stop.
 
-    And only if the BMU sees no current. A stop that is repeated meanwhile takes no proof away.
+    And only if the BMU sees no current. A stop repeated in the meantime does not invalidate the proof.
     """
-    found = taken.before.state is not State.STARTING and taken.after.state is State.OFFLINE  # it was there
+    found = taken.before.state is not State.STARTING and taken.after.state is State.OFFLINE  # it was there before
     if taken.before.state not in UNVERIFIED or not (found or taken.after.state in AT_REST) or taken.move.restart:
         return None
     amps = taken.snapshot.battery.current_a
@@ -120,7 +120,7 @@ def within_current(taken: Taken) -> str | None:
 
 
 def within_volts(taken: Taken) -> str | None:
-    """Nothing runs while charger or pack is above the station's voltage."""
+    """Nothing runs while charger or pack exceeds the station's voltage."""
     limit_v = taken.rules.bay.limits.voltage_v
     charger, pack = taken.snapshot.charger, taken.snapshot.battery.voltage_v
     highest_v = max(charger.voltage_v if charger else 0.0, pack.value if pack else 0.0)
@@ -136,25 +136,25 @@ def within_temperature(taken: Taken) -> str | None:
 
 
 def unproved_stops(taken: Taken) -> str | None:
-    """In states that wait for a verified standby, stop is the standing order."""
+    """In states that wait for verified standby, the command is stop."""
     if taken.after.state in UNVERIFIED and taken.decision.command != STOP:
         return f"the order in {taken.after.state} is {taken.decision.command}"
     return None
 
 
 def unordered_current_stops(taken: Taken) -> str | None:
-    """DESIGN §2: a charger that reports 0 A while the BMU sees 14 A is running."""
+    """A charger that reports 0 A while the BMU sees 14 A is running."""
     amps, before = taken.snapshot.battery.current_a, taken.before
     if amps is None or amps.value <= BMU_SEES_A or taken.now_s - amps.t_s > FAST_S or taken.move.restart:
         return None
-    since_s = before.witnessed.unordered_s  # of sights one after another, by the core's own count
+    since_s = before.witnessed.unordered_s  # of consecutive readings, by the core's own count
     if taken.after.state in AT_REST and since_s >= UNORDERED_S and taken.decision.command != STOP:
         return f"{taken.after.state} without a stop, and the BMU has seen {amps.value:.1f} A for {since_s:.1f} s"
     return None
 
 
 def counts_over_restarts(taken: Taken) -> str | None:
-    """No limit begins anew with a restart."""
+    """No limit starts over with a restart."""
     before, after = taken.before.session, taken.after.session
     if not taken.move.restart or before is None or after is None:
         return None
@@ -166,7 +166,7 @@ def counts_over_restarts(taken: Taken) -> str | None:
 
 
 def stops_in_time(taken: Taken) -> str | None:
-    """A stop that is not proved in time is called so."""
+    """A stop that is not verified in time leaves STOPPING."""
     since_s = taken.after.since_s
     if taken.after.state is not State.STOPPING or since_s is None or taken.now_s - since_s < VERIFY_S:
         return None
@@ -174,7 +174,7 @@ def stops_in_time(taken: Taken) -> str | None:
 
 
 def precharge_ends(taken: Taken) -> str | None:
-    """A stage of precharge never takes longer than its policy allows, all pauses and restarts left out."""
+    """A stage of precharge never takes longer than its policy allows, not counting pauses and restarts."""
     rule, session = taken.rules.policy.precharge, taken.after.session
     if taken.after.state not in PRECHARGING:
         return None
@@ -187,7 +187,7 @@ def precharge_ends(taken: Taken) -> str | None:
 
 
 def session_ends(taken: Taken) -> str | None:
-    """Energised never longer than the policy's hours."""
+    """A charge is never energised for longer than the policy's hours."""
     session, hours = taken.after.session, taken.rules.max_hours
     if taken.after.state not in ENERGISED or session is None or session.energised_s <= hours * 3600:
         return None
@@ -196,23 +196,23 @@ def session_ends(taken: Taken) -> str | None:
 
 PROPERTIES: tuple[Property, ...] = (
     Property("fresh", "nothing runs without fresh readings of everything", no_run_without_fresh_readings),
-    Property("stop at once", "a new fault of effect STOP or worse: stop in the same step", stop_at_once),
-    Property("no current", "nothing runs while a fault of effect PAUSE or worse is in force", no_current_under_a_fault),
-    Property("operator", "an accepted stop or pause takes effect in the same step", operator_stops),
-    Property("hold", "what an operator stopped, only an operator starts", held_until_started),
-    Property("held", "HELD is left by a person's start only, and says so", waits_for_a_start),
-    Property("tripped", "TRIPPED is left by a reset, or to stop", tripped_until_reset),
-    Property("latched", "a latched fault is taken away by a reset only", latched_until_reset),
-    Property("qualified", "current begins after QUALIFYING only", charge_begins_qualified),
-    Property("verified", "standby is entered on proof only", rest_is_verified),
+    Property("stop at once", "a new fault of effect STOP or worse: stop in the same decision", stop_at_once),
+    Property("no current", "nothing runs while a fault of effect PAUSE or worse is active", no_current_under_a_fault),
+    Property("operator", "an accepted stop or pause takes effect in the same decision", operator_stops),
+    Property("hold", "only an operator starts what an operator stopped", held_until_started),
+    Property("held", "HELD ends only with a person's start, and says so", waits_for_a_start),
+    Property("tripped", "TRIPPED ends only with a reset, or to stop", tripped_until_reset),
+    Property("latched", "only a reset clears a latched fault", latched_until_reset),
+    Property("qualified", "current begins only after QUALIFYING", charge_begins_qualified),
+    Property("verified", "standby is entered only on proof", rest_is_verified),
     Property("current limit", "no step above the station's current limit", within_current),
     Property("voltage limit", "nothing runs above the station's voltage", within_volts),
     Property("temperature limit", "nothing runs outside the station's temperatures", within_temperature),
-    Property("standing stop", "stop is the order until standby is proved", unproved_stops),
+    Property("standing stop", "the command is stop until standby is verified", unproved_stops),
     Property("alarm", "danger: a charger may be out of control; attention: a fault waits for a person", alarmed),
-    Property("unordered", "current that nobody ordered is stopped, whatever the charger says", unordered_current_stops),
+    Property("unordered", "uncommanded current is stopped, whatever the charger reports", unordered_current_stops),
     Property("death", "a service that dies in mid-charge waits for a person", a_death_in_mid_charge_holds),
-    Property("counters", "no limit begins anew with a restart", counts_over_restarts),
+    Property("counters", "no limit starts over with a restart", counts_over_restarts),
     Property("in time", "STOPPING ends within 3 s, one way or the other", stops_in_time),
     Property("precharge", "precharge never exceeds its time", precharge_ends),
     Property("hours", "a charge never exceeds its hours", session_ends),

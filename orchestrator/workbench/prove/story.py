@@ -1,4 +1,4 @@
-"""A counterexample as people read it: what the devices did, step by step, and what the bay made of it."""
+"""A counterexample for people: what the devices did, decision by decision, and how the bay reacted."""
 
 from dataclasses import dataclass
 from itertools import groupby
@@ -8,16 +8,16 @@ from orchestrator.core.rules import Rules
 from orchestrator.model import Action, Cause, Decision, Measurement, Request, Snapshot
 from orchestrator.text.catalogue import say
 
-#: Where time begins in a story; not 0, so that nobody takes "never" for a time.
+#: Where time begins in a story; not 0, so that "never" cannot be mistaken for a time.
 BEGIN_S = 1000.0
-#: The next moment: how often a bay is looked at, or nearly.
+#: The time to the next decision, roughly as in the service.
 TICK_S = 0.25
 WITH_VALUE = (Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE)
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """What happens between two steps: time passes, and then this is what the devices and the operator say."""
+    """What happens between two decisions: time passes, and then devices and operator report this."""
 
     dt_s: float
     charger: str  #: the name of a class of inputs
@@ -25,11 +25,11 @@ class Move:
     request: Request | None = None
     internal: str = ""
     ending: Cause | None = None
-    restart: bool = False  #: the service has died, and begins again with what it had written down
+    restart: bool = False  #: the service has died, and starts again from its persisted state
 
     @property
     def lasts(self) -> bool:
-        """Nothing but surroundings, which may go on."""
+        """Whether it consists only of surroundings, which may persist."""
         return self.request is None and not (self.internal or self.ending or self.restart)
 
     def __str__(self) -> str:
@@ -42,7 +42,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """One step as it was taken."""
+    """One decision as it was made."""
 
     move: Move
     now_s: float
@@ -51,12 +51,12 @@ class Taken:
     decision: Decision
     after: Memory
     rules: Rules
-    error: str = ""  #: the exception that it raised instead
+    error: str = ""  #: the exception raised instead
 
 
 @dataclass(frozen=True, slots=True)
 class Counterexample:
-    """Something that must hold and does not, and the shortest story that shows it."""
+    """A violated property, and the shortest story that shows it."""
 
     name: str
     text: str
@@ -72,7 +72,7 @@ class Counterexample:
 
 
 def _told(taken: Taken) -> str:
-    """One step; steps that tell the same are told once."""
+    """One decision as text; equal consecutive ones are shown once."""
     answer = f"; answer: {say(taken.decision.answer)}" if taken.decision.answer else ""
     return (
         f"{taken.move}\n      {_values(taken.snapshot)}\n"

@@ -1,1 +1,1 @@
-"""What was decided, decided again."""
+"""Repeats recorded decisions."""

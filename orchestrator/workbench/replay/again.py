@@ -1,7 +1,7 @@
-"""Decisions taken again from what was recorded: with the same rules they must be the same, bit for bit.
+"""Repeats decisions from a recording: with the same rules they must be the same, bit for bit.
 
-Compared is what the journal says of each step (state, reason, order, faults, session) and, wherever the record begins
-anew, the whole memory that all steps before have led to.
+It compares each decision with the journal (state, reason, command, faults, session) and, wherever the recording has a
+complete snapshot, the whole memory that results from all decisions before.
 """
 
 import json
@@ -19,18 +19,18 @@ from orchestrator.workbench.replay.recording import Event, Recorded
 
 @dataclass(frozen=True, slots=True)
 class Again:
-    """One step, taken again. `memory` is what it was given, `after` what it left."""
+    """One repeated decision. `memory` is its input, `after` its result."""
 
     recorded: Recorded
     rules: Rules
     memory: Memory
     decision: Decision
     after: Memory
-    wrong: str = ""  #: what is not as it was recorded
+    wrong: str = ""  #: the difference from the recording
 
 
 def again(steps: Iterable[Recorded]) -> Iterator[Again]:
-    """Take each step with the memory that the one before has left; a gap in the record begins with the recorded one."""
+    """Repeat each decision with the memory left by the previous one; after a gap, with the recorded memory."""
     memory: Memory | None = None
     rules: Rules | None = None
     before: Decision | None = None
@@ -38,7 +38,7 @@ def again(steps: Iterable[Recorded]) -> Iterator[Again]:
         wrong = ""
         if recorded.memory is not None and recorded.rules is not None:
             if recorded.gap or recorded.memory.last_s is None:
-                before = None  # of the step before nothing is known, or there was none
+                before = None  # the previous decision is unknown, or there was none
             elif memory is not None and memory.last_s == recorded.memory.last_s:
                 wrong = _differs(memory, recorded.memory)
             memory, rules = recorded.memory, recorded.rules
@@ -52,7 +52,7 @@ def again(steps: Iterable[Recorded]) -> Iterator[Again]:
 
 
 def _differs(ours: Memory, recorded: Memory) -> str:
-    """The first value of the memory that is not the recorded one."""
+    """The first value of the memory that differs from the recorded one."""
     for name in names():
         now, was = value_of(ours, name), value_of(recorded, name)
         if now != was:

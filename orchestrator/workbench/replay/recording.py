@@ -1,9 +1,10 @@
-"""A journal read back: every step that was recorded of a bay, with all that it was given, and what was said of it.
+"""Reads a journal back: every recorded decision of a bay, with its input, and the events it caused.
 
-Theory of operation. What stands in a file is hostile until it is decoded, and a power cut leaves torn lines: what
-cannot be read is counted and passed over. Snapshots are differences, so that a line which is lost takes its successors
-with it up to the next whole one. A run of the service, and after a reboot the monotonic clock, begin anew: an event
-belongs to the step in whose few milliseconds it was written, and of several to the one of the same wall-clock time.
+Theory of operation. File content is untrusted until it is decoded, and a power cut leaves torn lines: unreadable lines
+are counted and skipped. Snapshots are differences, so a lost line invalidates its successors up to the next complete
+one. Each run of the service starts over, and so does the monotonic clock after a reboot: an event belongs to the
+decision within whose few milliseconds it was written, and if there are several, to the one with the same wall-clock
+time.
 """
 
 import gzip
@@ -26,14 +27,14 @@ from orchestrator.errors import ConfigError, Finding
 from orchestrator.model import Cause, Snapshot
 from orchestrator.model.cause import from_plain
 
-#: What `decision_lines` writes of a step.
+#: The records that `decision_lines` writes for a decision.
 EVENTS = frozenset({"transition", "command", "fault", "session", "decision"})
 STREAMS = ("events", "snapshots")
-#: With these, nothing that was there before goes on: another run of the service, lines that no disk took.
+#: Records that break continuity: another run of the service, lines that the disk did not take.
 BREAKS = frozenset({"run", "lost"})
-#: Why a record cannot be decided again: it has the sentences of a version before, and no causes.
+#: Why a recording cannot be repeated: it has sentences from an older version, and no causes.
 SENTENCES = "an older version of this service has recorded this step: only that version can decide it again"
-#: No step takes longer than this to be written down.
+#: No decision takes longer than this to be recorded.
 STEP_S = 60.0
 
 Fields = dict[str, Any]
@@ -45,43 +46,43 @@ _CONVERTER.register_structure_hook(Cause, lambda value, _: from_plain(value))
 
 
 class _OlderError(Exception):
-    """A line that has sentences where the core has causes now."""
+    """A line with sentences where the core now has causes."""
 
 
 @dataclass(slots=True)
 class Recorded:
-    """One step as it was taken. `memory` and `rules` are there where the record begins anew."""
+    """One recorded decision. `memory` and `rules` are present where the recording has a complete snapshot."""
 
-    at_s: float  #: the time that the step was given
+    at_s: float  #: the time given to the decision
     wall: str  #: the same for people, RFC 3339
     snapshot: Snapshot
     memory: Memory | None = None
     rules: Rules | None = None
-    events: list[Event] = field(default_factory=list)  #: what the journal says of it
-    written_s: float = 0.0  #: when it was written down, right after its events
-    gap: bool = False  #: steps right before it are lost
-    unsure: bool = False  #: events of it may be lost
+    events: list[Event] = field(default_factory=list)  #: its events in the journal
+    written_s: float = 0.0  #: when it was recorded, right after its events
+    gap: bool = False  #: decisions right before it are lost
+    unsure: bool = False  #: some of its events may be lost
 
 
 @dataclass(slots=True)
 class Record:
-    """All that could be read."""
+    """Everything that could be read."""
 
-    bays: dict[str, list[Recorded]] = field(default_factory=dict)  #: each bay's steps, in order
-    broken: list[Finding] = field(default_factory=list)  #: the lines that could not be
+    bays: dict[str, list[Recorded]] = field(default_factory=dict)  #: each bay's decisions, in order
+    broken: list[Finding] = field(default_factory=list)  #: the unreadable lines
 
 
 @dataclass(slots=True)
 class _Stream:
-    """How far the files of one stream have been read."""
+    """The reading position in the files of one stream."""
 
     parts: dict[str, Fields] = field(default_factory=dict)  #: each bay's last snapshot
-    gaps: set[str] = field(default_factory=set)  #: the bays that have lost steps since theirs
+    gaps: set[str] = field(default_factory=set)  #: the bays that have lost decisions since then
     wall: str = ""  #: the time of the last line …
     hole: bool = False  #: … after which something is missing
 
     def stop(self) -> None:
-        """What follows does not go on from what was before."""
+        """Break continuity: the following lines do not continue the earlier ones."""
         self.gaps |= self.parts.keys()
         self.parts.clear()
 
@@ -92,16 +93,16 @@ class _Reader:
     def __init__(self) -> None:
         self.record = Record()
         self.events: list[Fields] = []
-        self.holes: list[tuple[str, str]] = []  # between which wall-clock times something is missing
+        self.holes: list[tuple[str, str]] = []  # wall-clock intervals in which something is missing
         self._streams: dict[str, _Stream] = {}
         self._stream = _Stream()
 
     def begin(self, path: Path) -> None:
-        """Another file, which may go on where an older one has ended."""
+        """Begin another file, which may continue an older one."""
         self._stream = self._streams.setdefault(str(path.parent / path.name.partition(".")[0]), _Stream())
 
     def take(self, path: Path, number: int, text: bytes) -> None:
-        """One line."""
+        """Process one line."""
         try:
             line = _line(text)
             if line["kind"] == "snapshot":
@@ -122,13 +123,13 @@ class _Reader:
             self.events.append(line)
 
     def broken(self, path: Path, number: int, text: str) -> None:
-        """A line that is passed over; nobody knows what it was."""
+        """Record a skipped line; its content is unknown."""
         self.record.broken.append(Finding(str(path), number, 1, text))
         self._stream.hole = True
         self._stream.stop()
 
     def end(self) -> Record:
-        """Everything, each event where it belongs."""
+        """Everything read, with each event assigned to its decision."""
         self.holes += [(stream.wall, "") for stream in self._streams.values() if stream.hole]
         for step in (step for taken in self.record.bays.values() for step in taken):
             step.unsure = any(since <= step.wall and (not until or step.wall <= until) for since, until in self.holes)
@@ -136,14 +137,14 @@ class _Reader:
         return self.record
 
     def _snapshot(self, line: Fields) -> None:
-        """A whole one, or what differs from the one before."""
+        """A complete snapshot, or its differences from the previous one."""
         memory: Memory | None = None
         rules: Rules | None = None
         bay, at_s, parts = line["bay"], float(line["at_s"]), self._stream.parts
         if line.get("whole"):
             if "cause" not in line["memory"] or isinstance(line["charger_link"]["problem"], str):
                 raise _OlderError
-            plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # what is newer has its default
+            plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # newer fields get their defaults
             memory = _CONVERTER.structure(in_parts(line["memory"]), Memory)
             if "chemistry" not in line["config"]["policy"]["pack"]:
                 raise ValueError(
@@ -155,7 +156,7 @@ class _Reader:
             changed = {name: line[name] for name in Snapshot.__slots__ if name in line}
             plain = {**before, **changed, "battery": {**before["battery"], **changed.get("battery", {})}}
         else:
-            return  # what it continues has gone
+            return  # the snapshot that it continues is lost
         snapshot = _CONVERTER.structure(plain, Snapshot)
         recorded = Recorded(
             at_s, line["wall"], snapshot, memory, rules, written_s=line["t"], gap=bay in self._stream.gaps
@@ -166,7 +167,7 @@ class _Reader:
 
 
 def read(paths: Iterable[Path]) -> Record:
-    """Each bay's steps from journal directories and files (JSON Lines, also gzipped).
+    """Each bay's decisions from journal directories and files (JSON Lines, also gzipped).
 
     Raises ConfigError for files that cannot be read at all.
     """
@@ -179,7 +180,7 @@ def read(paths: Iterable[Path]) -> Record:
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:
-    """Files, and of directories their streams; the oldest first."""
+    """The files, and the stream files of directories; the oldest first."""
     found: list[Path] = []
     for path in paths:
         inside = [one for name in STREAMS for one in path.glob(f"{name}*.jsonl*")] if path.is_dir() else [path]
@@ -219,20 +220,20 @@ def _line(text: bytes) -> Fields:
 
 
 def _spread(events: Iterable[Fields], bays: Mapping[str, list[Recorded]]) -> None:
-    """Give each event to the step that it was written for; none to those whose step is lost."""
+    """Assign each event to its decision; drop events whose decision is lost."""
     by_time = {bay: sorted(steps, key=lambda step: step.at_s) for bay, steps in bays.items()}
     times = {bay: [step.at_s for step in steps] for bay, steps in by_time.items()}
     for line in events:
         near = list(_near(line["t"], by_time.get(line["bay"], []), times.get(line["bay"], [])))
         if near:
-            later = [step for step in near if step.wall >= line["wall"]]  # a step is written down after its events
+            later = [step for step in near if step.wall >= line["wall"]]  # a decision is recorded after its events
             step = min(later or near, key=lambda step: step.wall)
             fields = {name: value for name, value in line.items() if name not in ("t", "wall", "bay", "kind")}
             step.events.append((line["kind"], fields))
 
 
 def _near(t_s: float, steps: Sequence[Recorded], times: Sequence[float]) -> Iterator[Recorded]:
-    """The steps that something of this time may have been written for: one in each boot of the machine."""
+    """The decisions that an event of this time may belong to: one in each boot of the machine."""
     for at in range(bisect_right(times, t_s) - 1, -1, -1):
         if times[at] < t_s - STEP_S:
             return

@@ -1,4 +1,4 @@
-"""`orchestrator replay`: a journal's decisions taken again, and what became of them, line by line."""
+"""`orchestrator replay`: repeats a journal's decisions and prints the results, line by line."""
 
 from collections.abc import Callable, Iterable
 from itertools import pairwise
@@ -11,15 +11,15 @@ from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import compare, told
 from orchestrator.workbench.replay.recording import Recorded, read
 
-#: Of a bay's deviations, so many are shown.
+#: At most this many deviations are shown per bay.
 SHOWN = 20
 Show = Callable[[str], None]
 
 
 def replay(journals: Iterable[Path], policy: str | None, bays: Iterable[str] = (), show: Show = print) -> int:
-    """Replay each bay, or those named; 1 if without `policy` a decision is not as it was recorded.
+    """Replay each bay, or those named; returns 1 if, without `policy`, a decision differs from the recording.
 
-    Raises ConfigError for journals or a policy that cannot be read, OrchestratorError where nothing is recorded.
+    Raises ConfigError if journals or policy cannot be read, OrchestratorError if nothing is recorded.
     """
     other = load_policy(policy) if policy else None
     record = read(journals)

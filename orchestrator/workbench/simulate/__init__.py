@@ -1,1 +1,1 @@
-"""What a policy would do, in hours of simulated time."""
+"""Simulates a policy over hours."""

@@ -1,4 +1,4 @@
-"""Several policies on one scenario: when they did different things."""
+"""Finds the times at which several policies behaved differently on one scenario."""
 
 from collections.abc import Iterator, Sequence
 
@@ -6,12 +6,12 @@ from orchestrator.core.states import PASSING
 from orchestrator.model import State
 from orchestrator.workbench.simulate.trail import Span
 
-#: A difference in time of less than this is none.
+#: A shorter difference does not count.
 SAME_S = 60.0
 
 
 def differences(all_spans: Sequence[Sequence[Span]]) -> list[tuple[float, float]]:
-    """The times (from, to, in s) in which not all were in one state on one step, longer than `SAME_S`."""
+    """The intervals (from, to, in s) longer than `SAME_S` in which states or steps differed."""
     times = sorted({span.from_s for spans in all_spans for span in spans} | {spans[-1].to_s for spans in all_spans})
     found: list[tuple[float, float]] = []
     walks = [_walk(spans, times) for spans in all_spans]
@@ -26,7 +26,7 @@ def differences(all_spans: Sequence[Sequence[Span]]) -> list[tuple[float, float]
 
 
 def _walk(spans: Sequence[Span], times: Sequence[float]) -> Iterator[tuple[State, int | None] | None]:
-    """What was done from each of the times on."""
+    """State and step from each of the times on."""
     done: tuple[State, int | None] | None = None
     rest = iter(spans)
     span: Span | None = next(rest, None)

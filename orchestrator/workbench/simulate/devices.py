@@ -1,7 +1,7 @@
-"""What the service would know of a scenario's devices: orders out, readings in, as coarse as they are on the wire.
+"""A scenario's devices as the service sees them: commands out, readings in, as coarse as on the wire.
 
-One turn of the charger's line is one tick: it hears the standing order in the middle of it and reports at its end. The
-BMU answers everything in every tick. Lost frames and delays are for the tests of the service, not for the workbench.
+One turn of the charger's line is one tick: the charger receives the command in the middle of it and reports at its end.
+The BMU answers everything in every tick. Lost frames and delays belong in the service's tests, not in the workbench.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from orchestrator.workbench.simulate.plant import Plant
 
 #: A turn of the charger's line (0.2 s) rounded up to a binary fraction, so that times add up exactly.
 TICK_S = 0.25
-#: A BMU that has said nothing for this long is silent, as the service has it.
+#: After this long without a reading the BMU is silent, as in the service.
 SILENT_S = 1.5
 
 
@@ -34,7 +34,7 @@ def _stop(charger: Charger, _value: int) -> None:
     charger.push(Push.OPERATION, 0)
 
 
-#: What each order does to the charger.
+#: The effect of each command on the charger.
 ORDERS: dict[Action, Callable[[Charger, int], None]] = {
     Action.STOP: _stop,
     Action.RESUME: lambda charger, _: charger.rest(1),
@@ -49,18 +49,18 @@ class Devices:
     """The lines to one bay's charger and BMU."""
 
     def __init__(self) -> None:
-        self.faults: tuple[SensorFault, ...] = ()  #: the sensor faults in force
+        self.faults: tuple[SensorFault, ...] = ()  #: the active sensor faults
         self._link = ChargerLink(online=True)
         self._told: dict[str, Measurement] = {}
 
     def copy(self) -> "Devices":
-        """Others that know the same."""
+        """An independent copy in the same state."""
         twin = Devices()
         twin.faults, twin._link, twin._told = self.faults, self._link, self._told
         return twin
 
     def obey(self, command: Command | None, charger: Charger, now_s: float) -> None:
-        """Let the charger hear the standing order."""
+        """Deliver the command to the charger."""
         if command is None:
             return
         ORDERS[command.action](charger, command.value)
@@ -68,7 +68,7 @@ class Devices:
         self._link = ChargerLink(online=True, sent=Sent(command, now_s), stop_sent_s=stop_s)
 
     def snapshot(self, plant: Plant, now_s: float, request: Request | None = None) -> Snapshot:
-        """Everything that is known at the end of a tick."""
+        """Everything known at the end of a tick."""
         if plant.pack is not None:
             self._told = {**self._told, **self._measured(plant.pack, now_s)}
         told = self._told
@@ -82,7 +82,7 @@ class Devices:
         )
 
     def told_c(self, pack: Pack | None, now_s: float) -> float | None:
-        """The temperature that the BMU tells at `now_s`, None if it tells none."""
+        """The temperature that the BMU reports at `now_s`; None if it reports none."""
         if pack is None:
             return None
         truth = {"temperature_c": pack.temperature_c}
@@ -118,7 +118,7 @@ class Devices:
                     truth[name] += fault.by * (now_s / 3600 - fault.from_h)
 
 
-#: Digits after the point, as both object maps have them.
+#: Digits after the decimal point, as in both object maps.
 DECIMALS = {"voltage_v": 2, "current_a": 2, "status": 0, "temperature_c": 1, "soc_pct": 0, "soh_pct": 0}
 ONLINE, OFFLINE = BatteryLink(online=True), BatteryLink()
 

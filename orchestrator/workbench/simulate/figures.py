@@ -1,4 +1,4 @@
-"""What a simulation comes to, in figures: how long, how much, how warm, and how often something was in the way."""
+"""The key figures of a simulation: duration, charge, temperature, stops and faults."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -11,27 +11,27 @@ from orchestrator.model import State
 from orchestrator.workbench.simulate.simulation import Run
 from orchestrator.workbench.simulate.trail import Moment, Span
 
-#: Above these volts of a cell time counts as time at high voltage, in which cells age fastest.
+#: Above this cell voltage, time counts as time at high voltage, in which cells age fastest.
 HIGH_CELL_V: dict[Cell, float] = {Cell.NMC: 4.10, Cell.LFP: 3.45}
 
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """One policy's figures on one scenario. Hours of batteries, not of the bay, where there are several."""
+    """One policy's figures on one scenario. With several batteries, hours are per battery, not per bay."""
 
     policy: str
     visits: int
     full: int  #: visits that ended with a full battery
-    full_h: float | None  #: from arrival to full, mean of those; None: none was
+    full_h: float | None  #: mean time from arrival to full; None: none was full
     left_pct: float | None  #: mean state of charge at the end of a visit
     charged_ah: float
     charged_wh: float
-    peak_c: float | None  #: the warmest that a battery was
+    peak_c: float | None  #: the highest temperature of a battery
     high_voltage_h: float
-    stops: int  #: how often the current was stopped before the battery was full; a battery that leaves is one
+    stops: int  #: stops before the battery was full, including its removal
     step_changes: int
     state_h: Mapping[State, float]
-    faults: Mapping[str, int] = field(default_factory=dict)  #: how often each came
+    faults: Mapping[str, int] = field(default_factory=dict)  #: occurrences of each
 
 
 def figures(run: Run) -> Figures:
@@ -75,14 +75,14 @@ def _high_voltage_h(visit: Visit, stay: Sequence[Moment], scenario: Scenario) ->
 
 
 def _above_s(before: Moment, now: Moment, high_v: float) -> float:
-    """How long the voltage, straight between the two, was that high."""
+    """How long the voltage, linear between the two, was that high."""
     low, high = sorted((before.voltage_v or 0.0, now.voltage_v or 0.0))
     share = 1.0 if low >= high_v else max(high - high_v, 0.0) / (high - low) if high > low else 0.0
     return (now.t_s - before.t_s) * share
 
 
 def _stopped(span: Span, spans: Sequence[Span]) -> bool:
-    """Whether this is a stop that does not end with a full battery."""
+    """Whether this is a stop that does not lead to FULL."""
     if span.state is not State.STOPPING:
         return False
     return next((s.state for s in spans if s.from_s >= span.to_s and s is not span), None) is not State.FULL
@@ -133,7 +133,7 @@ ROWS: tuple[Row, ...] = (
 
 
 def table(all_figures: Sequence[Figures]) -> list[list[str]]:
-    """A row for each figure and each state that lasts, a column for each policy; first of all headings."""
+    """A row per figure and per lasting state, a column per policy; the first row has the headings."""
     rows = [["", *(f.policy for f in all_figures)]]
     rows += [[name, *(tell(f) for f in all_figures)] for name, tell in ROWS]
     for state in State:

@@ -1,8 +1,8 @@
-"""The physics of a scenario: a charger, and the battery that is in the bay. Pure: time is an argument.
+"""The physics of a scenario: a charger, and the battery in the bay. Pure: time is an argument.
 
-The charger and the pack are those of the emulators. What is special here is that hours pass in a few hundred pieces: a
-piece is as long as the current allows, and where the constant voltage lets it fall, the current of its middle counts
-(the midpoint method), so that the size of the pieces does not show in the result.
+Charger and pack are those of the emulators. Here, however, hours pass in a few hundred pieces: a piece is as long as
+the current allows, and at constant voltage, where the current falls, its value in the middle of the piece counts (the
+midpoint method), so that the size of the pieces does not affect the result.
 """
 
 from copy import copy
@@ -13,14 +13,14 @@ from orchestrator.sim.chemistry import LFP, NMC, Chemistry, interpolate
 from orchestrator.sim.pack import Pack
 
 CHEMISTRIES: dict[Cell, Chemistry] = {Cell.NMC: NMC, Cell.LFP: LFP}
-#: The longest piece: with a constant current, and while the constant voltage limits it.
+#: The longest piece: at constant current, and at constant voltage.
 STEADY_S, TAPERING_S = 10.0, 4.0
-#: From here on the constant voltage may come to limit the current within a piece.
+#: Below this ratio of possible to demanded current, the constant voltage may begin to limit it within a piece.
 NEARLY_TAPERING = 1.5
 
 
 def pack_of(model: BatteryModel) -> Pack:
-    """The battery as the scenario describes it; its resistance is that of its age."""
+    """The battery described in the scenario, with its resistance increased by ageing."""
     aged = 1 + model.ageing_per_pct * (100 - model.soh_pct)
     return Pack(
         chemistry=CHEMISTRIES[model.cells],
@@ -57,7 +57,7 @@ class Plant:
         self._packs = {name: pack_of(model) for name, model in scenario.batteries.items()}
 
     def copy(self) -> "Plant":
-        """Another plant in the same state; batteries that are not in the bay are shared."""
+        """An independent copy in the same state; batteries outside the bay are shared."""
         twin = copy(self)
         twin.charger = copy(self.charger)
         twin.pack = copy(self.pack)
@@ -65,14 +65,14 @@ class Plant:
 
     @property
     def ambient_c(self) -> float:
-        """The temperature around the bay, now."""
+        """The present ambient temperature."""
         return self._ambient_c(self.t_s)
 
     def _ambient_c(self, t_s: float) -> float:
         return interpolate(self._weather, t_s)
 
     def arrive(self, visit: Visit) -> None:
-        """Somebody puts a battery in."""
+        """A battery is inserted."""
         pack = self._packs[visit.battery]
         pack.ambient_c = self.ambient_c
         pack.temperature_c = pack.ambient_c if visit.temperature_c is None else visit.temperature_c
@@ -84,7 +84,7 @@ class Plant:
         self.pack = pack
 
     def leave(self, visit: Visit) -> None:
-        """Somebody takes the battery out; it keeps its charge until it comes back."""
+        """The battery is removed; it keeps its charge until it comes back."""
         if self.pack is not None:
             self._packs[visit.battery] = self.pack
         self.pack = None
@@ -110,13 +110,13 @@ class Plant:
         current_a = self._middle_a(dt_s / 2, charger, pack) if midpoint else charger.current_a
         pack.advance(dt_s, current_a)
         charger.advance(dt_s, pack)
-        pack.current_a = charger.current_a  # charger and BMU are measured on one cable
+        pack.current_a = charger.current_a  # charger and BMU measure the same cable
         ah = current_a * dt_s / 3600
         self.charged_ah += ah
         self.charged_wh += ah * charger.voltage_v
 
     def _middle_a(self, half_s: float, charger: Charger, pack: Pack) -> float:
-        """The current in the middle of a piece; the pack is left as it was."""
+        """The current in the middle of a piece; the pack is restored afterwards."""
         before = pack.charge_ah, pack.polarisation_v, pack.temperature_c
         pack.advance(half_s, charger.current_a)
         middle_a = charger.output_a(half_s, charger.demand_a, charger.room_a(pack))

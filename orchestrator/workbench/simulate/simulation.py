@@ -1,4 +1,4 @@
-"""One policy on one scenario: the product's own `step()`, the emulators' charger and pack, and time that jumps."""
+"""Plays one policy on one scenario: the product's own `decide()`, the emulators' charger and pack, and jumping time."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -20,28 +20,28 @@ from orchestrator.workbench.simulate.leap import Outline, brought_up, outline
 from orchestrator.workbench.simulate.plant import Plant
 from orchestrator.workbench.simulate.trail import Trail
 
-#: The longest leap, in ticks: two minutes, so that a curve drawn through the moments is one.
+#: The longest leap, in ticks: two minutes, so that a curve through the moments is smooth.
 MAX_LEAP = round(120 / TICK_S)
-#: After so many moments `watch` is called.
+#: `watch` is called after this many decisions.
 WATCH_EVERY = 100
 
 Happening = Callable[[], None]
 
 
 class UnsuitableError(OrchestratorError):
-    """The policy is not for the batteries of the scenario."""
+    """The policy does not suit the scenario's batteries."""
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What came of it."""
+    """The result of a simulation."""
 
     policy: Policy
     scenario: Scenario
     trail: Trail
     charged_ah: float
     charged_wh: float
-    steps: int  #: how often `step()` was called, what was taken back included
+    steps: int  #: how often `decide()` was called, including undone leaps
 
 
 def simulate(
@@ -49,8 +49,8 @@ def simulate(
 ) -> Run:
     """Play the scenario to its end.
 
-    Without `stretch` every tick is stepped through. `watch` is called now and then with the share that is done (0 … 1).
-    Raises UnsuitableError.
+    Without `stretch` every tick is decided. `watch` is called regularly with the share that is done (0 … 1). Raises
+    UnsuitableError.
     """
     return Simulation(policy, scenario, MAX_LEAP if stretch else 1).run(watch or (lambda _: None))
 
@@ -104,7 +104,7 @@ class Simulation:
     # --- what happens to the bay -----------------------------------------------------------------------------------
 
     def _happenings(self, end: int) -> Iterator[tuple[int, Happening]]:
-        """(tick, what happens then) of everything in the scenario that happens before its end, and the end."""
+        """(tick, action) for everything that happens in the scenario before its end, and for the end."""
         for tick, happening in self._planned():
             if tick < end:
                 yield tick, happening
@@ -141,8 +141,8 @@ class Simulation:
     # --- time ------------------------------------------------------------------------------------------------------
 
     def _until(self, end: int, watch: Callable[[int], None]) -> None:
-        """Let time pass until the tick `end`: leaps that grow while nothing happens, and halve before it does."""
-        leap, news = 1, 0  # at the tick `news` something will have happened; 0: nothing is known of it
+        """Advance to the tick `end` in leaps, which grow while nothing happens and halve before something does."""
+        leap, news = 1, 0  # by the tick `news` something will have happened; 0: nothing is known
         while self._tick < end:
             ticks = (news - self._tick) // 2 if news > self._tick else leap
             ticks = 1 if self._restless else max(1, min(ticks, end - self._tick))
@@ -157,11 +157,11 @@ class Simulation:
 
     @property
     def _restless(self) -> bool:
-        """Every tick counts: an order is under way, or the current comes in pulses."""
+        """Whether every tick counts: a command is under way, or the current is pulsing."""
         return self._request is not None or self._decision.command is not None or self._plant.charger.pulsing
 
     def _leap(self, ticks: int) -> bool:
-        """Let so many ticks pass and say whether nothing has happened; if it has, only a single tick has passed."""
+        """Leap by this many ticks; True if nothing happened. Otherwise undo it, unless it was a single tick."""
         plant, devices, memory = self._plant, self._devices, self._memory
         if ticks > 1:
             plant, devices = plant.copy(), devices.copy()
@@ -181,7 +181,7 @@ class Simulation:
         return nothing_happened
 
     def _skip(self, ticks: int, plant: Plant, devices: Devices) -> Memory:
-        """Let the plant go on for so many ticks without a step; the memory as steps would have left it."""
+        """Advance the plant by this many ticks without decisions; returns the memory that they would have left."""
         memory, warmth = self._memory, self._memory.battery.warmth
         end_s = (self._tick + ticks) * TICK_S
         before_ah, before_wh = plant.charged_ah, plant.charged_wh

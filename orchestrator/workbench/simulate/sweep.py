@@ -1,4 +1,4 @@
-"""Many values of a policy's keys on one scenario: which of them charges faster, cooler, or at a lower voltage."""
+"""Tries many values of a policy's keys on one scenario: which charges faster, cooler, or at a lower voltage."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,51 +14,51 @@ from orchestrator.errors import OrchestratorError, UsageError
 from orchestrator.workbench.simulate.figures import ROWS, Figures, figures
 from orchestrator.workbench.simulate.simulation import rules_of, simulate
 
-#: `key=a..b:n`; several keys that shall have the same value are joined by commas.
+#: `key=a..b:n`; commas join keys that share a value.
 _FORM = re.compile(r"(?P<keys>[^=]+)=(?P<low>-?[\d.]+)\.\.(?P<high>-?[\d.]+):(?P<count>\d+)")
 #: More than this is a typing error.
 MAX_POINTS = 100_000
-#: Points that one process is handed at a time.
+#: Points handed to a process at a time.
 CHUNK = 8
-#: A cluster that has not answered by then is not there.
+#: How long to wait for a cluster.
 CONNECT_S = 10
 
 
 class ClusterError(OrchestratorError):
-    """There is no Dask cluster, or nothing to reach it with."""
+    """There is no Dask cluster, or Dask is not installed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One key, or several that have the same value, and the values that it takes."""
+    """One key, or several that share a value, and the values to try."""
 
     keys: tuple[str, ...]
     values: tuple[str, ...]
 
     @property
     def name(self) -> str:
-        """What it is called in tables: its first key stands for the others."""
+        """Its name in tables: the first key represents the others."""
         return self.keys[0] + (f" (and {len(self.keys) - 1} more)" if len(self.keys) > 1 else "")
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """One combination of values, and what came of it: figures, or why the policy may not have these values."""
+    """One combination of values, and its result: figures, or the reason these values are invalid."""
 
-    values: tuple[str, ...]  #: one for each axis
+    values: tuple[str, ...]  #: one per axis
     figures: Figures | None
     refused: str = ""
 
 
 def axis(text: str) -> Axis:
-    """The axis that `key=a..b:n` stands for: n values from a to b. Raises UsageError."""
+    """The axis for `key=a..b:n`: n values from a to b. Raises UsageError."""
     match = _FORM.fullmatch(text)
     try:
         if match is None:
             raise ValueError
         low, high, count = float(match["low"]), float(match["high"]), int(match["count"])
     except ValueError:
-        raise UsageError(f"--sweep {text}: write KEY=FROM..TO:COUNT, e.g. finish.soc_pct=80..100:5") from None
+        raise UsageError(f"--sweep {text}: write KEY=FROM..TO:COUNT, e.g. finish.target_soc_pct=80..100:5") from None
     if not 2 <= count <= MAX_POINTS:
         raise UsageError(f"--sweep {text}: {count} values; write 2 … {MAX_POINTS}")
     values = (low + (high - low) * i / (count - 1) for i in range(count))
@@ -67,7 +67,7 @@ def axis(text: str) -> Axis:
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """A sweep that has been played."""
+    """A completed sweep."""
 
     policy: str
     scenario: str
@@ -78,10 +78,10 @@ class Sweep:
 def played(
     policy: str, scenario: Scenario, axes: Sequence[Axis], pool: Executor, watch: Callable[[str, float], None]
 ) -> Sweep:
-    """Every combination of the axes' values, played in the pool; the policy is a shipped name or a path.
+    """Play every combination of the axes' values in the pool; the policy is a shipped name or a path.
 
-    `watch` is called with the policy's name and the share that is done. Raises ConfigError for what is wrong in the
-    policy as it is, UnsuitableError for a policy that is not for the scenario, UsageError for too many points.
+    `watch` is called with the policy's name and the share that is done. Raises ConfigError for errors in the policy
+    itself, UnsuitableError if it does not suit the scenario, UsageError for too many points.
     """
     combinations = list(product(*(one.values for one in axes)))
     if len(combinations) > MAX_POINTS:
@@ -108,7 +108,7 @@ def _try(policy: str, scenario: Scenario, axes: tuple[Axis, ...], values: tuple[
 def cluster(address: str) -> Iterator[Executor]:
     """The workers of a Dask cluster. Raises ClusterError if there is none at that address, or no Dask here."""
     try:
-        from distributed import Client  # noqa: PLC0415 - an extra of its own, for those who have a cluster
+        from distributed import Client  # noqa: PLC0415 - a separate extra, for those who have a cluster
     except ImportError:
         raise ClusterError(
             "--dask needs the package distributed: pip install 'charging-station-orchestrator[dask]'"
@@ -122,7 +122,7 @@ def cluster(address: str) -> Iterator[Executor]:
 
 
 def rows(sweep: Sweep) -> list[list[str]]:
-    """A row for each point, a column for each axis and figure; first of all headings."""
+    """A row per point, a column per axis and figure; the first row has the headings."""
     head = [*(one.name for one in sweep.axes), *(name for name, _ in ROWS)]
     return [head, *([*point.values, *_told(point)] for point in sweep.points)]
 
@@ -134,7 +134,7 @@ def _told(point: Point) -> list[str]:
 
 
 def best(points: Sequence[Point]) -> list[Point]:
-    """The points that no other one beats in time to full, peak temperature and time at high voltage at once."""
+    """The points that no other beats in time to full, peak temperature and time at high voltage at once."""
     weighed = [(point, costs) for point in points if point.figures and (costs := _costs(point.figures))]
     return [
         point
@@ -150,7 +150,7 @@ def _costs(found: Figures) -> tuple[float, float, float] | None:
 
 
 def record(axes: Sequence[Axis], point: Point) -> Mapping[str, object]:
-    """One point as numbers, for a file that programs read."""
+    """One point as numbers, for a machine-readable file."""
     found = point.figures
     return {
         **{one.name: value for one, value in zip(axes, point.values, strict=True)},

@@ -1,4 +1,4 @@
-"""What a simulation leaves behind: measured values over time, and which rule bound the bay in each stretch of it."""
+"""The recording of a simulation: measured values over time, and the rule that limited the bay in each span."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
@@ -10,7 +10,7 @@ from orchestrator.workbench.simulate.plant import Plant
 
 
 class Moment(NamedTuple):
-    """The truth of the bay at one time; without a battery most of it is None."""
+    """The bay's true state at one time; without a battery most values are None."""
 
     t_s: float
     soc_pct: float | None
@@ -18,25 +18,25 @@ class Moment(NamedTuple):
     current_a: float
     temperature_c: float | None
     ambient_c: float
-    step: int | None  #: the current-limit step in force, None while no current is to flow
+    step: int | None  #: the current step in force, None while no current should flow
     state: State
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A time in which the bay was in one state, on one step, for one reason."""
+    """An interval in which the bay was in one state, on one step, for one reason."""
 
     from_s: float
     to_s: float
     state: State
     step: int | None
     step_a: float | None
-    cause: Cause  #: the rule that bound it; else why the bay is in this state
-    faults: tuple[str, ...] = ()  #: the ids of those in force
+    cause: Cause  #: the limiting rule; else the reason for the state
+    faults: tuple[str, ...] = ()  #: the ids of the active faults
 
     @property
     def key(self) -> str:
-        """Of the policy's row that bound it, where one did."""
+        """The key of the limiting policy row, if any."""
         return self.cause.key
 
     @property
@@ -46,25 +46,25 @@ class Span:
 
     @property
     def rule(self) -> tuple[State, int | None, str, str]:
-        """What bound it, without the numbers that were measured: equal for the same rule at another time."""
+        """The limiting rule without measured numbers: equal for the same rule at another time."""
         return self.state, self.step, self.cause.id, self.cause.key
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """One rule and all the times in which it bound the bay."""
+    """One rule and all the spans in which it limited the bay."""
 
-    number: int  #: from 1, in the order in which they came
+    number: int  #: from 1, in order of appearance
     spans: tuple[Span, ...]
 
     @property
     def total_s(self) -> float:
-        """How long altogether."""
+        """The total time."""
         return sum(span.to_s - span.from_s for span in self.spans)
 
 
 def bounds(spans: Iterable[Span]) -> list[Bound]:
-    """The spans by their rule, in the order in which the rules came."""
+    """The spans grouped by rule, in the rules' order of appearance."""
     by_rule: dict[object, list[Span]] = {}
     for span in spans:
         by_rule.setdefault(span.rule, []).append(span)
@@ -73,13 +73,13 @@ def bounds(spans: Iterable[Span]) -> list[Bound]:
 
 @dataclass(slots=True)
 class Trail:
-    """Filled by a simulation while it goes."""
+    """Filled by a simulation as it runs."""
 
     moments: list[Moment] = field(default_factory=list)
     spans: list[Span] = field(default_factory=list)
 
     def add(self, plant: Plant, decision: Decision) -> None:
-        """One more moment, at the plant's time."""
+        """Add a moment at the plant's time."""
         pack, step = plant.pack, decision.step
         self.moments.append(
             Moment(
@@ -103,6 +103,6 @@ class Trail:
         self.spans.append(span)
 
     def close(self, t_s: float) -> None:
-        """The last span ends here."""
+        """End the last span here."""
         if self.spans:
             self.spans[-1] = replace(self.spans[-1], to_s=t_s)

@@ -1,4 +1,4 @@
-"""`orchestrator simulate`: policies on a scenario, and the table of their figures."""
+"""`orchestrator simulate`: plays policies on a scenario and prints the table of their figures."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -9,10 +9,10 @@ from orchestrator.workbench.simulate.simulation import Run, simulate
 
 
 def play(policies: Sequence[str], scenario: str, watch: Callable[[str, float], None]) -> list[Run]:
-    """Each policy on the scenario; both are shipped names or paths.
+    """Play each policy on the scenario; both are shipped names or paths.
 
-    `watch` is called now and then with a policy's name and the share of it that is done. Raises ConfigError for what
-    is wrong in the files, UnsuitableError for a policy that is not for the batteries of the scenario.
+    `watch` is called regularly with a policy's name and the share of it that is done. Raises ConfigError for errors in
+    the files, UnsuitableError for a policy that does not suit the scenario's batteries.
     """
     what_happens = load_scenario(scenario)
     loaded = [load_policy(name) for name in policies]
@@ -20,5 +20,5 @@ def play(policies: Sequence[str], scenario: str, watch: Callable[[str, float], N
 
 
 def as_table(runs: Sequence[Run]) -> str:
-    """The figures of all, for a terminal."""
+    """All figures, for a terminal."""
     return aligned(table([figures(run) for run in runs]))

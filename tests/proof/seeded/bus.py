@@ -1,4 +1,4 @@
-"""Seeds of who else is on the CAN bus."""
+"""Seeds about others on the CAN bus."""
 
 from tests.proof.seeded.seed import DEVICES, LINK, Seed, part, scene
 
@@ -6,14 +6,14 @@ BUS: tuple[Seed, ...] = (
     scene(
         "another master's answer is a second node",
         "bus",
-        "answers that another master asked for count as a second BMU's",
+        "answers to another master count as a second BMU's",
         ("on the bus, reads all", "on the bus, master"),
         (f"{DEVICES}whose_answer.py", "    if not others.active:\n", "    if True:\n"),
     ),
     part(
         "a refusal to another master is ours",
         "bus",
-        "an abort that answers somebody else's write trips the bay",
+        "an abort answering another master's write trips the bay",
         ("tests/devices/test_battery_others.py",),
         (
             f"{DEVICES}whose_answer.py",
@@ -24,14 +24,14 @@ BUS: tuple[Seed, ...] = (
     scene(
         "CAN FD frames are CANopen's",
         "bus",
-        "a CAN FD frame with a BMU's id is taken for its answer",
+        "a CAN FD frame with a BMU's id counts as its answer",
         ("on the bus, fd",),
         (f"{LINK}can.py", " or message.is_fd or", " or"),
     ),
     scene(
         "a heartbeat that somebody has set stays so",
         "bus",
-        "a heartbeat period that another master has set stays",
+        "a heartbeat period set by another master stays",
         ("on the bus, heartbeat",),
         (
             f"{DEVICES}bmu_setup.py",
@@ -49,7 +49,7 @@ BUS: tuple[Seed, ...] = (
     part(
         "the kernel filters nothing",
         "bus",
-        "every frame of a shared bus comes to the service",
+        "every frame of a shared bus reaches the service",
         ("tests/link/test_can_filter.py",),
         (
             f"{LINK}can.py",

@@ -1,4 +1,4 @@
-"""Seeds of conditions that come, go, and count."""
+"""Seeds about conditions that come and go, and their timers."""
 
 from tests.proof.seeded.seed import CORE, DEVICES, SERVICE, Seed, part, scene
 
@@ -6,14 +6,14 @@ CONDITIONS: tuple[Seed, ...] = (
     scene(
         "a debounce begins anew",
         "comes and goes",
-        "one clean sample resets the time for which a condition has held",
+        "one clean sample resets the time a condition has held",
         ("apart for most of the time",),
         (f"{CORE}drain.py", "max(0.0, seconds - DRAIN * passed_s)", "0.0"),
     ),
     scene(
         "a limit that goes back is not seen",
         "comes and goes",
-        "neither a setting that goes back nor a current above the step is a fault",
+        "neither a setting that reverts nor a current above the step is a fault",
         ("limit goes back",),
         (f"{CORE}checks/obedience.py", "    if step is None or len(recent) < MAX_REVERTS:\n", "    if True:\n"),
         (f"{CORE}checks/obedience.py", "    if f.amps <= allowed_a:\n", "    if True:\n"),
@@ -21,21 +21,21 @@ CONDITIONS: tuple[Seed, ...] = (
     part(
         "returns of a setting are not counted",
         "comes and goes",
-        "a charger that confirms each step and drops it is well",
+        "a charger that confirms each step and then drops it is healthy",
         ("tests/core/test_witnesses.py",),
         (f"{CORE}checks/obedience.py", "    if step is None or len(recent) < MAX_REVERTS:\n", "    if True:\n"),
     ),
     scene(
         "a loose plug never latches",
         "comes and goes",
-        "a battery that leaves and comes back is charged again each time",
+        "a battery removed and put back is charged again each time",
         ("loose plug",),
         (f"{CORE}history/battery.py", "f.now_s - known.left_s < LOOSE_PLUG_S and not _is_another(f)", "False"),
     ),
     scene(
         "another kind of pack is charged",
         "battery",
-        "volts a cell, SOC and chemistry are not compared",
+        "volts per cell, SOC and chemistry are not compared",
         ("a pack of 36 V",),
         (
             f"{CORE}witnesses/pack.py",
@@ -46,14 +46,14 @@ CONDITIONS: tuple[Seed, ...] = (
     scene(
         "another kind of pack is deeply discharged",
         "battery",
-        "a pack of 24 V is said to be too deeply discharged",
+        "a 24 V pack is reported as too deeply discharged",
         ("a pack of 24 V",),
         (f"{CORE}checks/battery.py", " or another_pack(f) is not None:", ":"),
     ),
     scene(
         "a pack may collapse",
         "battery",
-        "a voltage that falls in mid-charge is no fault",
+        "a voltage drop in mid-charge is not a fault",
         ("a pack that collapses",),
         (
             f"{CORE}witnesses/pack.py",
@@ -64,7 +64,7 @@ CONDITIONS: tuple[Seed, ...] = (
     scene(
         "a BMU may stand still",
         "battery",
-        "a BMU whose values do not change any more is believed",
+        "a BMU with frozen values is believed",
         ("a BMU that is frozen",),
         (
             f"{CORE}witnesses/measured.py",
@@ -75,7 +75,7 @@ CONDITIONS: tuple[Seed, ...] = (
     scene(
         "the first answer counts",
         "battery",
-        "of two different answers to one request the first is believed",
+        "the first of two different answers to one request is believed",
         ("a temperature that is forged",),
         (f"{DEVICES}two_answers.py", "        if not apart:\n", "        if True:\n"),
     ),
@@ -89,7 +89,7 @@ CONDITIONS: tuple[Seed, ...] = (
     scene(
         "charges begin together",
         "battery",
-        "the charges of a station do not begin one after the other",
+        "the charges of a station do not start one after another",
         ("nothing happens",),
         (f"{SERVICE}starts.py", "        if not self._stagger_s:\n", "        if True:\n"),
     ),

@@ -1,4 +1,4 @@
-"""Seeds of what must be on the disk."""
+"""Seeds about what must be on the disk."""
 
 from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
 
@@ -8,7 +8,7 @@ DISK: tuple[Seed, ...] = (
     scene(
         "a running charge is not kept",
         "disk",
-        "it is not written down that a charger may be running",
+        "that a charger may be running is not persisted",
         ("charging, then no power",),
         (
             f"{CORE}persisted.py",
@@ -24,14 +24,14 @@ DISK: tuple[Seed, ...] = (
     scene(
         "who ran is not held",
         "disk",
-        "a charge that a crash has ended goes on by itself after the restart",
+        "a charge ended by a crash resumes by itself after the restart",
         ("charging, then no power",),
         (f"{CORE}persisted.py", "        if self.running:\n", "        if False:\n"),
     ),
     scene(
         "a charge begins before it is written down",
         "disk",
-        "RUN goes out though the disk has not taken that the charger may be running",
+        "RUN is sent before the disk has confirmed that the charger may be running",
         ("fsync hangs, begun, killed", "disk full"),
         (
             f"{SERVICE}bay.py",
@@ -52,14 +52,14 @@ DISK: tuple[Seed, ...] = (
     scene(
         "a request is answered before it is kept",
         "disk",
-        "a stop is answered with yes while the disk has not taken it",
+        "a stop is confirmed before it is on the disk",
         ("stopped at rest, then no power at once",),
         (f"{SERVICE}asked.py", "        if answer is not None:\n", "        if True:\n"),
     ),
     part(
         "nobody is told what is not kept",
         "disk",
-        "a disk that takes nothing is not reported, and a charge may begin",
+        "a failing disk is not reported, and a charge may begin",
         ("tests/service/test_store.py",),
         (
             f"{SERVICE}store.py",
@@ -70,7 +70,7 @@ DISK: tuple[Seed, ...] = (
     hostile(
         "an end that has kept nothing is a good one",
         "disk",
-        "the service ends with 0 though the disk has not taken what the next start must know",
+        "the service exits with 0 though data for the next start is not on the disk",
         ("tests/whole/test_survives.py::test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one",),
         (
             f"{SERVICE}supervisor.py",
@@ -81,7 +81,7 @@ DISK: tuple[Seed, ...] = (
     scene(
         "standard error is written before the state",
         "disk",
-        "who writes the persisted state first waits for whoever reads standard error",
+        "the writer of the persisted state first waits for the reader of standard error",
         ("standard error is not read",),
         (
             f"{SERVICE}store.py",
@@ -92,14 +92,14 @@ DISK: tuple[Seed, ...] = (
     scene(
         "a hold is not kept",
         "disk",
-        "an operator's stop is forgotten with a restart",
+        "an operator's stop is forgotten after a restart",
         ("stopped, then no power",),
         (f"{CORE}persisted.py", "            hold=memory.operator.hold,\n", '            hold="",\n'),
     ),
     scene(
         "latches are not kept",
         "disk",
-        "a fault that waits for a person is forgotten with a restart",
+        "a fault waiting for a person is forgotten after a restart",
         ("tripped, taken out, put back", "tripped at rest, then no power"),
         (
             f"{CORE}persisted.py",
@@ -110,7 +110,7 @@ DISK: tuple[Seed, ...] = (
     part(
         "a fault is no reason to write",
         "disk",
-        "a fault that latches is written down with the next counters only",
+        "a latching fault is written only with the next counters",
         ("tests/core/test_persisted.py",),
         (
             f"{CORE}persisted.py",
@@ -121,7 +121,7 @@ DISK: tuple[Seed, ...] = (
     part(
         "the directory is not synchronised",
         "disk",
-        "after the rename the directory is not brought to the disk",
+        "the directory is not synchronised after the rename",
         ("tests/service/test_store.py",),
         (
             f"{SERVICE}disk.py",
@@ -143,7 +143,7 @@ DISK: tuple[Seed, ...] = (
     scene(
         "an absent bay is forgotten",
         "disk",
-        "entries of bays that the station file lacks are dropped, and a bay without an entry is a new one",
+        "entries of bays missing from the station file are dropped, and a bay without an entry counts as new",
         ("tripped, taken out, put back",),
         (f"{SERVICE}past.py", "        if old in pasts or any(", "        if True or any("),
         (
@@ -155,7 +155,7 @@ DISK: tuple[Seed, ...] = (
     part(
         "a bay without a past is free to go",
         "disk",
-        "a bay that the persisted state does not know charges at once",
+        "a bay missing from the persisted state charges at once",
         ("tests/service/test_past.py", "tests/service/test_store.py"),
         (
             f"{SERVICE}past.py",
@@ -166,7 +166,7 @@ DISK: tuple[Seed, ...] = (
     scene(
         "what is kept belongs to the name alone",
         "disk",
-        "a bay that has got another name in the station file has no past",
+        "a bay renamed in the station file has no past",
         ("stopped, then renamed",),
         (
             f"{SERVICE}past.py",
@@ -182,14 +182,14 @@ DISK: tuple[Seed, ...] = (
     scene(
         "estop ignores ports in hand",
         "disk",
-        "estop stops what the file names, not what was written down as running",
+        "estop stops the chargers in the file, not those persisted as running",
         ("file edited, then both killed",),
         (f"{LASTRESORT}inhand.py", '            if entry.get("running") and', "            if False and"),
     ),
     hostile(
         "a start ignores ports in hand",
         "disk",
-        "a charger that the station file has lost runs on under the next service",
+        "a charger removed from the station file runs on under the next service",
         ("tests/whole/test_survives.py::test_a_charger_that_the_station_file_has_lost_is_stopped_by_the_next_start",),
         (
             f"{SERVICE}store.py",

@@ -1,14 +1,14 @@
-"""Seeds of errors of our own."""
+"""Seeds about internal errors."""
 
 from tests.proof.seeded.seed import CORE, SERVICE, WORKBENCH, Change, Seed, part, scene
 
-#: An arithmetic on a reading without its bounds.
+#: Arithmetic on a reading without a range check.
 DIVIDES: Change = (
     f"{CORE}witnesses/measured.py",
     "    if abs(volts - pack_v) <= volts_differ(f.rules.policy.faults, pack_v):",
     "    if abs(volts - pack_v) / pack_v <= volts_differ(f.rules.policy.faults, pack_v) / pack_v:",
 )
-#: A row that raises takes the whole step with it.
+#: A row that raises aborts the whole decision.
 NOT_CAUGHT: Change = (
     f"{CORE}latches.py",
     "    except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it\n",
@@ -25,14 +25,14 @@ OURS: tuple[Seed, ...] = (
     part(
         "a row takes the others with it",
         "exception",
-        "a check that raises ends the whole step",
+        "a check that raises aborts the whole decision",
         ("tests/core/test_failed.py",),
         NOT_CAUGHT,
     ),
     scene(
         "after an exception nothing is known",
         "exception",
-        "an exception leaves the memory as it was: no fault is shown, and a stop is never given up",
+        "an exception leaves the memory unchanged: no fault is shown, and a stop is never given up",
         ("a BMU that reads 0.00 V",),
         DIVIDES,
         NOT_CAUGHT,
@@ -52,7 +52,7 @@ OURS: tuple[Seed, ...] = (
     scene(
         "a torn line ends the replay",
         "record",
-        "a journal with one line that cannot be read is not replayed",
+        "a journal with one unreadable line is not replayed",
         ("a record over lives",),
         (
             f"{WORKBENCH}replay/recording.py",
@@ -63,7 +63,7 @@ OURS: tuple[Seed, ...] = (
     scene(
         "runs are one run",
         "record",
-        "a restart in a journal is taken for a deviation",
+        "a restart in a journal counts as a deviation",
         ("a record over lives",),
         (f"{WORKBENCH}replay/recording.py", 'BREAKS = frozenset({"run", "lost"})', 'BREAKS = frozenset({"lost"})'),
         (f"{WORKBENCH}replay/again.py", "if recorded.gap or recorded.memory.last_s is None:", "if recorded.gap:"),
@@ -71,12 +71,12 @@ OURS: tuple[Seed, ...] = (
     part(
         "a reboot loses events",
         "record",
-        "events of the second boot are looked for in the first one's steps",
+        "events of the second boot are searched in the first boot's decisions",
         ("tests/workbench/test_replay.py",),
         (
             f"{WORKBENCH}replay/recording.py",
-            '            later = [step for step in near if step.wall >= line["wall"]]  # a step is '
-            "written down after its events\n",
+            '            later = [step for step in near if step.wall >= line["wall"]]  # a decision '
+            "is recorded after its events\n",
             "            later = near[-1:]\n",
         ),
     ),

@@ -1,4 +1,4 @@
-"""Seeds of ports that hang, are busy, or come and go."""
+"""Seeds about ports that hang, are busy, or come and go."""
 
 from tests.proof.seeded.seed import DEVICES, LASTRESORT, SERVICE, Seed, hostile, part, scene
 
@@ -6,7 +6,7 @@ PORTS: tuple[Seed, ...] = (
     scene(
         "ports are stopped one after another",
         "ports",
-        "estop opens and stops one port after the other",
+        "estop opens and stops one port after another",
         ("half dead adapter, estop",),
         (
             f"{LASTRESORT}laststop.py",
@@ -18,7 +18,7 @@ PORTS: tuple[Seed, ...] = (
     hostile(
         "a close holds the guardian up",
         "ports",
-        "the guardian waits for a driver that takes its time over a close",
+        "the guardian waits for a driver with a slow close",
         ("tests/guardian/test_guardian_messages.py::test_a_port_whose_close_hangs_keeps_nobody_from_watching",),
         (f"{LASTRESORT}guardian.py", "            aside(partial(drop_port, old))", "            drop_port(old)"),
     ),
@@ -39,12 +39,12 @@ PORTS: tuple[Seed, ...] = (
     part(
         "an opened port goes on",
         "ports",
-        "a port that was opened does not begin with a stop",
+        "an opened port does not begin with a stop",
         ("tests/devices/test_charger_port.py::test_an_opened_port_stops_the_whole_charger_before_it_asks_anything",),
         (
             f"{DEVICES}schedule.py",
-            "        self.order: Command | None = STOP  #: the standing order\n        self._urgent = True",
-            "        self.order: Command | None = None  #: the standing order\n        self._urgent = False",
+            "        self.order: Command | None = STOP  #: the command to repeat\n        self._urgent = True",
+            "        self.order: Command | None = None  #: the command to repeat\n        self._urgent = False",
         ),
     ),
     scene(

@@ -1,4 +1,4 @@
-"""Seeds of restarts: what a new life of the gateway must know."""
+"""Seeds about restarts: what a new life of the gateway must know."""
 
 from tests.proof.seeded.seed import CORE, Seed, part, scene
 
@@ -6,7 +6,7 @@ RESTARTS: tuple[Seed, ...] = (
     scene(
         "what flowed before a kill is forgotten",
         "restart",
-        "ampere-hours that went in after the counters were last written count as nothing",
+        "ampere-hours charged after the last write of the counters do not count",
         ("ampere-hours over kills",),
         (
             f"{CORE}persisted.py",
@@ -17,7 +17,7 @@ RESTARTS: tuple[Seed, ...] = (
     part(
         "a charger that ran at the start was never stopped",
         "restart",
-        "one that ran at the start and runs again after each stop is called uncontrollable one return later",
+        "a charger running at the start and again after each stop is reported as out of control one return late",
         ("tests/core/test_safestop.py::test_a_charger_that_ran_at_the_start_has_been_stopped_once_already",),
         (
             f"{CORE}safestop.py",
@@ -28,7 +28,7 @@ RESTARTS: tuple[Seed, ...] = (
     scene(
         "the open charge is not kept",
         "restart",
-        "ampere-hours and seconds of a charge begin anew with a restart",
+        "a restart resets the ampere-hours and seconds of a charge",
         ("ampere-hours over restarts",),
         (
             f"{CORE}persisted.py",
@@ -40,7 +40,7 @@ RESTARTS: tuple[Seed, ...] = (
     scene(
         "a lost BMU ends the charge",
         "restart",
-        "the limits of a charge begin anew when its BMU was silent for a while",
+        "a temporary silence of its BMU resets the limits of a charge",
         ("ampere-hours over silences",),
         (
             f"{CORE}states.py",
@@ -56,7 +56,7 @@ RESTARTS: tuple[Seed, ...] = (
     scene(
         "a precharge begins anew",
         "restart",
-        "the time in which a precharged pack must rise begins anew with a restart",
+        "a restart resets the time within which a precharged pack must rise",
         ("precharge over restarts",),
         (
             f"{CORE}persisted.py",
@@ -70,7 +70,7 @@ RESTARTS: tuple[Seed, ...] = (
     part(
         "strikes are not kept",
         "restart",
-        "a fault that comes again after each restart never latches",
+        "a fault recurring after each restart never latches",
         ("tests/core/test_persisted.py",),
         (
             f"{CORE}persisted.py",

@@ -1,15 +1,15 @@
-"""What a seed is: a small change of the package that opens a hole again."""
+"""A seed: a small change of the package that reopens a hole."""
 
 from dataclasses import dataclass
 
-Change = tuple[str, str, str]  #: file, what stands there exactly once, what takes its place
+Change = tuple[str, str, str]  #: file, text that occurs in it exactly once, replacement
 
 
 @dataclass(frozen=True, slots=True)
 class Seed:
-    """One bug. `kind`: the kind of hole; `likely`: the proof that is asked first; `where`: what of it comes first.
+    """One bug. `kind`: the kind of hole; `likely`: the proof tried first; `where`: the part of it tried first.
 
-    `where` holds names of scenes for the environment, and files or tests for the proofs that pytest runs.
+    `where` has scene names for the environment, and files or tests for proofs run by pytest.
     """
 
     name: str
@@ -31,15 +31,15 @@ WORKBENCH = "orchestrator/workbench/"
 
 
 def scene(name: str, kind: str, about: str, where: tuple[str, ...], *changes: Change) -> Seed:
-    """One that a scene of the environment is likely to find."""
+    """A seed likely to be found by a scene of the environment."""
     return Seed(name, kind, about, changes, "environment", where)
 
 
 def hostile(name: str, kind: str, about: str, where: tuple[str, ...], *changes: Change) -> Seed:
-    """One that shows in real processes only."""
+    """A seed that shows only in real processes."""
     return Seed(name, kind, about, changes, "hostile", where)
 
 
 def part(name: str, kind: str, about: str, where: tuple[str, ...], *changes: Change) -> Seed:
-    """One behind which a second guard stands: the station is safe with it, and only the part's own tests tell."""
+    """A seed covered by a second guard: the station stays safe, and only the part's own tests find it."""
     return Seed(name, kind, about, changes, "parts", where)

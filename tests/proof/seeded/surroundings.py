@@ -1,4 +1,4 @@
-"""Seeds of the surroundings: starters, clients, clocks, other programs."""
+"""Seeds about the surroundings: starters, clients, clocks, other programs."""
 
 from tests.proof.seeded.seed import LASTRESORT, SERVICE, Seed, hostile, part
 
@@ -17,7 +17,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
     hostile(
         "clients are served one after another",
         "surroundings",
-        "an idle client at the control socket holds up a stop",
+        "an idle client at the control socket delays a stop",
         (
             "tests/service/test_control_clients.py::test_one_who_says_nothing_holds_nobody_up_and_is_sent_away",
             "tests/service/test_control_clients.py::test_idle_clients_do_not_count_however_many_they_are",
@@ -27,7 +27,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
     hostile(
         "who asks may wait for ever",
         "surroundings",
-        "an answer that drips byte for byte holds up whoever asks",
+        "an answer dripping byte by byte delays the client",
         ("tests/service/test_asking.py::test_who_asks_waits_so_long_and_no_longer",),
         (
             f"{LASTRESORT}asking.py",
@@ -39,7 +39,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
     hostile(
         "a poor terminal makes a traceback",
         "surroundings",
-        "what a Latin-1 terminal cannot show ends a verb with a traceback",
+        "text a Latin-1 terminal cannot show ends a verb with a traceback",
         ("tests/test_surroundings.py::test_no_terminal_is_too_poor",),
         (
             "orchestrator/__main__.py",
@@ -50,7 +50,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
     part(
         "a thread for each hang-up",
         "surroundings",
-        "each SIGHUP starts one more thread that reads the files",
+        "each SIGHUP starts another thread that reads the files",
         ("tests/service/test_reload.py",),
         (
             f"{SERVICE}reload.py",

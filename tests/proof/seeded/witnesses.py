@@ -1,4 +1,4 @@
-"""Seeds of the two witnesses: what charger and BMU say of each other."""
+"""Seeds about the two witnesses: what charger and BMU reveal about each other."""
 
 from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
 
@@ -6,7 +6,7 @@ WITNESSES: tuple[Seed, ...] = (
     scene(
         "a stop while the service ends is lost",
         "reasons",
-        "the reason of the end takes the place of an operator's stop in the same second",
+        "the reason of the end replaces an operator's stop in the same second",
         ("stopped while it ends",),
         (
             f"{SERVICE}bay.py",
@@ -18,7 +18,7 @@ WITNESSES: tuple[Seed, ...] = (
     scene(
         "the end of the service is a hold",
         "reasons",
-        "a bay waits for a person after an orderly restart",
+        "a bay waits for a person after a clean restart",
         ("restarted in order",),
         (
             f"{SERVICE}bay.py",
@@ -36,21 +36,21 @@ WITNESSES: tuple[Seed, ...] = (
     part(
         "one sample verifies a stop",
         "witness",
-        "one reply that shows standby is a proof of it",
+        "a single reply showing standby proves it",
         ("tests/core/test_witnesses.py",),
         (f"{CORE}witnesses/standby.py", "len(known.proof) < 2", "len(known.proof) < 1"),
     ),
     scene(
         "the charger alone verifies a stop",
         "witness",
-        "the current that the BMU sees does not count",
+        "the current seen by the BMU does not count",
         ("says standby",),
         (f"{CORE}witnesses/standby.py", "return f.pack_a is not None and f.pack_a > CHARGING_A", "return False"),
     ),
     part(
         "out of control is left at once",
         "witness",
-        "UNCONTROLLABLE ends with the first standby, not with a lasting one",
+        "UNCONTROLLABLE ends at the first standby, not at a lasting one",
         ("tests/core/test_witnesses.py",),
         (
             f"{CORE}safestop.py",
@@ -61,28 +61,28 @@ WITNESSES: tuple[Seed, ...] = (
     scene(
         "returns are not counted",
         "witness",
-        "a charger that runs again within ten seconds begins anew each time",
+        "a charger that runs again within ten seconds counts as new each time",
         ("runs again",),
         (f"{CORE}safestop.py", "        runs_again = (f.runs", "        runs_again = False and (f.runs"),
     ),
     scene(
         "mode 5 alone is full",
         "witness",
-        "a charger that somebody has stopped by other means is taken for full",
+        "a charger stopped by other means counts as full",
         ("stopped by other means",),
         (f"{CORE}finish.py", "    pack, trail = f.rules", "    return True\n    pack, trail = f.rules"),
     ),
     hostile(
         "estop believes one answer",
         "witness",
-        "one answer in two that shows standby is a proof for estop",
+        "for estop, one answer in two showing standby is proof",
         ("tests/guardian/test_laststop.py::test_one_answer_in_two_is_no_proof",),
         (f"{LASTRESORT}lastline.py", "PROOFS = 2\n", "PROOFS = 1\n"),
     ),
     hostile(
         "estop does not ask the BMU",
         "witness",
-        "estop takes the service's charger at its word, whatever the BMU sees",
+        "estop believes the service's charger, whatever the BMU sees",
         ("tests/guardian/test_emergency.py::test_both_witnesses_have_to_agree",),
         (
             f"{LASTRESORT}running_service.py",

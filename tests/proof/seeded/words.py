@@ -1,4 +1,4 @@
-"""Seeds of what people are told."""
+"""Seeds about messages to people."""
 
 from tests.proof.seeded.seed import CORE, LASTRESORT, SERVICE, Seed, hostile, part, scene
 
@@ -6,7 +6,7 @@ WORDS: tuple[Seed, ...] = (
     scene(
         "out of control is told with advice about cables",
         "words",
-        "UNCONTROLLABLE does not begin with what to do",
+        "the message for UNCONTROLLABLE does not begin with what to do",
         ("says standby", "cut off, then killed"),
         (
             f"{CORE}outofcontrol.py",
@@ -17,7 +17,7 @@ WORDS: tuple[Seed, ...] = (
     scene(
         "a restart ends the alarm",
         "words",
-        "a charger that ran when the service died and is not heard is no alarm",
+        "a charger that ran when the service died and is not heard raises no alarm",
         ("cut off and not heard, then killed",),
         (f"{CORE}alarm.py", "    unknown = memory.stop.unverified and", "    unknown = False and"),
         (
@@ -34,7 +34,7 @@ WORDS: tuple[Seed, ...] = (
     hostile(
         "a stop that is not verified is a success",
         "words",
-        "orchestrator stop ends with 0 whatever becomes of the stop",
+        "orchestrator stop exits with 0 whatever the result of the stop",
         ("tests/whole/test_operator.py::test_a_stop_that_is_not_obeyed_begins_with_what_to_do",),
         (
             f"{SERVICE}verbs.py",
@@ -45,7 +45,7 @@ WORDS: tuple[Seed, ...] = (
     hostile(
         "estop finds no station by itself",
         "words",
-        "estop without arguments knows the file of this folder only",
+        "estop without arguments only knows the file in this directory",
         ("tests/guardian/test_emergency.py::test_else_those_of_the_services_that_run",),
         (
             f"{LASTRESORT}inhand.py",
@@ -56,7 +56,7 @@ WORDS: tuple[Seed, ...] = (
     part(
         "old values are not marked",
         "words",
-        "a current that was last heard long ago is shown as one of now",
+        "a current last received long ago is shown as current",
         ("tests/service/test_status.py", "tests/service/test_show.py"),
         (f"{SERVICE}status.py", '"old": age_s is not None and age_s > CHARGER_STALE_S,', '"old": False,'),
     ),
