@@ -23,8 +23,8 @@ test: .venv/dev.stamp  ## all tests, three files at a time; ARGS='tests/core -k 
 COVERED := core interlock lastresort protocol
 COVERING := tests/core tests/guardian tests/interlock tests/protocol tests/link/test_serial.py \
 	tests/service/test_asking.py --ignore=tests/guardian/test_estop.py --ignore=tests/guardian/test_kills.py \
-	--deselect=tests/core/test_step.py::test_whatever_comes_it_decides_soberly \
-	--deselect=tests/core/test_step.py::test_whatever_happened_a_person_gets_it_charging_again
+	--deselect=tests/core/test_decide.py::test_whatever_comes_it_decides_soberly \
+	--deselect=tests/core/test_decide.py::test_whatever_happened_a_person_gets_it_charging_again
 
 cover: .venv/dev.stamp  ## hold the coverage of what decides and what stops: every branch of it, three minutes
 	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(COVERING) \

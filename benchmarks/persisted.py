@@ -25,7 +25,7 @@ def to_the_disk(directory: Path) -> list[float]:
     """Seconds from each change to its confirmation, with that many bays in the file."""
     places = [Place(f"bay-{number}", f"/dev/ttyS{number}", "can0", number) for number in range(BAYS)]
     told = Event()
-    store = Store(directory, places, time.monotonic, time.time, on_kept=lambda _: told.set())
+    store = Store(directory, places, time.monotonic, time.time, on_persisted=lambda _: told.set())
     store.start()
     store.wait(5.0)
     taken: list[float] = []
@@ -49,7 +49,7 @@ def of_a_step(directory: Path) -> float:
     memory = Memory(state=State.CHARGING, session=Session(0.0), faults={"late": FaultMemory(strikes=(1.0, 2.0))})
     began_s = time.perf_counter()
     for number in range(STEPS):
-        store.unkept(float(number))
+        store.not_persisted(float(number))
         store.on_disk(place)
         store.put(place, Persisted.of(memory, float(number)))
     return (time.perf_counter() - began_s) / STEPS

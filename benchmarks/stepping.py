@@ -10,10 +10,10 @@ from time import thread_time_ns
 
 from benchmarks.effort import Effort
 from benchmarks.report import Goal, Result, Series
+from orchestrator.core.decide import decide
 from orchestrator.core.machine import TABLE, Trigger, fire
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import step
 from orchestrator.model import Request, Snapshot, State
 from tests.core.world import World, bay
 
@@ -88,7 +88,7 @@ def _steps(moments: list[Moment], rules: Rules) -> Iterator[float]:
     for moment in moments:
         now_s, snapshot, memory = moment.now_s, moment.snapshot, moment.memory
         begin_ns = thread_time_ns()
-        step(now_s, snapshot, memory, rules)
+        decide(now_s, snapshot, memory, rules)
         yield (thread_time_ns() - begin_ns) / 1000
 
 

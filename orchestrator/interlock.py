@@ -36,7 +36,7 @@ class Grant:
     expires_s: float  #: when the first of these readings becomes too old
     voltage_v: float  #: the higher of charger and pack
     temperature_c: float  #: of the pack
-    current_limit: int | None  #: the current step that the charger last reported
+    current_step: int | None  #: the current step that the charger last reported
     kept: bool = True  #: the disk records that this charger may be running, so a restart would know
 
 
@@ -56,13 +56,11 @@ def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
         return None
     expires_s = min(end_s for _, end_s in lifetimes)
     highest_v = max(charger.voltage_v, volts.value)
-    return Grant(expires_s, highest_v, temperature.value, charger.current_limit, kept=snapshot.running_kept)
+    return Grant(expires_s, highest_v, temperature.value, charger.current_step, kept=snapshot.running_persisted)
 
 
-def permit(
-    command: Command, evidence: Grant | None, now_s: float, charger: ChargerConfig, limits: Limits
-) -> Cause | None:
-    """Why the order must not go out now; None if it may. A stop always may.
+def permit(command: Command, grant: Grant | None, now_s: float, charger: ChargerConfig, limits: Limits) -> Cause | None:
+    """Why the command must not go out now; None if it may. A stop always may.
 
     `limits` are the station file's hard limits; nothing here comes from a policy.
     """
@@ -70,32 +68,32 @@ def permit(
     if action is Action.STOP:
         return None
     if value not in ALLOWED[charger.control].get(action, ()):
-        return Cause.of("no_order", order=action.value, value=value, control=charger.control.name.lower())
-    if evidence is None:
-        return Cause.of("no_evidence", order=action.value)
-    if not evidence.kept:
-        return Cause.of("not_on_disk", order=action.value)
-    if not now_s < evidence.expires_s:
-        return Cause.of("evidence_old", order=action.value, age_s=now_s - evidence.expires_s)
-    if not evidence.voltage_v <= limits.voltage_v:
-        return _beyond("above_station_v", action, voltage_v=evidence.voltage_v, limit_v=limits.voltage_v)
-    if evidence.temperature_c not in limits.temperature_c:
+        return Cause.of("no_command", command=action.value, value=value, control=charger.control.name.lower())
+    if grant is None:
+        return Cause.of("no_grant", command=action.value)
+    if not grant.kept:
+        return Cause.of("not_on_disk", command=action.value)
+    if not now_s < grant.expires_s:
+        return Cause.of("grant_old", command=action.value, age_s=now_s - grant.expires_s)
+    if not grant.voltage_v <= limits.voltage_v:
+        return _beyond("above_station_v", action, voltage_v=grant.voltage_v, limit_v=limits.voltage_v)
+    if grant.temperature_c not in limits.temperature_c:
         low_c, high_c = limits.temperature_c.low, limits.temperature_c.high
-        return _beyond("outside_station_c", action, pack_c=evidence.temperature_c, low_c=low_c, high_c=high_c)
+        return _beyond("outside_station_c", action, pack_c=grant.temperature_c, low_c=low_c, high_c=high_c)
     if action is Action.SET_LIMIT:
         return _too_much(action, value, charger, limits)
     if action is Action.RUN:
-        return _too_much(action, evidence.current_limit, charger, limits)
+        return _too_much(action, grant.current_step, charger, limits)
     return None
 
 
 def _beyond(id_: str, action: Action, **params: float) -> Cause:
-    return Cause(id_, (("order", action.value), *params.items()))
+    return Cause(id_, (("command", action.value), *params.items()))
 
 
 def _too_much(action: Action, step: int | None, charger: ChargerConfig, limits: Limits) -> Cause | None:
     if step is None or not 0 <= step < len(charger.steps_a):
-        return Cause.of("step_unknown", order=action.value, step=step)
+        return Cause.of("step_unknown", command=action.value, step=step)
     current_a = charger.steps_a[step]
     if not current_a <= limits.current_a:
         return _beyond("above_station_a", action, step=step + 1, step_a=current_a, limit_a=limits.current_a)

@@ -9,7 +9,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class KeyRule:
     """A key's meaning and permitted values; bounds are inclusive (`ge`, `le`) or exclusive (`gt`, `lt`)."""
 
     about: str
@@ -34,7 +34,7 @@ def key(
     default_factory: Callable[[], Any] | None = None,
 ) -> Any:  # noqa: ANN401 - as dataclasses.field, so that the field keeps its own type
     """A dataclass field filled from a YAML key. Without a default the key is required."""
-    metadata = {"key": Key(about, unit, ge, le, gt, lt, is_path)}
+    metadata = {"key": KeyRule(about, unit, ge, le, gt, lt, is_path)}
     if default_factory is not None:
         return field(default_factory=default_factory, metadata=metadata)
     return field(default=default, metadata=metadata)

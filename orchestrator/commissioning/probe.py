@@ -9,7 +9,7 @@ from textwrap import indent
 from time import monotonic
 
 from orchestrator.commissioning.probe_bmu import BmuProbe
-from orchestrator.config.station import Bay, ChargerConfig, ContactorConfig, Rs485, Station
+from orchestrator.config.station import BayConfig, ChargerConfig, ContactorConfig, Rs485, Station
 from orchestrator.devices.dialogue import REQUESTS, SILENCE, Dialogue
 from orchestrator.devices.poll import poll
 from orchestrator.errors import LinkError, ServiceError
@@ -112,7 +112,7 @@ def _contactor(config: ContactorConfig, show: Show) -> bool:
 # --- the BMU ---------------------------------------------------------------------------------------------------------
 
 
-def _bmu(station: Station, bay: Bay, nmt: NmtCommand | None, *, old_protocol: bool, show: Show) -> bool:
+def _bmu(station: Station, bay: BayConfig, nmt: NmtCommand | None, *, old_protocol: bool, show: Show) -> bool:
     name = bay.battery.can
     bus = CanBus(name, station.can[name], [bay.battery.node_id], pages=old_protocol, filtered=False)
     bmu = BmuProbe(bus, bay.battery, show)

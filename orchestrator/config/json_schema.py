@@ -15,7 +15,7 @@ from orchestrator.config.policy import Policy
 from orchestrator.config.shipped import shipped_names
 from orchestrator.config.yaml.scalars import allowed
 from orchestrator.config.yaml.schema import INVALID, Slot, slots
-from orchestrator.keys import Key, Range
+from orchestrator.keys import KeyRule, Range
 from orchestrator.protocol.objects import ObjectMap
 
 Schema = dict[str, Any]
@@ -49,12 +49,12 @@ def _slot(slot: Slot) -> Schema:
     return schema
 
 
-def _description(key: Key) -> str:
+def _description(key: KeyRule) -> str:
     bounds = allowed(key) or key.unit
     return f"{key.about} ({bounds})" if bounds else key.about
 
 
-def _value(hint: Any, key: Key) -> Schema:  # noqa: ANN401 - any type expression
+def _value(hint: Any, key: KeyRule) -> Schema:  # noqa: ANN401 - any type expression
     if get_origin(hint) in (Union, UnionType):
         (inner,) = (arg for arg in get_args(hint) if arg is not NoneType)
         return _or_null(_value(inner, key))
@@ -72,7 +72,7 @@ def _value(hint: Any, key: Key) -> Schema:  # noqa: ANN401 - any type expression
     return _record(hint) if scalar is None else scalar
 
 
-def _scalar(hint: object, key: Key) -> Schema | None:
+def _scalar(hint: object, key: KeyRule) -> Schema | None:
     """The schema of a number, a text …; None for anything else."""
     bounds = {_BOUNDS[name]: bound for name in _BOUNDS if (bound := getattr(key, name)) is not None}
     scalars: dict[object, Schema] = {

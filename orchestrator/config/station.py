@@ -79,7 +79,7 @@ class ContactorConfig:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bay:
+class BayConfig:
     """One charging place: a charger, its battery's BMU, their limits and a policy."""
 
     name: str = key("what people call it")
@@ -113,7 +113,7 @@ class Station:
 
     station: str = key("the station's name")
     can: Mapping[str, Mapping[str, object]] = key("CAN buses by name; the keys of each are python-can's own")
-    bays: tuple[Bay, ...] = key("one for each charger")
+    bays: tuple[BayConfig, ...] = key("one for each charger")
     stagger_s: float = key(
         "charges of this station begin at least this far apart, each once the one before was seen on its own BMU; with "
         "one bay there is nobody to wait for; 0: they may begin together, and swapped cables are found later",

@@ -10,7 +10,7 @@ from typing import Any
 
 from orchestrator.core.acts import act
 from orchestrator.core.facts import Facts
-from orchestrator.core.faults import ROW, Clear, Row
+from orchestrator.core.faults import ROW, Clear, FaultRow
 from orchestrator.core.latches import effect, raised
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.model import ActiveFault, Cause, State
@@ -38,7 +38,7 @@ def active_faults(
     return tuple(_active(memory, now_s, bay, name, f, at_rest=at_rest) for name, _ in raised(memory.faults))
 
 
-def evidence(row: Row, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
+def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
     """What is, or was, seen of it, and what to do."""
     more: dict[str, Any] = {"effect": effect(row.id, fault).name}
     if fault.latched and len(fault.strikes) > 1:
@@ -52,7 +52,7 @@ def evidence(row: Row, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
     return (seen or Cause(row.id)).with_(advice, **more)
 
 
-def times(row: Row, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:
+def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:
     """Since when it is, or when it was; and its figures then and now."""
     names, raised_s = row.figures.split(), fault.raised_s
     then = figures(fault.cause, names)
@@ -79,7 +79,7 @@ def _figures(known: list[tuple[str, float]]) -> tuple[Cause, ...]:
     return tuple(Cause.of(f"figure_{name.partition('_')[2]}", value=value) for name, value in known)
 
 
-def _worse(row: Row, fault: FaultMemory, then: list[tuple[str, float]]) -> Cause | None:
+def _worse(row: FaultRow, fault: FaultMemory, then: list[tuple[str, float]]) -> Cause | None:
     """The worst value, where it was another one than at the beginning."""
     if fault.worst is None or len(then) != 1 or fault.worst == then[0][1]:
         return None

@@ -20,7 +20,7 @@ from orchestrator.model import Cause, Effect, Request
 #: So many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
 #: While what must survive a restart is not kept, nothing is cleared.
-UNKEPT = "unkept"
+UNKEPT = "not_persisted"
 
 
 def act(memory: Memory, now_s: float, bay: str, name: str, *, out: bool = False) -> Cause:
@@ -83,8 +83,12 @@ def _by_person(memory: Memory, now_s: float, bay: str, name: str, *, out: bool) 
         return Cause.of("after_standby", request=request.value, lasts_s=LASTS_S)
     if refused := refused_for(memory, now_s, name, request):
         return refused
-    unkept = memory.faults.get(UNKEPT)
-    keeps = [UNKEPT] if unkept is not None and unkept.raised_s is not None and unkept.clean_s is None else []
+    not_persisted = memory.faults.get(UNKEPT)
+    keeps = (
+        [UNKEPT]
+        if not_persisted is not None and not_persisted.raised_s is not None and not_persisted.clean_s is None
+        else []
+    )
     other = next(iter([*refusing(memory, now_s, request), *keeps]), None)
     if other is not None:
         return Cause.of("waits_for_fault", gone_t_s=fault.clean_s, request=request.value, fault=other)

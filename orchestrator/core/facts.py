@@ -138,7 +138,7 @@ class Facts:
         return boot_s is not None and self.now_s - boot_s < SETTLE_S + FAST_STALE_S
 
     @property
-    def departed(self) -> bool:
+    def battery_removed(self) -> bool:
         """The battery has left, as batteries do: its BMU is silent and the charger sees no voltage.
 
         Behind an open contactor it never sees one.

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
-from orchestrator.core.faults import FAULTS, RANK, ROW, Clear, Row
+from orchestrator.core.faults import FAULTS, RANK, ROW, Clear, FaultRow
 from orchestrator.core.memory import FaultMemory
 from orchestrator.core.safestop import verified
 from orchestrator.core.states import UNVERIFIED
@@ -31,17 +31,17 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
     """The fault memory after this step's facts."""
     before, state, looked_s = f.memory.faults, f.memory.state, f.memory.looked_s
     passed_s = f.now_s - looked_s if looked_s is not None else 0.0
-    departed = f.departed and not f.energised
+    battery_removed = f.battery_removed and not f.energised
     after: dict[str, FaultMemory] = {}
     for row in _looked_for(state, before):
         fault = before.get(row.id) if before else None
-        if departed and row.departs and not (fault is not None and fault.latched):
+        if battery_removed and row.departs and not (fault is not None and fault.latched):
             strikes = tuple(t for t in fault.strikes if t != fault.raised_s) if fault is not None else ()
             if strikes:  # what it has just done was no fault; what it did before was
                 after[row.id] = FaultMemory(strikes=strikes)
             continue
         seen = None
-        if fault is None or _is_looked_for(row, fault, state, departed=departed):
+        if fault is None or _is_looked_for(row, fault, state, battery_removed=battery_removed):
             try:
                 seen = row.check(f)
             except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
@@ -56,12 +56,12 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
     return after if after or before else before
 
 
-def _is_looked_for(row: Row, fault: FaultMemory, state: State, *, departed: bool) -> bool:
+def _is_looked_for(row: FaultRow, fault: FaultMemory, state: State, *, battery_removed: bool) -> bool:
     """Whether a known fault's condition is looked for; one in force is followed in every state."""
-    return not (departed and row.departs) and (fault.raised_s is not None or state in row.where)
+    return not (battery_removed and row.departs) and (fault.raised_s is not None or state in row.where)
 
 
-def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[Row]:
+def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[FaultRow]:
     """The rows that are looked for in a state, and those that are known, in their order."""
     usual = _USUAL.get(state)
     if usual is None or usual[0] is not FAULTS:
@@ -73,7 +73,7 @@ def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[Row]
 
 
 #: The rows of each state, and their ids; and of which table they are.
-_USUAL: dict[State, tuple[Sequence[Row], Sequence[Row], frozenset[str]]] = {}
+_USUAL: dict[State, tuple[Sequence[FaultRow], Sequence[FaultRow], frozenset[str]]] = {}
 
 
 def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
@@ -84,7 +84,7 @@ def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
     return (fault.polls + 1 if holds else max(0.0, fault.polls - DRAIN)), poll_t_s
 
 
-def _present(row: Row, fault: FaultMemory, seen: Cause, f: Facts, passed_s: float) -> FaultMemory:
+def _present(row: FaultRow, fault: FaultMemory, seen: Cause, f: Facts, passed_s: float) -> FaultMemory:
     polls, poll_t_s = _polls(fault, f, holds=True)
     # The time before its first look is nobody's: the condition may have come just now.
     seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
@@ -101,7 +101,7 @@ def _present(row: Row, fault: FaultMemory, seen: Cause, f: Facts, passed_s: floa
     return replace(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes, now=seen, worst=worst)
 
 
-def _worst(row: Row, seen: Cause, worst: float | None, first: Cause) -> float | None:
+def _worst(row: FaultRow, seen: Cause, worst: float | None, first: Cause) -> float | None:
     """The worst value so far of the one figure of the evidence, where it has one, and is about the same as at first."""
     names = [name for name in row.figures.split() if seen.param(name) is not None]
     if len(names) != 1 or first.param(names[0]) is None:
@@ -110,7 +110,7 @@ def _worst(row: Row, seen: Cause, worst: float | None, first: Cause) -> float | 
     return min(known) if row.lowest else max(known)
 
 
-def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMemory | None:
+def _absent(row: FaultRow, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMemory | None:
     """What is left of a fault while its condition is not there; None when nothing is."""
     now_s = f.now_s
     if fault.raised_s is None:
@@ -130,7 +130,7 @@ def _absent(row: Row, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMem
     return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause, now=None)
 
 
-def clear_after_s(row: Row, fault: FaultMemory) -> float | None:
+def clear_after_s(row: FaultRow, fault: FaultMemory) -> float | None:
     """How long the condition must be gone for the fault to clear by itself; None: a person must act."""
     if fault.latched or row.clear in (Clear.OPERATOR, Clear.RESET):
         return None

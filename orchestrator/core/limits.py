@@ -11,7 +11,7 @@ from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
 from orchestrator.core.rows import values
 from orchestrator.core.rules import Bound
-from orchestrator.model import ActiveFault, Cause, Effect, Step
+from orchestrator.model import ActiveFault, Cause, CurrentStep, Effect
 
 # --- how much they allow ----------------------------------------------------------------------------------------------
 
@@ -59,7 +59,7 @@ def none_allowed(f: Facts) -> Cause | None:
     return Cause.of("below_lowest_step", key=rule.key, place=rule.place, rule=rule, lowest_a=f.rules.worst_a[0])
 
 
-def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
+def choose(f: Facts, worst: ActiveFault | None) -> tuple[CurrentStep, float | None]:
     """The step for now, and since when a higher one has been allowed (None: none is)."""
     bound = lowest(f, worst)
     index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # where none is allowed a fault has ended the charge
@@ -77,8 +77,8 @@ def choose(f: Facts, worst: ActiveFault | None) -> tuple[Step, float | None]:
     return before, raise_s
 
 
-def _step(f: Facts, index: int, bound: Bound) -> Step:
-    return Step(index, f.rules.steps_a[index], limit(f, bound))
+def _step(f: Facts, index: int, bound: Bound) -> CurrentStep:
+    return CurrentStep(index, f.rules.steps_a[index], limit(f, bound))
 
 
 # --- as causes --------------------------------------------------------------------------------------------------------

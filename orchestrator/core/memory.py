@@ -13,7 +13,7 @@ from typing import Any
 from orchestrator.core.parts import Kind, changed, event, measured, of_kind, total
 from orchestrator.core.states import ENERGISED, SETTLED
 from orchestrator.core.witnesses.followed import Witnessed
-from orchestrator.model import Cause, Command, Session, State, Step
+from orchestrator.model import Cause, Command, CurrentStep, Session, State
 
 ANYWHERE, QUALIFYING = frozenset(State), frozenset({State.QUALIFYING})
 
@@ -82,7 +82,7 @@ class Stage:
     intends: bool = event(default=False, tells=QUALIFYING)  #: it is its turn, and a charge begins once that is on disk
     reached_s: float | None = event(None, by_policy=True)  #: since when the pack has been above the stage's voltage
     taper_s: float | None = event(None, by_policy=True)  #: since when the current has been tapered off
-    step: Step | None = measured(None, by_policy=True)  #: while energised
+    step: CurrentStep | None = measured(None, by_policy=True)  #: while energised
     raise_s: float | None = event(None, by_policy=True)  #: since when a higher step has been allowed
 
 
@@ -90,8 +90,8 @@ class Stage:
 class Sequence:
     """How far the charger has been brought to its setpoint."""
 
-    order: Command | None = event(None, tells=ENERGISED)  #: what the sequence is waiting to see confirmed …
-    order_s: float = measured(0.0)  #: … since when
+    command: Command | None = event(None, tells=ENERGISED)  #: what the sequence is waiting to see confirmed …
+    command_s: float = measured(0.0)  #: … since when
     tries: int = measured(0)  #: … and how often the resume was repeated for it
     resumed: bool = event(default=False)  #: the charger was brought back from standby …
     resume_s: float = measured(0.0)  #: … by a resume sent after this moment

@@ -34,13 +34,15 @@ class Heard:
     refusal: Cause | None = None
 
 
-def hear(memory: Memory, request: Request, now_s: float, unkept: Cause | None = None, bay: str = "BAY") -> Heard:
+def handle_request(
+    memory: Memory, request: Request, now_s: float, not_persisted: Cause | None = None, bay: str = "BAY"
+) -> Heard:
     """What becomes of the request; `bay` is the name for commands.
 
-    What lets a charge begin is not done where it could not be kept (`unkept` says why); what stops one always is.
+    A request that would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never is.
     """
-    if unkept is not None and request in (Request.START, Request.RESET):
-        return _refused(memory, Cause.of("not_done", advice="unkept", problem=unkept))
+    if not_persisted is not None and request in (Request.START, Request.RESET):
+        return _refused(memory, Cause.of("not_done", advice="not_persisted", problem=not_persisted))
     return VERBS[request](memory, now_s, bay)
 
 

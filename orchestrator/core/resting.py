@@ -62,7 +62,7 @@ def _pauses(f: Facts, _faults: Faults) -> Found:
 def _absent(f: Facts, _faults: Faults) -> Found:
     if f.battery.online and not f.silent:
         return None
-    if f.departed:
+    if f.battery_removed:
         return Trigger.REST, Cause("battery_absent")
     id_ = "bmu_just_booted" if f.just_booted else "bmu_does_not_answer"
     what = f.battery.problem or Cause.of(id_, node_id=f.rules.bay.battery.node_id)

@@ -31,7 +31,7 @@ def values(f: Facts) -> dict[str, float | None]:
 def update(f: Facts) -> Tables:
     """The rows that are in force by these facts."""
     memory, rules, before = f.memory, f.rules, f.memory.tables
-    if f.departed or f.battery.boots != memory.battery.boots:
+    if f.battery_removed or f.battery.boots != memory.battery.boots:
         return before if before == NONE else NONE
     returns = before.row_returns if memory.session is not None else ()
     was, known = dict(before.rows), values(f)

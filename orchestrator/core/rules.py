@@ -16,7 +16,7 @@ from orchestrator.config.amperes import (
     where_a,
 )
 from orchestrator.config.policy import Band, Policy, Where
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
 from orchestrator.keys import Range
 from orchestrator.model import Cause, ControlMode
 
@@ -36,7 +36,7 @@ class Bound:
 class Rules:
     """Fixed for as long as a bay runs on one policy; made by `Rules.of(bay)`."""
 
-    bay: Bay
+    bay: BayConfig
     policy: Policy
     manual: bool  #: the charger obeys values, not only stop and resume
     max_v: float  #: no current above this, at the charger or at the pack
@@ -55,7 +55,7 @@ class Rules:
     max_ah: float  #: … and one that takes more
 
     @classmethod
-    def of(cls, bay: Bay) -> "Rules":
+    def of(cls, bay: BayConfig) -> "Rules":
         """The stricter of station and policy, for each limit that both have."""
         policy, limits, charger = bay.policy, bay.limits, bay.charger
         worst_a = tuple(round(amps * (1 + charger.tolerance_pct / 100), DIGITS) for amps in charger.steps_a)

@@ -1,10 +1,9 @@
 """The safe stop: when a charger must be told to stop, what proves that it did, and when it is out of control.
 
 Theory of operation. The safe state is *verified* standby, by both witnesses (`witnesses/standby.py`). Until then the
-standing order is STOP, which the port repeats every 500 ms. A charger that has not been verified after `OBEY_STOP_S` is
-uncontrollable: the order stays, the contactor opens, people are alarmed, and only a standby that lasts for `LASTS_S`
-ends it. In states of rest the standing order is nothing, as long as fresh replies go on to show standby; the moment one
-does not, or the BMU sees current, it is STOP again.
+standing command is STOP, repeated by the port every 500 ms. A charger not verified after `OBEY_STOP_S` is uncontrollable: the command stays, the contactor opens, people are alarmed, and only a standby that lasts for `LASTS_S`
+ends it. In states of rest there is no standing command as long as fresh replies show standby; the moment one does not,
+or the BMU sees current, it is STOP again.
 
 One that runs again within `LASTS_S` was never verified, whatever it said: its time counts on from the first stop.
 
@@ -27,7 +26,7 @@ LASTS_S = 10.0
 
 
 def must_stop(f: Facts, state: State) -> bool:
-    """Whether the standing order is STOP in `state`, given what both witnesses show."""
+    """Whether the standing command is STOP in `state`, given what both witnesses show."""
     if state in UNVERIFIED:
         return True
     if state in (State.OFFLINE, State.QUALIFYING):

@@ -1,6 +1,6 @@
-"""How a charger is brought to a setpoint: one order at a time, each seen in a status reply before the next.
+"""How a charger is brought to a setpoint: one command at a time, each seen in a status reply before the next.
 
-Manual mode: resume (rest 1) → limit step → mode → precharge function → run. Automatic mode: resume only. An order
+Manual mode: resume (rest 1) → limit step → mode → precharge function → run. Automatic mode: resume only. A command
 stands until its read-back ends it, and the port repeats it meanwhile, so a lost frame costs one slot. A resume has no
 read-back of its own: it counts when a reply was asked for after it was sent. If what follows is not obeyed, the resume
 may have been the frame that was lost, so the sequence begins again with it.
@@ -19,21 +19,21 @@ RUN = Command(Action.RUN)
 ON_THE_WAY = (ChargeMode.BATTERY_SEARCH, ChargeMode.BATTERY_RECOVERY)
 
 
-def next_order(f: Facts, setpoint: Setpoint) -> tuple[Command | None, Sequence]:
-    """The order that leads towards `setpoint`, None when the status shows all of it; and how far the sequence is."""
+def next_command(f: Facts, setpoint: Setpoint) -> tuple[Command | None, Sequence]:
+    """The command that leads towards `setpoint`, None when the status shows all of it; and how far the sequence is."""
     known, reading = f.memory.sequence, f.reading
     if reading is None:
-        return known.order, known
+        return known.command, known
     missing = _missing(reading, setpoint, manual=f.rules.manual)
-    if missing != known.order:
-        known = changed(known, order=missing, order_s=f.now_s, tries=0)
+    if missing != known.command:
+        known = changed(known, command=missing, command_s=f.now_s, tries=0)
     if missing is None or _running(reading):
         return missing, known
     if f.memory.stage.ran:
         return None, known  # somebody stopped it: the fault table decides
     if not known.resumed and _resume_seen(f, reading):
         known = changed(known, resumed=True)
-    tries = int((f.now_s - known.order_s) / RETRY_S)
+    tries = int((f.now_s - known.command_s) / RETRY_S)
     if tries > known.tries:
         known = changed(known, tries=tries, resumed=False, resume_s=f.now_s)
     return (missing if known.resumed else RESUME), known
@@ -41,12 +41,12 @@ def next_order(f: Facts, setpoint: Setpoint) -> tuple[Command | None, Sequence]:
 
 def begins(known: Sequence, now_s: float) -> Sequence:
     """Current is to flow, after a rest in which it did not."""
-    return changed(known, resumed=False, resume_s=now_s, order=None)
+    return changed(known, resumed=False, resume_s=now_s, command=None)
 
 
 def ends(known: Sequence) -> Sequence:
     """No current is to flow any more."""
-    return changed(known, order=None) if known.order is not None else known
+    return changed(known, command=None) if known.command is not None else known
 
 
 def _running(reading: ChargerReading) -> bool:
@@ -63,8 +63,8 @@ def _missing(reading: ChargerReading, setpoint: Setpoint, *, manual: bool) -> Co
     running = _running(reading)
     if not manual:
         return None if running else RESUME
-    if setpoint.current_limit is not None and reading.current_limit != setpoint.current_limit:
-        return Command(Action.SET_LIMIT, setpoint.current_limit)
+    if setpoint.current_step is not None and reading.current_step != setpoint.current_step:
+        return Command(Action.SET_LIMIT, setpoint.current_step)
     if setpoint.charge_mode is not None and reading.charge_mode is not setpoint.charge_mode:
         under_way = running and reading.charge_mode in ON_THE_WAY
         if not under_way:

@@ -78,7 +78,7 @@ class ChargerPort:
         """The newest reading and the state of the link: one consistent pair."""
         return self._view.current
 
-    def order(self, command: Command | None, grant: Grant | None = None) -> None:
+    def command(self, command: Command | None, grant: Grant | None = None) -> None:
         """Give the command to repeat (None: only poll) and the grant for it. A stop goes out at once.
 
         Call this with every decision, changed or not: a reopened port has forgotten the last command and stops.
@@ -131,34 +131,36 @@ class ChargerPort:
                 self._wake.wait(self._open_at_s - now_s)
             return
         with self._lock:
-            due, order, grant = self._schedule.next(), self._schedule.order, self._grant
+            due, command, grant = self._schedule.next(), self._schedule.command, self._grant
         if due.at_s > now_s:
             self._wake.wait(due.at_s - now_s)
         elif due.turn is Turn.STOP:
             self._write(line, STOP_FRAME, STOP, due.turn, whole_stop=self._config.control is ControlMode.AUTOMATIC)
         elif due.turn is Turn.OPERATION_STOP:
             self._write(line, OPERATION_STOP_FRAME, STOP, due.turn, whole_stop=True)
-        elif due.turn is Turn.ORDER and order is not None:
-            self._obey(line, order, grant)
+        elif due.turn is Turn.ORDER and command is not None:
+            self._obey(line, command, grant)
         else:
             self._poll(line)
 
-    def _obey(self, line: ChargerLine, order: Command, grant: Grant | None) -> None:
-        refused = permit(order, grant, self._clock(), self._config, self._limits)
+    def _obey(self, line: ChargerLine, command: Command, grant: Grant | None) -> None:
+        refused = permit(command, grant, self._clock(), self._config, self._limits)
         if refused is not None:
             self._poll(line, refused)
         else:
-            self._write(line, encode(order), order, Turn.ORDER)
+            self._write(line, encode(command), command, Turn.ORDER)
 
-    def _write(self, line: ChargerLine, frame: bytes, order: Command, turn: Turn, *, whole_stop: bool = False) -> None:
+    def _write(
+        self, line: ChargerLine, frame: bytes, command: Command, turn: Turn, *, whole_stop: bool = False
+    ) -> None:
         start_s = self._clock()
-        found = self._restored(line) if order == STOP else None
+        found = self._restored(line) if command == STOP else None
         line.write(frame)
         end_s = self._clock()
         self._took(turn, start_s, end_s)
         self._found(found)
         stop_sent_s = end_s if whole_stop else self._view.link.stop_sent_s
-        self._view.publish(sent=Sent(order, end_s), stop_sent_s=stop_sent_s, refused=None)
+        self._view.publish(sent=Sent(command, end_s), stop_sent_s=stop_sent_s, refused=None)
 
     def _restored(self, line: ChargerLine) -> Cause | None:
         """The settings that had to be corrected. A failure here must not prevent a stop."""

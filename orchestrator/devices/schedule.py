@@ -39,7 +39,7 @@ class Due:
 class Schedule:
     """The turns of one port. Not thread-safe: the port locks it."""
 
-    __slots__ = ("_after_poll", "_free_s", "_half_stopped", "_manual", "_slot_s", "_stop_s", "_urgent", "order")
+    __slots__ = ("_after_poll", "_free_s", "_half_stopped", "_manual", "_slot_s", "_stop_s", "_urgent", "command")
 
     def __init__(self, control: ControlMode) -> None:
         self._manual = control is ControlMode.MANUAL
@@ -53,7 +53,7 @@ class Schedule:
 
         At most once per slot, so that a recurring error does not flood the line.
         """
-        self.order: Command | None = STOP  #: the command to repeat
+        self.command: Command | None = STOP  #: the command to repeat
         self._urgent = True
         self._free_s = self._slot_s = self._stop_s = max(now_s, self._stop_s + SLOT_S)
 
@@ -61,14 +61,14 @@ class Schedule:
         """Replace the command. True if that is a new stop, which must wake the thread."""
         stop = command is not None and command.action is Action.STOP
         new_stop = stop and not self.stopping
-        self.order = command
+        self.command = command
         self._urgent = self._urgent or new_stop
         return new_stop
 
     @property
     def stopping(self) -> bool:
         """Whether the command is stop."""
-        return self.order is not None and self.order.action is Action.STOP
+        return self.command is not None and self.command.action is Action.STOP
 
     @property
     def stop_unfinished(self) -> bool:
@@ -83,7 +83,7 @@ class Schedule:
             return Due(Turn.OPERATION_STOP, self._slot_s)
         if self.stopping and self._stop_s + STOP_REPEAT_S <= self._slot_s:
             return Due(Turn.STOP, self._stop_s + STOP_REPEAT_S)
-        if self.order is None or self.stopping or not self._after_poll:
+        if self.command is None or self.stopping or not self._after_poll:
             return Due(Turn.POLL, self._slot_s)
         return Due(Turn.ORDER, self._slot_s)
 

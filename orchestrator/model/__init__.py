@@ -24,6 +24,7 @@ from orchestrator.model.decision import (
     STANDBY,
     ActiveFault,
     Alarm,
+    CurrentStep,
     Decision,
     Effect,
     Request,
@@ -31,7 +32,6 @@ from orchestrator.model.decision import (
     Setpoint,
     Snapshot,
     State,
-    Step,
 )
 
 __all__ = [
@@ -50,6 +50,7 @@ __all__ = [
     "Command",
     "Connection",
     "ControlMode",
+    "CurrentStep",
     "Decision",
     "Effect",
     "ErrorBit",
@@ -62,5 +63,4 @@ __all__ = [
     "Setpoint",
     "Snapshot",
     "State",
-    "Step",
 ]

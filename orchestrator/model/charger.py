@@ -88,7 +88,7 @@ class ChargerReading:
     current_a: float
     control_mode: ControlMode | None
     operation: Operation | None
-    current_limit: int | None
+    current_step: int | None
     charge_mode: ChargeMode | None
     precharge: Precharge | None
     connection: Connection | None
@@ -112,7 +112,7 @@ class ChargerLink:
     misses: int = 0  #: polls in a row without an answer
     sent: Sent | None = None
     stop_sent_s: float | None = None  #: when the last complete stop was handed to the port
-    refused: Cause | None = None  #: the interlock's reason, if it held the standing order back
+    refused: Cause | None = None  #: the interlock's reason, if it held the standing command back
     error_bits: int = 0  #: of the newest 0x1F frame
     error_t_s: float | None = None  #: when that frame arrived
     bad_frames: int = 0  #: frames dropped since the port was opened: checksum, length, end

@@ -30,7 +30,9 @@ class Snapshot:
     internal: str = ""  #: an exception in our own code, caught at the boundary, as text
     late_s: float = 0.0  #: how much later than planned this decision is made
     slept_s: float = 0.0  #: how long the whole machine was suspended since the previous decision
-    unkept: Cause | None = None  #: why faults that latch now would be forgotten by a restart; None while they would not
+    not_persisted: Cause | None = (
+        None  #: why faults that latch now would be forgotten by a restart; None while they would not
+    )
     ending: Cause | None = None  #: why the service is about to end; None while it is not
     connected: bool = True  #: no contactor between charger and battery, or one that was closed for this reading
     contactor_problem: Cause | None = None  #: why the contactor cannot be driven
@@ -38,7 +40,7 @@ class Snapshot:
         None  #: why no charge may begin here right now, although nothing is wrong: another bay is beginning one
     )
     moves: str = ""  #: the other bay whose BMU saw the first amperes of this bay's charger, if that happened
-    running_kept: bool = True  #: the disk records that this bay's charger may be running
+    running_persisted: bool = True  #: the disk records that this bay's charger may be running
 
 
 class State(StrEnum):
@@ -103,7 +105,7 @@ class Setpoint:
     """What the charger should be doing; None where the charger decides (automatic mode, standby)."""
 
     run: bool = False
-    current_limit: int | None = None
+    current_step: int | None = None
     charge_mode: ChargeMode | None = None
     precharge: Precharge | None = None
 
@@ -112,7 +114,7 @@ STANDBY = Setpoint()
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class CurrentStep:
     """The current step in force, and the rule that limits it."""
 
     index: int  #: as in the charger's protocol: 0 (lowest) … 4
@@ -171,7 +173,7 @@ class Decision:
     cause: Cause  #: why the bay is in this state
     command: Command | None = None  #: repeated to the charger until confirmed; None: only poll
     setpoint: Setpoint = STANDBY
-    step: Step | None = None  #: while energised
+    step: CurrentStep | None = None  #: while energised
     faults: tuple[ActiveFault, ...] = ()  #: the most dangerous first
     alarm: Alarm = Alarm.NONE
     closed: bool = False  #: the contactor between charger and battery should be closed

@@ -150,7 +150,7 @@ STATUS_VALUES = (
     StatusValue("temperature_2_c", "temperature 2", Kind1.TEMPERATURE_2, 0, _signed_tenths),
     StatusValue("control_mode", "control mode", Kind1.CONTROL_MODE, 0, ControlMode, "0, 1"),
     StatusValue("operation", "operation", 0, Kind2.OPERATION, Operation, "0, 1"),
-    StatusValue("current_limit", "current limit", 0, Kind2.CURRENT_LIMIT, range(5).index, "0 … 4"),
+    StatusValue("current_step", "current limit", 0, Kind2.CURRENT_LIMIT, range(5).index, "0 … 4"),
     StatusValue("charge_mode", "charge mode", 0, Kind2.CHARGE_MODE, ChargeMode, "1 … 8"),
     StatusValue("precharge", "precharge function", 0, Kind2.PRECHARGE, Precharge, "0 … 2"),
     StatusValue("connection", "battery connection", 0, Kind2.CONNECTION, Connection, "0, 1"),

@@ -55,7 +55,7 @@ def _raw(data: bytes) -> list[tuple[bytes, str]]:
 def _words(name: str, value: float) -> str:
     if isinstance(value, IntEnum):
         return f"{value} ({value.name.lower().replace('_', ' ')})"
-    if name == "current_limit":
+    if name == "current_step":
         return f"{value} ({_STEPS[int(value)]})"
     return f"{value}{_UNITS[name.rpartition('_')[2]]}"
 

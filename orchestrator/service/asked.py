@@ -68,15 +68,17 @@ class Answers:
 
     def look(self, now_s: float) -> None:
         """Answer the requests that are on disk or have waited long enough."""
-        kept = self._store.kept_revision
+        kept = self._store.persisted_revision
         left = []
         for asked, revision, until_s, changed in self.waiting:
             if revision > kept and now_s < until_s:
                 left.append((asked, revision, until_s, changed))
                 continue
             if revision > kept:
-                starts, problem = asked.request is Request.START, self._store.unkept(now_s)
-                asked.answer = Cause.of("not_done" if starts else "not_kept", problem=problem or Cause("not_taken"))
+                starts, problem = asked.request is Request.START, self._store.not_persisted(now_s)
+                asked.answer = Cause.of(
+                    "not_done" if starts else "done_not_persisted", problem=problem or Cause("not_taken")
+                )
                 if starts and changed:
                     self._withdraw()
             asked.done.set()

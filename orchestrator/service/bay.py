@@ -6,12 +6,12 @@ from dataclasses import replace
 from math import inf
 from time import monotonic, time
 
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
+from orchestrator.core.decide import decide
 from orchestrator.core.failed import carry_on
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.states import ENERGISED, SETTLED
-from orchestrator.core.step import step
 from orchestrator.interlock import grant
 from orchestrator.model import (
     STOP,
@@ -24,7 +24,7 @@ from orchestrator.model import (
 )
 from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.contactor import Contactor
-from orchestrator.service.devices import Battery, Charger
+from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
@@ -43,9 +43,9 @@ class BayRunner:
 
     def __init__(
         self,
-        bay: Bay,
-        charger: Charger,
-        battery: Battery,
+        bay: BayConfig,
+        charger: ChargerDevice,
+        battery: BatteryDevice,
         journal: Journal,
         store: Store,
         say: Callable[[Cause], None],
@@ -125,7 +125,7 @@ class BayRunner:
         try:
             self._step(now_s, asleep_s, asked[0].request if asked else None)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
-            self._charger.order(STOP)
+            self._charger.command(STOP)
             self._failed(error, now_s, asked[0].request if asked else None)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         for one in asked:
@@ -155,8 +155,8 @@ class BayRunner:
         snapshot = self._snapshot = self._look(now_s, asleep_s, request)
         before = self.decision
         memory = self._memory or self._store.past(self.place).memory(now_s)
-        decision, self._memory = step(now_s, snapshot, memory, self.policy.rules)
-        self._charger.order(decision.command, grant(snapshot, now_s) if decision.command else None)
+        decision, self._memory = decide(now_s, snapshot, memory, self.policy.rules)
+        self._charger.command(decision.command, grant(snapshot, now_s) if decision.command else None)
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
         self.decision, self._internal, self.last_s = decision, "", now_s
@@ -194,11 +194,11 @@ class BayRunner:
             self._internal,
             late_s=late_s if late_s > TICK_S else 0.0,  # less is normal on such a machine
             slept_s=slept_s if slept_s > TICK_S else 0.0,
-            unkept=self._store.unkept(now_s),
+            not_persisted=self._store.not_persisted(now_s),
             ending=self._ending,
             waits=self._starts.waits(self.name, now_s),
             moves=self._starts.moves(self.name),
-            running_kept=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
+            running_persisted=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
         )
         if self._contactor is not None:
             connected, problem = self._contactor.connects(reading), self._contactor.problem

@@ -6,18 +6,18 @@ from orchestrator.interlock import Grant
 from orchestrator.model import BatteryLink, BatteryReading, ChargerLink, ChargerReading, Command
 
 
-class Charger(Protocol):
+class ChargerDevice(Protocol):
     """The interface of a charger's port (`devices.charger.ChargerPort`)."""
 
     @property
     def view(self) -> tuple[ChargerReading | None, ChargerLink]:
         """The newest reading and the state of the link."""
 
-    def order(self, command: Command | None, grant: Grant | None = None) -> None:
+    def command(self, command: Command | None, grant: Grant | None = None) -> None:
         """Give the command to repeat."""
 
 
-class Battery(Protocol):
+class BatteryDevice(Protocol):
     """The interface of a BMU (`devices.battery.BatteryNode`)."""
 
     @property

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os.path import abspath, realpath
 
-from orchestrator.config.station import Bay, Rs485
+from orchestrator.config.station import BayConfig, Rs485
 from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.model import Cause, ControlMode
 from orchestrator.model.cause import SEVERAL, together
@@ -27,7 +27,7 @@ class Place:
     rs485: Rs485 = field(default=Rs485.OFF, compare=False)
 
     @classmethod
-    def of(cls, bay: Bay) -> "Place":
+    def of(cls, bay: BayConfig) -> "Place":
         """The present place of this bay."""
         charger, battery, port = bay.charger, bay.battery, abspath(bay.charger.port)  # noqa: PTH100 - not resolved
         return cls(bay.name, port, battery.can, battery.node_id, charger.control, charger.rs485)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause
 
@@ -10,11 +10,11 @@ from orchestrator.model import Cause
 class PolicyInForce:
     """`rules` are the rules in force. Used by the control loop's thread only, except `offer` and `status`."""
 
-    def __init__(self, bay: Bay) -> None:
+    def __init__(self, bay: BayConfig) -> None:
         self.rules = Rules.of(bay)
-        self._offered: Bay | None = None  # has a policy that is not in force yet
+        self._offered: BayConfig | None = None  # has a policy that is not in force yet
 
-    def offer(self, bay: Bay | None) -> Cause:
+    def offer(self, bay: BayConfig | None) -> Cause:
         """Offer another policy, to be adopted at the next standby; returns the outcome for people. Thread-safe.
 
         `bay` is this bay in the present station file, None if the file no longer has it.
@@ -28,7 +28,7 @@ class PolicyInForce:
         self._offered = bay
         return Cause.of("policy_offered", policy=name_of(bay))
 
-    def take_over(self) -> Bay | None:
+    def take_over(self) -> BayConfig | None:
         """The bay is in standby: put the offered policy into force. Returns the bay with it, None if there is none."""
         bay, self._offered = self._offered, None
         if bay is not None:
@@ -46,7 +46,7 @@ class PolicyInForce:
         }
 
 
-def name_of(bay: Bay) -> Cause:
+def name_of(bay: BayConfig) -> Cause:
     """The name of a bay's policy, with its file."""
     source = bay.policy.source
     return Cause.of("policy", policy=bay.policy.policy, file=source.file, sha256=source.digest)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
 from orchestrator.core.memory import Memory, side_by_side
 from orchestrator.core.states import QUIET
 from orchestrator.model import (
@@ -15,12 +15,12 @@ from orchestrator.model import (
     ChargerLink,
     ChargerReading,
     Command,
+    CurrentStep,
     Decision,
     Measurement,
     Session,
     Snapshot,
     State,
-    Step,
 )
 from orchestrator.model.cause import plain
 from orchestrator.service.wallclock import WallClock
@@ -32,8 +32,8 @@ Line = tuple[str, dict[str, object]]  #: kind, fields
 TEXTS = frozenset({"reason", "text", "rule", "result"})
 #: The parts of a snapshot that concern this service and its contactor.
 OURS = (
-    "internal", "late_s", "slept_s", "unkept", "ending", "connected", "contactor_problem", "waits", "moves",
-    "running_kept",
+    "internal", "late_s", "slept_s", "not_persisted", "ending", "connected", "contactor_problem", "waits", "moves",
+    "running_persisted",
 )  # fmt: skip
 #: What of a reading or a link may have causes in it; the rest is written as it is.
 DEEP = frozenset({Cause, tuple, dict})
@@ -77,7 +77,7 @@ def without_texts(said: Mapping[str, object]) -> dict[str, object]:
     return {name: without_texts(value) if name == "step" and value else value for name, value in kept.items()}  # type: ignore[arg-type]
 
 
-def _step_fields(step: Step | None, language: str) -> dict[str, object] | None:
+def _step_fields(step: CurrentStep | None, language: str) -> dict[str, object] | None:
     if step is None:
         return None
     rule = {"rule": say(step.rule, language), "cause": plain(step.rule)}
@@ -138,11 +138,11 @@ class SnapshotRecorder:
     input of a decision: repeating it gives the same result.
     """
 
-    def __init__(self, bay: Bay) -> None:
+    def __init__(self, bay: BayConfig) -> None:
         self._since_whole = 0
         self.begin(bay)
 
-    def begin(self, bay: Bay) -> None:
+    def begin(self, bay: BayConfig) -> None:
         """Start over with a complete line, with the policy now in force."""
         self._config = json.loads(json.dumps(asdict(bay), default=str))
         self._last: Snapshot | None = None

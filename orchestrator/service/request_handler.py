@@ -43,10 +43,10 @@ class RequestHandler:
             name = request.get("bay")
             bays = self._bays if name is None else [self._named(name)]
             now_s, shown = self._clock(), [bay.status() for bay in bays]
-            problem, unkept = self._journal.problem(now_s), self._store.unkept(now_s)
+            problem, not_persisted = self._journal.problem(now_s), self._store.not_persisted(now_s)
             alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
             strays = self._strays.status(self._language)
-            return station_status(self._station, alarm, shown, problem, unkept, strays)
+            return station_status(self._station, alarm, shown, problem, not_persisted, strays)
         if isinstance(verb, str) and verb in set(Request):
             names, port = request.get("bays"), request.get("port")
             if verb == Request.RESET and isinstance(port, str):
@@ -57,17 +57,17 @@ class RequestHandler:
 
     def _drop(self, port: str) -> Later:
         """Forget a charger without a bay; answered once that is on disk."""
-        self._store.refuse_unkept(self._clock())
+        self._store.refuse_not_persisted(self._clock())
         what, revision = self._strays.drop(port)
         end_s = self._clock() + KEPT_WITHIN_S
 
         def results() -> Answer | None:
-            if self._store.kept_revision >= revision:
+            if self._store.persisted_revision >= revision:
                 return self._results({what: None})
             if self._clock() < end_s:
                 return None
-            problem = self._store.unkept(self._clock()) or Cause("not_taken")
-            return self._results({what: Cause.of("dropped_not_kept", problem=problem)})
+            problem = self._store.not_persisted(self._clock()) or Cause("not_taken")
+            return self._results({what: Cause.of("dropped_not_persisted", problem=problem)})
 
         return results
 

@@ -88,7 +88,7 @@ def station_status(
     alarm: Alarm,
     bays: list[dict[str, object]],
     journal_problem: Cause | None,
-    unkept: Cause | None = None,
+    not_persisted: Cause | None = None,
     strays: Sequence[Mapping[str, object]] = (),
 ) -> dict[str, object]:
     """The whole station. `alarm` is the worst of all its bays and strays, even if `bays` has only some of them.
@@ -102,7 +102,7 @@ def station_status(
         "bays": bays,
         "strays": list(strays),
         "journal": _problem(journal_problem, station.language.value),
-        "persisted": _problem(unkept, station.language.value),
+        "persisted": _problem(not_persisted, station.language.value),
     }
 
 
@@ -123,7 +123,7 @@ def _level(alarm: Alarm) -> str:
 def _setpoint(setpoint: Setpoint) -> dict[str, object]:
     return {
         "operation": int(setpoint.run),
-        "current_limit": setpoint.current_limit,
+        "current_limit": setpoint.current_step,
         "charge_mode": setpoint.charge_mode,
         "precharge": setpoint.precharge,
     }

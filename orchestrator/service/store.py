@@ -2,8 +2,8 @@
 
 Theory of operation. The control loop puts each bay's state here; the thread writes the whole file whenever anything
 changes that may be relied on (`Persisted.gist`), and plain counters periodically. Every such change has a revision;
-answers and starts wait until `kept_revision` has reached it. A disk that is full, gone or hung delays nobody: `unkept`
-reports it, and no charge begins.
+answers and starts wait until `persisted_revision` has reached it. A disk that is full, gone or hung delays nobody:
+`not_persisted` reports it, and no charge begins.
 
 A restart is neither a reset nor a start. If the file cannot be read, every bay is held; the file is moved aside, never
 overwritten. If the disk does not answer in time, nothing is written at all, and the next start finds the old state.
@@ -32,8 +32,8 @@ RETRY_S = 1.0
 class Store:
     """The persisted state of a station's bays. `put` and the queries never block and are thread-safe.
 
-    `clock` is monotonic, `wall` the wall clock, `boot` identifies the boot of the machine. `on_kept` is called from the
-    store's thread with the places whose changes have just reached the disk; it must be quick.
+    `clock` is monotonic, `wall` the wall clock, `boot` identifies the boot of the machine. `on_persisted` is called
+    from the store's thread with the places whose changes have just reached the disk; it must be quick.
     """
 
     def __init__(
@@ -44,16 +44,16 @@ class Store:
         wall: Callable[[], float],
         *,
         boot: str = "",
-        on_kept: Callable[[Collection[Place]], None] = lambda _: None,
+        on_persisted: Callable[[Collection[Place]], None] = lambda _: None,
     ) -> None:
         self.path = directory / FILE
         self._directory, self._places = directory, tuple(places)
-        self._clock, self._wall, self._boot, self._on_kept = clock, wall, boot, on_kept
+        self._clock, self._wall, self._boot, self._on_persisted = clock, wall, boot, on_persisted
         self._lock = threading.Lock()  # guards the following; never held while waiting for a disk
         self._table: dict[Place, Remembered] = {}
         self._gists: dict[Place, object] = {}  # as last written
         self._disk: dict[Place, Persisted] = {}  # without entries that the write under way may change
-        self._revision, self.kept_revision = 1, 0  # the file is written once at the start
+        self._revision, self.persisted_revision = 1, 0  # the file is written once at the start
         self._pending_s: float | None = None  # since when a change has been waiting for the disk …
         self._later_s: float | None = None  # … and one that is not part of the write under way
         self._counted = False  # a counter has changed
@@ -96,7 +96,7 @@ class Store:
         return [place for place in running if not any(place.is_port_of(one) for one in self._places)]
 
     def put(self, place: Place, persisted: Persisted) -> int:
-        """Store this state. Returns its revision: it is on disk once `kept_revision` has reached it."""
+        """Store this state. Returns its revision: it is on disk once `persisted_revision` has reached it."""
         now_s = self._clock()
         with self._lock:
             old = self._table[place]
@@ -117,7 +117,7 @@ class Store:
         """This place's state on disk, with the ages of that time; None while a write may be changing `running`."""
         return self._disk.get(place)
 
-    def unkept(self, now_s: float) -> Cause | None:
+    def not_persisted(self, now_s: float) -> Cause | None:
         """Why a restart would forget something; None while it would not."""
         pending_s, problem = self._pending_s, self._blind or self._problem
         if problem is None and pending_s is not None and now_s - pending_s > KEPT_WITHIN_S:
@@ -126,13 +126,13 @@ class Store:
             return None
         return Cause.of("would_forget", problem=problem, then=Cause("restart_then") if self._blind else None)
 
-    def refuse_unkept(self, now_s: float) -> None:
+    def refuse_not_persisted(self, now_s: float) -> None:
         """RequestError where what is to be changed now would be forgotten."""
-        if why := self.unkept(now_s):
+        if why := self.not_persisted(now_s):
             raise RequestError(Cause.of("not_done", problem=why))
 
     def stalled(self, _now_s: float) -> bool:
-        """True if the writer has died. Waiting for its disk does not count: `unkept` reports that."""
+        """True if the writer has died. Waiting for its disk does not count: `not_persisted` reports that."""
         return not self._thread.is_alive()
 
     def close(self, within_s: float) -> Cause | None:
@@ -143,7 +143,7 @@ class Store:
             self._thread.join(within_s)
         if self._blind or self._problem:
             return self._blind or self._problem
-        if self._thread.is_alive() or self.kept_revision < self._revision:
+        if self._thread.is_alive() or self.persisted_revision < self._revision:
             return Cause.of("disk_hangs", file=str(self.path), limit_s=within_s)
         return None
 
@@ -197,10 +197,10 @@ class Store:
     def _due(self, *, ended: bool) -> bool:
         now_s = self._clock()
         if ended:
-            return self.kept_revision < self._revision or self._counted
+            return self.persisted_revision < self._revision or self._counted
         if self._problem and now_s - self._failed_s < RETRY_S:
             return False
-        return self.kept_revision < self._revision or (self._counted and now_s - self._written_s >= COUNTERS_S)
+        return self.persisted_revision < self._revision or (self._counted and now_s - self._written_s >= COUNTERS_S)
 
     def _write(self) -> None:
         stamp = self._stamp()
@@ -220,7 +220,7 @@ class Store:
             move_aside(self._directory, self._aside, "unread")
             self._aside = ()
             replace_file(self.path, encode(stamp, self._run_number, entries))
-            if not self.kept_revision:  # an older version started again then finds nothing, and holds every bay
+            if not self.persisted_revision:  # an older version started again then finds nothing, and holds every bay
                 move_aside(self._directory, [FIRST_FILE], "old")
         except OSError as error:
             self._fail(_said(error, self.path), stamp.clock_s)
@@ -230,9 +230,9 @@ class Store:
         with self._lock:
             self._disk = {place: put.persisted for place, put in table.items()}
             self._gists = {place: put.gist for place, put in table.items()}
-            self.kept_revision, self._pending_s = revision, self._later_s
+            self.persisted_revision, self._pending_s = revision, self._later_s
             self._problem, self._written_s = None, stamp.clock_s
-        self._on_kept(changed)
+        self._on_persisted(changed)
 
     def _fail(self, problem: Cause, now_s: float) -> None:
         self._problem, self._failed_s, self._counted = problem, now_s, True

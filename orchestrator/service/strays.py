@@ -49,7 +49,7 @@ class Strays:
         """Begin to stop each of them."""
         for place in self._store.strays():
             port = self._open_port(place)
-            port.order(STOP)
+            port.command(STOP)
             port.start()
             self._strays.append(_Stray(place, port))
             self._tell("stray_found", place)

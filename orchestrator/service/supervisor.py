@@ -63,7 +63,7 @@ class Supervisor:
         self._console = Console(language=self._language)
         self._journal = Journal(kept.directory, kept.max_mb, monotonic, time, boot=boot, say=self._say)
         places = [Place.of(bay) for bay in station.bays]
-        self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_kept=self._on_kept)
+        self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_persisted=self._on_persisted)
         self._ports: list[ChargerPort] = []
         self._buses: list[BatteryBus] = []
         self._bays: list[BayRunner] = []
@@ -153,7 +153,7 @@ class Supervisor:
         for bay in self._bays:
             self._run(bay)
 
-    def _on_kept(self, places: Collection[Place]) -> None:
+    def _on_persisted(self, places: Collection[Place]) -> None:
         """A change on disk may let a charge begin, or answer a request."""
         for number, bay in enumerate(self._bays):
             if bay.place in places:
@@ -217,12 +217,12 @@ class Supervisor:
         for bay in self._bays:
             bay.isolate()
         self._guardian.done()
-        unkept = self._store.close(KEEP_S)
+        not_persisted = self._store.close(KEEP_S)
         for bay in self._bays:
             bay.answer()
         close_all([worker.close for worker in (*self._devices, *self._strays.ports)], CLOSE_S)
         verdicts = [Cause.of("not_verified", chargers=tuple(unverified))] if unverified else []
-        verdicts += [Cause.of("not_written", problem=unkept)] if unkept is not None else []
+        verdicts += [Cause.of("not_written", problem=not_persisted)] if not_persisted is not None else []
         self._say(Cause.of("ended", verdicts=tuple(verdicts)) if verdicts else Cause("ended_well"))
         self._journal.close()
         return 1 if verdicts or self._lost else 0

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from time import monotonic
 
-from orchestrator.config.station import Bay, ChargerConfig, Limits, Rs485
+from orchestrator.config.station import BayConfig, ChargerConfig, Limits, Rs485
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.keys import Range
 from orchestrator.link.gpio import OutputLine, need_gpiod
@@ -34,7 +34,7 @@ def stray_port(guardian: GuardianLink, poke: Callable[[], None], place: Place) -
     return charger_port(charger, Limits(voltage_v=0.0, current_a=0.0, temperature_c=Range(0, 0)), poke, guardian)
 
 
-def open_contactor(bay: Bay, guardian: GuardianLink) -> Contactor | None:
+def open_contactor(bay: BayConfig, guardian: GuardianLink) -> Contactor | None:
     """The bay's contactor, if it has one. LinkError if its library is not installed."""
     config = bay.contactor
     if config is None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.pack import Pack, Readout
 
 #: Model time advances in steps of at most this, so that pulses and the constant-voltage phase are modelled correctly.
@@ -12,10 +12,10 @@ MAX_STEP_S = 0.1
 
 
 @dataclass(slots=True)
-class Bay:
+class SimulatedBay:
     """A charger and a pack; `falsify` changes what the BMU reports, by field of the readout."""
 
-    charger: Charger
+    charger: SimulatedCharger
     pack: Pack
     connected: bool = True  #: the battery is in the bay
     falsify: dict[str, Callable[[float], float]] = field(default_factory=dict)

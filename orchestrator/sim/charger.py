@@ -42,7 +42,7 @@ ALLOWED = {
 
 
 @dataclass(slots=True)
-class Charger:
+class SimulatedCharger:
     """One charger. `rest` and `push` are what its line brings, `advance` lets time pass, the rest is what it says."""
 
     control_mode: ControlMode = ControlMode.MANUAL
@@ -55,7 +55,7 @@ class Charger:
     # what was commanded and is remembered
     run: bool = False
     resting: bool = False  #: standby by rest 0, until rest 1
-    current_limit: int = 0
+    current_step: int = 0
     mode: ChargeMode = ChargeMode.FULL  #: commanded, or in automatic the present stage
     precharge: Precharge = Precharge.OFF
 
@@ -82,7 +82,7 @@ class Charger:
 
     def __post_init__(self) -> None:
         if self.control_mode is ControlMode.AUTOMATIC:
-            self.run, self.mode, self.current_limit = True, ChargeMode.BATTERY_SEARCH, len(self.steps_a) - 1
+            self.run, self.mode, self.current_step = True, ChargeMode.BATTERY_SEARCH, len(self.steps_a) - 1
 
     # --- what the line brings ---
 
@@ -107,7 +107,7 @@ class Charger:
         if what == Push.OPERATION:
             self._set_operation(run=value == 1)
         elif what == Push.CURRENT_LIMIT:
-            self.current_limit, self.limit_s = value, 0.0
+            self.current_step, self.limit_s = value, 0.0
         elif what == Push.CHARGE_MODE:
             if value != self.mode:
                 self.full = False
@@ -205,7 +205,7 @@ class Charger:
         if not self.running:
             return 0.0
         if self.mode is ChargeMode.CHARGE:
-            return self.steps_a[self.current_limit]
+            return self.steps_a[self.current_step]
         if self.pulsing:
             return self.precharge_a if self.stage_s % (2 * PULSE_S) < PULSE_S else 0.0
         if self.mode is ChargeMode.PRECHARGE and self.precharge is Precharge.CONTINUOUS:
@@ -243,4 +243,4 @@ class Charger:
     def _go_back(self, dt_s: float) -> None:
         self.limit_s += dt_s
         if self.reverts_s is not None and self.limit_s >= self.reverts_s:
-            self.current_limit = len(self.steps_a) - 1
+            self.current_step = len(self.steps_a) - 1

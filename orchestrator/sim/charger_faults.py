@@ -52,7 +52,7 @@ def command_ignored(rig: Rig, _: float | None) -> None:
     """The charger falls to its lowest limit and takes no other."""
     charger = rig.bay.charger
     charger.deaf_to.add(Push.CURRENT_LIMIT)
-    charger.current_limit = 0
+    charger.current_step = 0
 
 
 def ignore_stop(rig: Rig, _: float | None) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from math import inf
 
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 
 ADDRESS = 0x90
 HEAD, TAIL = b"\xaf\xfa", b"\xaf\xa0"
@@ -130,7 +130,7 @@ def complaint(request: Request, errors: int) -> bytes:
     return frame(ERROR, errors, bytes((request.length, request.command, request.order, request.checksum)))
 
 
-def status(charger: Charger, kind1: int, kind2: int, lies: Mapping[Kind, int]) -> bytes:
+def status(charger: SimulatedCharger, kind1: int, kind2: int, lies: Mapping[Kind, int]) -> bytes:
     """0x03: the requested values, in list order, two bytes each; no values for undefined bits.
 
     `lies` replaces values, whatever the charger is doing.
@@ -141,7 +141,7 @@ def status(charger: Charger, kind1: int, kind2: int, lies: Mapping[Kind, int]) -
     return frame(REPLY, ADDRESS, b"".join(value.to_bytes(2, "big") for value in answers))
 
 
-def _values(charger: Charger) -> tuple[int, ...]:
+def _values(charger: SimulatedCharger) -> tuple[int, ...]:
     """The ten values of §4.1.1, in its order; the two temperatures carry no information since 2022-01."""
     return (
         _hundredths(charger.voltage_v),
@@ -150,7 +150,7 @@ def _values(charger: Charger) -> tuple[int, ...]:
         0,
         charger.control_mode,
         charger.operation,
-        charger.current_limit,
+        charger.current_step,
         charger.charge_mode,
         charger.precharge,
         charger.connection,

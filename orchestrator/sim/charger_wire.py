@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from termios import tcgetattr
 
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.charger_frames import (
     CHECKSUM_ERROR,
     REST,
@@ -23,7 +23,7 @@ from orchestrator.sim.charger_frames import (
     complaint,
     status,
 )
-from orchestrator.sim.line import Line, Noise, garbled, is_clear
+from orchestrator.sim.line import Noise, SimulatedLine, garbled, is_clear
 
 #: A frame interrupted for this long (about 60 byte times) is cut off.
 FRAME_GAP_S = 0.03
@@ -56,9 +56,9 @@ class ChargerWire:
     def __init__(
         self,
         loop: asyncio.AbstractEventLoop,
-        charger: Charger,
+        charger: SimulatedCharger,
         *,
-        line: Line | None = None,
+        line: SimulatedLine | None = None,
         link: Path | None = None,
         now: Callable[[], None] = lambda: None,
     ) -> None:
@@ -72,7 +72,7 @@ class ChargerWire:
         self.on_bytes: Callable[[float, bytes], None] | None = None  #: called with (monotonic s, bytes) on arrival
         self.path = ""
         self._loop = loop
-        self._line = line or Line()
+        self._line = line or SimulatedLine()
         self._noise = Noise(self._line)
         self._link = link
         self._now = now

@@ -10,7 +10,7 @@ BYTE_S = 10 / 19200
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class SimulatedLine:
     """A kind of line; the default is perfect and takes no time."""
 
     byte_s: float = 0.0  #: time per byte, `BYTE_S` for a real line
@@ -26,14 +26,14 @@ class Line:
 
 #: The lines used in tests.
 LINES = {
-    "perfect": Line(),
-    "real": Line(byte_s=BYTE_S),
-    "bytewise": Line(byte_s=BYTE_S, bytewise=True),
-    "delayed": Line(answer_s=0.08),
-    "lossy": Line(loss=0.05),
-    "garbage": Line(garbage=0.5),
-    "echo": Line(echo=True),
-    "poor": Line(byte_s=BYTE_S, lost=0.01, wrong=0.001),
+    "perfect": SimulatedLine(),
+    "real": SimulatedLine(byte_s=BYTE_S),
+    "bytewise": SimulatedLine(byte_s=BYTE_S, bytewise=True),
+    "delayed": SimulatedLine(answer_s=0.08),
+    "lossy": SimulatedLine(loss=0.05),
+    "garbage": SimulatedLine(garbage=0.5),
+    "echo": SimulatedLine(echo=True),
+    "poor": SimulatedLine(byte_s=BYTE_S, lost=0.01, wrong=0.001),
 }
 
 
@@ -53,7 +53,7 @@ def garbled(data: bytes) -> bytes:
 class Noise:
     """Spoils frames as its line does; the same seed spoils the same frames."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: SimulatedLine) -> None:
         self._line = line
         self._random = random.Random(line.seed)  # noqa: S311 - noise, not a secret
 

@@ -24,12 +24,12 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.model import ControlMode
-from orchestrator.sim.bay import Bay
+from orchestrator.sim.bay import SimulatedBay
 from orchestrator.sim.bmu import Layout
 from orchestrator.sim.can_noise import BUSES
 from orchestrator.sim.can_pty import open_bus
 from orchestrator.sim.can_wire import CanWire
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.line import LINES
 from orchestrator.sim.presets import PACKS
@@ -63,7 +63,7 @@ class Plant:
             pack.set_soc(args.soc)
         if args.temperature is not None:
             pack.temperature_c = pack.ambient_c = args.temperature
-        charger = Charger(ControlMode.AUTOMATIC if args.automatic else ControlMode.MANUAL)
+        charger = SimulatedCharger(ControlMode.AUTOMATIC if args.automatic else ControlMode.MANUAL)
         setup = Setup(
             node_id=args.node + number % self._per_bus,
             link=args.dir / f"bay-{number + 1}",
@@ -72,7 +72,7 @@ class Plant:
             main_loop=args.bmu == "mainloop",
             speed=args.speed,
         )
-        return Rig(self._loop, self._wires[number // self._per_bus], Bay(charger, pack), setup)
+        return Rig(self._loop, self._wires[number // self._per_bus], SimulatedBay(charger, pack), setup)
 
     def _tick(self) -> None:
         for rig in self.rigs:
@@ -113,7 +113,7 @@ class Plant:
             "temperature_c": round(pack.temperature_c, 2),
             "operation": int(charger.operation),
             "charge_mode": int(charger.charge_mode),
-            "current_limit": charger.current_limit,
+            "current_limit": charger.current_step,
             "precharge": int(charger.precharge),
             "resting": charger.resting,
             "run": charger.run,

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.model import ControlMode
-from orchestrator.sim.bay import Bay
+from orchestrator.sim.bay import SimulatedBay
 from orchestrator.sim.bmu import Bmu, Layout
 from orchestrator.sim.can_wire import CanWire
 from orchestrator.sim.charger_wire import ChargerWire
-from orchestrator.sim.line import Line
+from orchestrator.sim.line import SimulatedLine
 from orchestrator.sim.pack import Readout
 
 #: A model advanced this recently is not advanced again for a query.
@@ -23,7 +23,7 @@ class Setup:
 
     node_id: int
     link: Path | None = None  #: a name for the charger's port
-    line: Line = field(default_factory=Line)
+    line: SimulatedLine = field(default_factory=SimulatedLine)
     layout: Layout = Layout.FIRST_HIGH
     main_loop: bool = False  #: the BMU answers when its main loop gets to it
     speed: float = 1.0  #: model seconds per real second
@@ -41,7 +41,7 @@ class AsBuilt:
 class Rig:
     """A bay of the model with its charger on a pty and its BMU on a bus. Belongs to the loop's thread."""
 
-    def __init__(self, loop: asyncio.AbstractEventLoop, can_wire: CanWire, bay: Bay, setup: Setup) -> None:
+    def __init__(self, loop: asyncio.AbstractEventLoop, can_wire: CanWire, bay: SimulatedBay, setup: Setup) -> None:
         self.bay = bay
         self.as_built = AsBuilt(bay.charger.control_mode, bay.pack.ambient_c, bay.pack.cells)
         self.injected_s: float | None = None  #: when the newest fault was injected, `time.monotonic()`

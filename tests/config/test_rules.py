@@ -9,7 +9,7 @@ from orchestrator.config.map_rules import REQUIRED
 from orchestrator.config.names import name_problem
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems, Rule, problems
-from orchestrator.config.station import Bay, Station
+from orchestrator.config.station import BayConfig, Station
 from orchestrator.config.yaml.schema import slots
 from orchestrator.protocol.objects import READING_FIELDS, ObjectMap
 
@@ -162,7 +162,12 @@ def test_the_rules_name_keys_that_there_are() -> None:
     from orchestrator.config.policy_rules import POLICY_RULES
     from orchestrator.config.station_rules import _BAY_RULES, _STATION_RULES
 
-    for record, rules in ((Policy, POLICY_RULES), (ObjectMap, MAP_RULES), (Station, _STATION_RULES), (Bay, _BAY_RULES)):
+    for record, rules in (
+        (Policy, POLICY_RULES),
+        (ObjectMap, MAP_RULES),
+        (Station, _STATION_RULES),
+        (BayConfig, _BAY_RULES),
+    ):
         for rule in rules:
             for path in rule.keys:
                 assert _exists(record, path), (record, path)

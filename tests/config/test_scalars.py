@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from orchestrator.config.yaml import scalars
 from orchestrator.config.yaml.scalars import UnfitError
 from orchestrator.config.yaml.tree import Mark, Scalar
-from orchestrator.keys import Key
+from orchestrator.keys import KeyRule
 
-VOLTS = Key("a voltage", unit="V")
-TEXT = Key("a text")
+VOLTS = KeyRule("a voltage", unit="V")
+TEXT = KeyRule("a text")
 
 
 def _plain(text: str) -> Scalar:
@@ -86,17 +86,17 @@ def test_a_whole_number_written_otherwise(text: str, said: str) -> None:
 
 
 BOUNDS = [
-    (Key("", ge=1, le=2), [1, 2], [0.99, 2.01], "1 … 2"),
-    (Key("", gt=1, le=2), [1.01, 2], [1, 2.01], "above 1, at most 2"),
-    (Key("", ge=1, lt=2), [1, 1.99], [0.99, 2], "at least 1, below 2"),
-    (Key("", gt=1), [1.01], [1], "above 1"),
-    (Key("", unit="V", le=2), [2, -9], [2.01], "at most 2 V"),
-    (Key(""), [-1e9, 1e9], [], ""),
+    (KeyRule("", ge=1, le=2), [1, 2], [0.99, 2.01], "1 … 2"),
+    (KeyRule("", gt=1, le=2), [1.01, 2], [1, 2.01], "above 1, at most 2"),
+    (KeyRule("", ge=1, lt=2), [1, 1.99], [0.99, 2], "at least 1, below 2"),
+    (KeyRule("", gt=1), [1.01], [1], "above 1"),
+    (KeyRule("", unit="V", le=2), [2, -9], [2.01], "at most 2 V"),
+    (KeyRule(""), [-1e9, 1e9], [], ""),
 ]
 
 
 @pytest.mark.parametrize(("key", "inside", "outside", "words"), BOUNDS)
-def test_bounds_are_kept_and_told(key: Key, inside: list[float], outside: list[float], words: str) -> None:
+def test_bounds_are_kept_and_told(key: KeyRule, inside: list[float], outside: list[float], words: str) -> None:
     assert scalars.allowed(key) == words
     for value in inside:
         assert scalars.bounded(value, key) == value

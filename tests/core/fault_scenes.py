@@ -240,9 +240,9 @@ def swapped() -> World:
 def reverts(world: World) -> None:
     """The charger confirms the step that it is told, and twice goes back from it; the third time is to come."""
     for shown in (0, 4, 0, 4):
-        world.shows["current_limit"] = shown
+        world.shows["current_step"] = shown
         world.tick()
-    world.shows["current_limit"] = 0
+    world.shows["current_step"] = 0
 
 
 def comes_back_at_once(world: World) -> None:
@@ -486,7 +486,7 @@ SCENES: tuple[Scene, ...] = (
     Scene("late", world_has(ours={"late_s": 0.41}), world_has(ours={}), ("0.41 s late",), S.CHARGING),
     Scene("overrun", world_has(ours={"late_s": 1.01}), world_has(ours={}), ("for 1.0 s",), S.SUSPENDED),
     Scene("suspended", world_has(ours={"slept_s": 2.1}), world_has(ours={}), ("suspended for 2 s",), S.SUSPENDED),
-    Scene("unkept", world_has(ours={"unkept": cause("kept.json: No space left")}), world_has(ours={}),
+    Scene("not_persisted", world_has(ours={"not_persisted": cause("kept.json: No space left")}), world_has(ours={}),
           ("No space left",),
           S.CHARGING),
 )  # fmt: skip

@@ -6,10 +6,10 @@ Nothing here answers as the core would like it to: orders take slots, frames get
 from dataclasses import replace
 from random import Random
 
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import step
 from orchestrator.devices.schedule import Schedule, Turn
 from orchestrator.interlock import Grant, grant, permit
 from orchestrator.model import (
@@ -31,8 +31,8 @@ from orchestrator.model import (
     Snapshot,
     State,
 )
-from orchestrator.sim.bay import Bay as Plant
-from orchestrator.sim.charger import Charger, Push
+from orchestrator.sim.bay import SimulatedBay as Plant
+from orchestrator.sim.charger import Push, SimulatedCharger
 from orchestrator.sim.pack import Pack
 from tests.core.said import cause, reason_of
 from tests.core.world import bay
@@ -57,7 +57,7 @@ class Site:
     def __init__(
         self,
         pack: Pack,
-        the_bay: Bay | None = None,
+        the_bay: BayConfig | None = None,
         *,
         loss: float = 0.0,
         can_loss: float = 0.0,
@@ -69,7 +69,7 @@ class Site:
         self.now_s = start_s
         self.loss, self.can_loss = loss, can_loss
         self.chance = Random(seed)
-        self.plant = Plant(Charger(self.rules.bay.charger.control, self.rules.steps_a), pack)
+        self.plant = Plant(SimulatedCharger(self.rules.bay.charger.control, self.rules.steps_a), pack)
         self.schedule = Schedule(self.rules.bay.charger.control)
         self.schedule.restart(start_s)
         self.grant: Grant | None = None
@@ -82,7 +82,7 @@ class Site:
         self.raised: dict[str, int] = {}  #: how often each fault came
 
     @property
-    def charger(self) -> Charger:
+    def charger(self) -> SimulatedCharger:
         return self.plant.charger
 
     @property
@@ -111,7 +111,7 @@ class Site:
         self._bus()
         snapshot = Snapshot(self.reading, self.link, self.values, self.battery_link, request)
         before = self.decision
-        self.decision, self.memory = step(self.now_s, snapshot, self.memory, self.rules)
+        self.decision, self.memory = decide(self.now_s, snapshot, self.memory, self.rules)
         command = self.decision.command
         self.schedule.give(command)
         self.grant = grant(snapshot, self.now_s) if command else None
@@ -126,41 +126,41 @@ class Site:
 
     def _line(self) -> None:
         while (due := self.schedule.next()).at_s <= self.now_s:
-            order = self.schedule.order
+            command = self.schedule.command
             if due.turn is Turn.STOP:
                 self._write(due.turn, STOP, whole=self.rules.bay.charger.control is ControlMode.AUTOMATIC)
             elif due.turn is Turn.OPERATION_STOP:
                 self._write(due.turn, STOP, whole=True)
-            elif due.turn is Turn.ORDER and order is not None:
-                refused = permit(order, self.grant, self.now_s, self.rules.bay.charger, self.rules.bay.limits)
+            elif due.turn is Turn.ORDER and command is not None:
+                refused = permit(command, self.grant, self.now_s, self.rules.bay.charger, self.rules.bay.limits)
                 if refused:
                     self._poll(refused)
                 else:
-                    self._write(due.turn, order)
+                    self._write(due.turn, command)
             else:
                 self._poll()
 
     def _lost(self) -> bool:
         return self.chance.random() < self.loss
 
-    def _write(self, turn: Turn, order: Command, *, whole: bool = False) -> None:
+    def _write(self, turn: Turn, command: Command, *, whole: bool = False) -> None:
         if not self._lost():
-            self._hear(turn, order)
+            self._hear(turn, command)
         self.schedule.took(turn, self.now_s, self.now_s)
         stop_sent_s = self.now_s if whole else self.link.stop_sent_s
-        self.link = replace(self.link, sent=Sent(order, self.now_s), stop_sent_s=stop_sent_s, refused=None)
+        self.link = replace(self.link, sent=Sent(command, self.now_s), stop_sent_s=stop_sent_s, refused=None)
 
-    def _hear(self, turn: Turn, order: Command) -> None:
+    def _hear(self, turn: Turn, command: Command) -> None:
         if turn is Turn.STOP:
             self.charger.rest(0)
         elif turn is Turn.OPERATION_STOP:
             self.charger.push(Push.OPERATION, 0)
-        elif order.action is Action.RESUME:
+        elif command.action is Action.RESUME:
             self.charger.rest(1)
-        elif order.action is Action.RUN:
+        elif command.action is Action.RUN:
             self.charger.push(Push.OPERATION, 1)
         else:
-            self.charger.push(PUSHES[order.action], order.value)
+            self.charger.push(PUSHES[command.action], command.value)
 
     def _poll(self, refused: Cause | None = None) -> None:
         self.schedule.took(Turn.POLL, self.now_s, self.now_s)
@@ -178,7 +178,7 @@ class Site:
             current_a=round(charger.current_a, 2),
             control_mode=charger.control_mode,
             operation=charger.operation,
-            current_limit=charger.current_limit,
+            current_step=charger.current_step,
             charge_mode=ChargeMode(charger.charge_mode),
             precharge=Precharge(charger.precharge),
             connection=charger.connection,

@@ -8,10 +8,10 @@ import pytest
 from orchestrator.core.active import active_faults
 from orchestrator.core.acts import MAX_RESETS
 from orchestrator.core.checks.state_of_charge import STEP_NEWS_S
-from orchestrator.core.faults import DANGERS, FAULTS, RANK, ROW, Clear, Row
+from orchestrator.core.faults import DANGERS, FAULTS, RANK, ROW, Clear, FaultRow
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory, with_values
-from orchestrator.core.operator import hear
+from orchestrator.core.operator import handle_request
 from orchestrator.model import ActiveFault, Effect, Request, State
 from orchestrator.text.catalogue import LANGUAGES, say
 from tests.core.bays import charging
@@ -29,7 +29,7 @@ BY_ITSELF = {"goes_on_after", "goes_on_in", "goes_on_in_at_the_earliest", "clear
 class Case:
     """One row, how far it is, and the state of its bay."""
 
-    row: Row
+    row: FaultRow
     stage: str
     state: State
 
@@ -86,7 +86,7 @@ def test_every_fault_ends_with_an_act_and_the_act_is_true(case: Case) -> None:
         assert fault.effect is not Effect.TRIP
         return
     for request in (Request.START, Request.RESET):
-        answer = hear(case.memory, request, NOW_S, bay="bay-1").refusal
+        answer = handle_request(case.memory, request, NOW_S, bay="bay-1").refusal
         if COMMANDS.get(ends.id) is request:
             assert answer is None, say(answer)
         elif ends.param("request") == request.value or (ends.id, request) == ("reset_locked", Request.RESET):
@@ -99,7 +99,7 @@ def test_every_fault_ends_with_an_act_and_the_act_is_true(case: Case) -> None:
 @every_case
 def test_a_refusal_names_the_fault_its_evidence_and_what_ends_it(case: Case) -> None:
     for request in (Request.START, Request.RESET):
-        answer = hear(case.memory, request, NOW_S, bay="bay-1").refusal
+        answer = handle_request(case.memory, request, NOW_S, bay="bay-1").refusal
         if answer is None or answer.id.startswith("nothing_to_"):
             continue
         assert (answer.id, answer.param("fault")) == ("refused", case.row.id)
@@ -122,10 +122,10 @@ def test_out_of_control_no_command_is_named() -> None:
 def test_a_command_is_not_named_while_nothing_can_be_kept() -> None:
     memory = Case(ROW["hot_trip"], "gone", State.TRIPPED).memory
     full = cause("disk full")
-    memory = with_fault(memory, "unkept", FaultMemory(present=True, raised_s=NOW_S - 9, cause=full, now=full))
+    memory = with_fault(memory, "not_persisted", FaultMemory(present=True, raised_s=NOW_S - 9, cause=full, now=full))
     trip, _ = active_faults(memory, NOW_S, "bay-1")
-    assert say(trip.next) == "gone since 9900 s, but reset is refused because of unkept"
-    refused = hear(memory, Request.RESET, NOW_S, unkept=full).refusal
+    assert say(trip.next) == "gone since 9900 s, but reset is refused because of not_persisted"
+    refused = handle_request(memory, Request.RESET, NOW_S, not_persisted=full).refusal
     assert say(refused) == "not done: disk full; make space, or mend the disk of the journal's directory"
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.core.alarm import alarm
-from orchestrator.core.faults import FAULTS, Clear, Row
+from orchestrator.core.faults import FAULTS, Clear, FaultRow
 from orchestrator.core.operator import RESET, STOPPED
 from orchestrator.model import ActiveFault, Alarm, Cause, Request, State
 from orchestrator.text.catalogue import advise
@@ -35,7 +35,7 @@ def test_who_holds_a_bay_knows_of_it(hold: Cause, level: Alarm) -> None:
 
 
 @pytest.mark.parametrize("row", FAULTS, ids=[row.id for row in FAULTS])
-def test_a_fault_that_waits_for_a_start_wants_attention(row: Row) -> None:
+def test_a_fault_that_waits_for_a_start_wants_attention(row: FaultRow) -> None:
     level = alarm(remembering(state=State.HELD, hold=STOPPED), (ActiveFault(row.id, row.effect, Cause(row.id), 0.0),))
     waits = Alarm.ATTENTION if row.clear is Clear.OPERATOR else Alarm.NONE
     assert level is (Alarm.DANGER if row.id == "port_locked" else waits)

@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 
 from orchestrator.core.contactor import closes
-from orchestrator.core.course import QUALIFY_S
+from orchestrator.core.next_transition import QUALIFY_S
 from orchestrator.core.states import ENERGISED
 from orchestrator.model import Action, Alarm, Request, State
 from tests.core.bays import charging

@@ -22,12 +22,12 @@ from orchestrator.model import (
     Command,
     Connection,
     ControlMode,
+    CurrentStep,
     ErrorBit,
     Measurement,
     Operation,
     Session,
     State,
-    Step,
 )
 from tests.core.bays import POLICY
 from tests.core.edges import AT, CONTINUOUS, NO_PRECHARGE, PULSE, Edge, ago, marked, raised, session, witnessed
@@ -41,8 +41,8 @@ def heart(age_s: float, nmt_state: int | None = 5) -> dict[str, Any]:
     return {"heartbeat_s": 0.5, "heartbeat_t_s": ago(age_s), "nmt_state": nmt_state}
 
 
-def order(command: Command, seconds: float) -> dict[str, Any]:
-    return {"order": command, "order_s": ago(seconds)}
+def command(command: Command, seconds: float) -> dict[str, Any]:
+    return {"order": command, "command_s": ago(seconds)}
 
 
 def still(seconds: float, pack_v: float, pack_a: float) -> dict[str, Any]:
@@ -89,7 +89,7 @@ CHARGE = (
 def trail(*samples: tuple[float, float, float, float]) -> dict[str, Any]:
     """Seconds ago, the pack's volts and amps, the charger's amps; oldest first."""
     seen = tuple(Sample(ago(age_s), pack_v, pack_a, pack_v, amps) for age_s, pack_v, pack_a, amps in samples)
-    return {**witnessed(trail=seen), "step": Step(4, 14.0, cause(""))}
+    return {**witnessed(trail=seen), "step": CurrentStep(4, 14.0, cause(""))}
 
 
 TAPERED = trail((5.0, 53.0, 6.9, 6.9), (0.0, 53.0, 6.9, 6.9))
@@ -206,16 +206,16 @@ NOT_FULL = "the charger stopped though it was told to run, and its mode 5 is not
 UNCONFIRMED = "the charger was told '{}' for {} s and its status does not show it"
 OBEDIENCE = (
     Edge(obedience.will_not_start, None),
-    Edge(obedience.will_not_start, None, order(RUN, 4.9)),
-    Edge(obedience.will_not_start, UNCONFIRMED.format("run", "5.0"), order(RUN, 5)),
-    Edge(obedience.will_not_start, UNCONFIRMED.format("run", "5.0"), order(RESUME, 5)),
-    Edge(obedience.will_not_start, None, order(RUN, 9), State.STOPPING),
-    Edge(obedience.will_not_start, None, order(LIMIT_3, 9)),
+    Edge(obedience.will_not_start, None, command(RUN, 4.9)),
+    Edge(obedience.will_not_start, UNCONFIRMED.format("run", "5.0"), command(RUN, 5)),
+    Edge(obedience.will_not_start, UNCONFIRMED.format("run", "5.0"), command(RESUME, 5)),
+    Edge(obedience.will_not_start, None, command(RUN, 9), State.STOPPING),
+    Edge(obedience.will_not_start, None, command(LIMIT_3, 9)),
     Edge(obedience.will_not_start, UNCONFIRMED.format("run", "9.0") + "; the interlock holds it back: too old",
-         order(RUN, 9), charger_link={"refused": cause("too old")}),
-    Edge(obedience.setting_not_obeyed, UNCONFIRMED.format("step 4", "9.0"), order(LIMIT_3, 9)),
-    Edge(obedience.setting_not_obeyed, None, order(LIMIT_3, 9), State.STOPPING),
-    Edge(obedience.setting_not_obeyed, None, order(RUN, 9)),
+         command(RUN, 9), charger_link={"refused": cause("too old")}),
+    Edge(obedience.setting_not_obeyed, UNCONFIRMED.format("step 4", "9.0"), command(LIMIT_3, 9)),
+    Edge(obedience.setting_not_obeyed, None, command(LIMIT_3, 9), State.STOPPING),
+    Edge(obedience.setting_not_obeyed, None, command(RUN, 9)),
     Edge(obedience.stopped_by_itself, None),
     Edge(obedience.stopped_by_itself, "the charger stopped though it was told to run",
          charger={"operation": Operation.STOPPED}),
@@ -238,11 +238,11 @@ OBEDIENCE = (
     Edge(obedience.over_current, None, charger={"current_a": 14 * 110 / 100 + 0.3}),
     Edge(obedience.over_current, "15.71 A, more than 15.70 A for a limit of 14 A", charger={"current_a": 15.71}),
     Edge(obedience.over_current, "12.50 A, more than 12.40 A for a limit of 11 A",
-         {"limit_before": 4, "limit_s": ago(1.1)}, charger={"current_a": 12.5, "current_limit": 3}),
+         {"limit_before": 4, "limit_s": ago(1.1)}, charger={"current_a": 12.5, "current_step": 3}),
     Edge(obedience.over_current, None, {"limit_before": 4, "limit_s": ago(1)},
-         charger={"current_a": 12.5, "current_limit": 3}),
+         charger={"current_a": 12.5, "current_step": 3}),
     Edge(obedience.over_current, "16.81 A, more than 16.80 A for a limit of 15 A",
-         charger={"current_a": 16.81, "current_limit": None}),
+         charger={"current_a": 16.81, "current_step": None}),
     Edge(obedience.early_full, None, TAPERED, bmu={"soc_pct": 80.0}, charger={"charge_mode": ChargeMode.FULL}),
     Edge(obedience.early_full, None, bmu={"soc_pct": 79.0}, charger={"charge_mode": ChargeMode.FULL}),
     Edge(obedience.early_full, "the charger reports full (mode 5), the BMU only 79 %", TAPERED, bmu={"soc_pct": 79.0},
@@ -340,10 +340,10 @@ PAIR = (
     Edge(measured.volts_disagree, None, bmu={"voltage_v": None}),
     Edge(measured.amps_disagree, None, bmu={"current_a": 9.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.00 A; the charger is likelier wrong, by the "
-         "step that was set (8 A)", {"step": Step(2, 8.0, cause(""))}, bmu={"current_a": 8.0}),
+         "step that was set (8 A)", {"step": CurrentStep(2, 8.0, cause(""))}, bmu={"current_a": 8.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A; the BMU is likelier wrong, by the step "
-         "that was set (10 A)", {"step": Step(2, 10.0, cause(""))}, bmu={"current_a": 14.0}),
-    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A", {"step": Step(2, 2.0, cause(""))},
+         "that was set (10 A)", {"step": CurrentStep(2, 10.0, cause(""))}, bmu={"current_a": 14.0}),
+    Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 14.00 A", {"step": CurrentStep(2, 2.0, cause(""))},
          bmu={"current_a": 14.0}),
     Edge(measured.amps_disagree, "the charger reads 10.00 A, the BMU 8.99 A", bmu={"current_a": 8.99}),
     Edge(measured.amps_disagree, None, charger={"current_a": 14.0}, bmu={"current_a": 12.61}),

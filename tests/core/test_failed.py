@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.core import latches
+from orchestrator.core.decide import decide
 from orchestrator.core.facts import Facts
 from orchestrator.core.failed import carry_on
-from orchestrator.core.faults import FAULTS, Row
+from orchestrator.core.faults import FAULTS, FaultRow
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import ENERGISED, UNVERIFIED
-from orchestrator.core.step import step
 from orchestrator.model import (
     STOP,
     Action,
@@ -54,7 +54,7 @@ class Switch:
     def __call__(self, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
         if self.on:
             return carry_on(now_s, snapshot, memory, BROKEN)
-        return step(now_s, snapshot, memory, rules)
+        return decide(now_s, snapshot, memory, rules)
 
 
 @pytest.fixture
@@ -155,7 +155,7 @@ def test_what_was_known_of_the_bay_is_kept(raises: Switch) -> None:
 # --- one rule of the table --------------------------------------------------------------------------------------------
 
 
-def broken(row: Row) -> Callable[[Facts], Cause | None]:
+def broken(row: FaultRow) -> Callable[[Facts], Cause | None]:
     def check(_f: Facts) -> Cause | None:
         raise ZeroDivisionError(row.id)
 
@@ -166,7 +166,9 @@ JUDGED = [row for row in FAULTS if row.id != "internal"]
 
 
 @pytest.mark.parametrize("row", JUDGED, ids=lambda row: row.id)
-def test_a_rule_that_raises_trips_its_bay_and_takes_no_other_with_it(monkeypatch: pytest.MonkeyPatch, row: Row) -> None:
+def test_a_rule_that_raises_trips_its_bay_and_takes_no_other_with_it(
+    monkeypatch: pytest.MonkeyPatch, row: FaultRow
+) -> None:
     for state in sorted(row.where - UNVERIFIED - {State.TRIPPED}):  # that one has tripped by it already
         world = IN[state]()
         world.tick()
@@ -212,7 +214,7 @@ CHARGERS = st.fixed_dictionaries(
         "charge_mode": st.sampled_from([None, *ChargeMode]),
         "precharge": st.sampled_from([None, *Precharge]),
         "connection": st.sampled_from([None, *Connection]),
-        "current_limit": st.none() | st.integers(0, 4),
+        "current_step": st.none() | st.integers(0, 4),
     },
 )
 
@@ -238,7 +240,7 @@ def test_no_reading_makes_a_step_raise(
         charger = snapshot.charger
         assert charger is not None
         snapshot = replace(snapshot, battery=battery, charger=replace(charger, **shows))  # type: ignore[arg-type]  # its fields by name
-        decision, world.memory = step(world.now_s, snapshot, world.memory, world.rules)
+        decision, world.memory = decide(world.now_s, snapshot, world.memory, world.rules)
         assert "internal" not in {fault.id for fault in decision.faults if "cannot be judged" in say(fault.cause)}
         assert decision.state in ENERGISED or decision.command in (None, STOP)
         assert decision.command is None or decision.command.action in Action

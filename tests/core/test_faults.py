@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
-from orchestrator.core.faults import FAULTS, ROW, Check, Clear, Row
+from orchestrator.core.faults import FAULTS, ROW, Check, Clear, FaultRow
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import measured, pack, paired, standby
@@ -33,7 +33,7 @@ ENDS = {
 
 
 @pytest.mark.parametrize("row", FAULTS, ids=lambda row: row.id)
-def test_a_row_makes_sense(row: Row) -> None:
+def test_a_row_makes_sense(row: FaultRow) -> None:
     assert re.fullmatch(r"[a-z]+(_[a-z]+)*", row.id)
     assert re.fullmatch(r"[BCGP]\d+(, [BCGP]\d+)*", row.source)
     assert row.clear in ENDS[row.effect]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.config.load import load_policy
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
 from orchestrator.model import ControlMode, Measurement, State
 from orchestrator.sim.chemistry import LFP
 from orchestrator.sim.pack import Pack, Readout
@@ -22,7 +22,7 @@ LATE = ("voltage_v", "current_a")
 class LateSite(Site):
     """Its BMU says what was `late_s` ago, in coarse figures."""
 
-    def __init__(self, pack: Pack, the_bay: Bay, late_s: float, loss: float = 0.0) -> None:
+    def __init__(self, pack: Pack, the_bay: BayConfig, late_s: float, loss: float = 0.0) -> None:
         super().__init__(pack, the_bay, loss=loss)
         self.late_s = late_s
         self.past: deque[tuple[float, Readout]] = deque()

@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.core.latches import release
 from orchestrator.core.memory import FaultMemory
-from orchestrator.core.operator import hear
+from orchestrator.core.operator import handle_request
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Action, Cause, Connection, ControlMode, Effect, Request, State
 from orchestrator.service.records import decision_lines
@@ -563,9 +563,9 @@ def test_an_hour_after_the_first_of_three_there_may_be_a_fourth() -> None:
     latched = {"internal": FaultMemory(raised_s=1.0, clean_s=2.0, latched=True, cause=cause("KeyError()"))}
     memory = remembering(faults=latched, resets=tuple((1000.0 + t_s, "internal") for t_s in (0.0, 10.0, 20.0)))
     for now_s in (1060.0, 4599.75):
-        refusal = hear(memory, Request.RESET, now_s).refusal
+        refusal = handle_request(memory, Request.RESET, now_s).refusal
         assert say(refusal).startswith("internal: reset is locked until 4600 s, because ")
-    heard = hear(memory, Request.RESET, 4600.0)
+    heard = handle_request(memory, Request.RESET, 4600.0)
     assert heard.refusal is None
     assert [t_s for t_s, _ in heard.operator.resets] == [1010.0, 1020.0, 4600.0]
 

@@ -6,12 +6,12 @@ from typing import Any
 import pytest
 
 from orchestrator.config.policy import Band, Policy, Table, Where
+from orchestrator.core.decide import PRECHARGE
 from orchestrator.core.facts import Facts
 from orchestrator.core.limits import choose
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import PRECHARGE
 from orchestrator.keys import Range, Source
-from orchestrator.model import BatteryStatus, ChargeMode, Precharge, Request, Setpoint, Snapshot, State, Step
+from orchestrator.model import BatteryStatus, ChargeMode, CurrentStep, Precharge, Request, Setpoint, Snapshot, State
 from tests.core.bays import POLICY, charging
 from tests.core.said import reason_of, say
 from tests.core.world import STEPS_A, TICK_S, World, bay
@@ -401,7 +401,7 @@ def test_precharge_is_always_on_the_lowest_step() -> None:
         world = World(voltage_v=volts).charging(state)
         assert index(world) == 0
         assert world.charger.limit == 0
-        assert world.decision.step == Step(0, STEPS_A[0], PRECHARGE)
+        assert world.decision.step == CurrentStep(0, STEPS_A[0], PRECHARGE)
 
 
 # --- what comes back all the same -------------------------------------------------------------------------------------

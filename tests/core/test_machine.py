@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.core import course, machine
+from orchestrator.core import machine, next_transition
 from orchestrator.core.machine import MACHINE, TABLE, Trigger, fire
 from orchestrator.core.states import ENERGISED
 from orchestrator.errors import RefusedError
@@ -124,7 +124,7 @@ def test_no_state_is_a_dead_end_and_every_state_can_be_reached() -> None:
 
 def test_every_trigger_is_in_the_table_and_is_used() -> None:
     assert {trigger for trigger, _, _ in TABLE} == set(Trigger)
-    source = ast.parse(Path(course.__file__).read_text(encoding="utf-8"))
+    source = ast.parse(Path(next_transition.__file__).read_text(encoding="utf-8"))
     used = {
         node.attr
         for node in ast.walk(source)
@@ -134,7 +134,7 @@ def test_every_trigger_is_in_the_table_and_is_used() -> None:
 
 
 def test_triggers_of_rest_lead_where_the_course_believes() -> None:
-    for trigger, state in course.LEADS.items():
+    for trigger, state in next_transition.LEADS.items():
         assert {target for name, _, target in TABLE if name is trigger} == {state}
 
 

@@ -19,20 +19,20 @@ def test_a_bay_that_is_ready_waits_for_its_turn_and_says_for_whom() -> None:
     world.run(30)
     assert world.is_in(S.QUALIFYING)
     assert world.decision.cause == turn
-    assert {order.action for order in world.orders if order is not None} == {Action.STOP}
+    assert {command.action for command in world.commands if command is not None} == {Action.STOP}
     world.ours["waits"] = None
     world.charging()
 
 
 def test_nothing_runs_before_it_is_on_disk_that_it_may() -> None:
     world = World()
-    world.ours["running_kept"] = False
+    world.ours["running_persisted"] = False
     world.until(S.QUALIFYING)
     world.run(30)
     assert world.is_in(S.QUALIFYING)
     assert world.decision.cause == Cause("writing_down")
-    assert {order.action for order in world.orders if order is not None} == {Action.STOP}
-    world.ours["running_kept"] = True
+    assert {command.action for command in world.commands if command is not None} == {Action.STOP}
+    world.ours["running_persisted"] = True
     world.charging()
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import orchestrator.core
+from orchestrator.core.decide import decide
 from orchestrator.core.facts import Facts
 from orchestrator.core.memory import (
     FLAT,
@@ -29,7 +30,6 @@ from orchestrator.core.memory import (
     with_values,
 )
 from orchestrator.core.parts import Kind, changed, event, made, unclassed
-from orchestrator.core.step import step
 from orchestrator.model import Session, Snapshot, State
 from tests.core.bays import IN
 from tests.core.world import World
@@ -166,8 +166,8 @@ def test_what_has_not_changed_is_the_same_object(state: State) -> None:
     world = IN[state]()
     world.run(5)
     snapshot = world.snapshot(None, "")
-    _, before = step(world.now_s, snapshot, world.memory, world.rules)
-    _, after = step(world.now_s, snapshot, before, world.rules)
+    _, before = decide(world.now_s, snapshot, world.memory, world.rules)
+    _, after = decide(world.now_s, snapshot, before, world.rules)
     for part in FLAT:
         assert getattr(after, part) is getattr(before, part), part
     assert after.witnessed is before.witnessed

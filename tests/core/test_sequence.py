@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 
 from orchestrator.core.facts import Facts
-from orchestrator.core.sequence import next_order
+from orchestrator.core.sequence import next_command
 from orchestrator.core.states import ENERGISED
 from orchestrator.devices.schedule import Turn
 from orchestrator.model import (
@@ -131,8 +131,8 @@ def test_nothing_goes_on_before_the_read_back(lost: Action, still: Callable[[Wor
     world.charger.precharge = Precharge.PULSE
     world.deaf.add(lost)
     world.run(4)
-    orders = [order for order in orders_since(world, first) if order not in (RESUME, None)]
-    assert orders[-1].action is lost
+    commands = [command for command in orders_since(world, first) if command not in (RESUME, None)]
+    assert commands[-1].action is lost
     assert still(world)
     world.deaf.clear()
     world.run(2)
@@ -231,13 +231,13 @@ def test_without_a_reading_the_order_stays() -> None:
     world, _ = new_charge()
     memory = world.memory
     facts = Facts.of(world.now_s + 10, Snapshot(), memory, world.rules)
-    assert next_order(facts, Setpoint(run=True))[0] == memory.sequence.order == limit(4)
+    assert next_command(facts, Setpoint(run=True))[0] == memory.sequence.command == limit(4)
 
 
 def test_what_a_setpoint_leaves_open_is_not_ordered() -> None:
     world = charging()
     facts = Facts.of(world.now_s, world.snapshot(None, ""), world.memory, world.rules)
-    assert next_order(facts, STANDBY)[0] is None
+    assert next_command(facts, STANDBY)[0] is None
 
 
 # --- automatic: the rotary switch has set everything ------------------------------------------------------------------
@@ -251,7 +251,7 @@ def test_automatic_mode_needs_a_resume_and_nothing_else() -> None:
     world = automatic()
     world.until(State.CHARGING)
     world.run(10)
-    assert world.orders == [STOP, None, STOP, None, RESUME, None]
+    assert world.commands == [STOP, None, STOP, None, RESUME, None]
     assert world.charger.running
     assert world.decision.setpoint == Setpoint(run=True)
     assert world.decision.step is None
@@ -292,18 +292,18 @@ class Lossy(Site):
         self.turn, self.count, self.at, self.frames = turn, count, at, 0
         self.ran_unasked = False
 
-    def _hear(self, turn: Turn, order: Command) -> None:
+    def _hear(self, turn: Turn, command: Command) -> None:
         if turn is self.turn:
             self.frames += 1
             if self.at < self.frames <= self.at + self.count:
                 return
-        super()._hear(turn, order)
+        super()._hear(turn, command)
 
     def tick(self, request: Request | None = None) -> None:
         super().tick(request)
         wanted = self.decision.state in ENERGISED
-        before_run = self.memory.sequence.order is not None
-        self.ran_unasked |= self.charger.running and wanted and before_run and self.memory.sequence.order != RUN
+        before_run = self.memory.sequence.command is not None
+        self.ran_unasked |= self.charger.running and wanted and before_run and self.memory.sequence.command != RUN
 
 
 @pytest.mark.parametrize(("count", "at"), list(product((1, 2, 3), (0, 1, 2, 3, 4, 5, 6))))
@@ -312,7 +312,7 @@ def test_any_order_may_be_lost(count: int, at: int) -> None:
     site.until(State.CHARGING, 10)
     site.run(8)
     assert site.charger.running
-    assert site.charger.current_limit == 4
+    assert site.charger.current_step == 4
     assert site.raised == {}
 
 
@@ -329,7 +329,7 @@ def test_a_lost_half_of_a_stop_lets_no_charger_run_on_its_old_values() -> None:
     site.pack.set_soc(92)  # on its way to step 2
     site.run(1)
     assert site.run(8, Request.START).state is State.CHARGING
-    assert site.charger.current_limit == 2
+    assert site.charger.current_step == 2
     assert not site.ran_unasked
 
 
@@ -341,8 +341,8 @@ def test_a_run_is_ordered_only_when_everything_else_is_read_back() -> None:
             if decision.command == RUN:
                 shown, wanted = world.reading, decision.setpoint
                 assert shown is not None
-                assert (shown.current_limit, shown.charge_mode, shown.precharge) == (
-                    wanted.current_limit,
+                assert (shown.current_step, shown.charge_mode, shown.precharge) == (
+                    wanted.current_step,
                     wanted.charge_mode,
                     wanted.precharge,
                 )

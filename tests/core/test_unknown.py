@@ -80,7 +80,7 @@ CHARGER_UNKNOWN = [
     ("current_a", inf),
     ("control_mode", None),
     ("operation", None),
-    ("current_limit", None),
+    ("current_step", None),
     ("charge_mode", None),
     ("precharge", None),
     ("connection", None),

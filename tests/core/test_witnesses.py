@@ -564,4 +564,4 @@ def test_a_current_that_only_the_bmu_has_seen_was_a_charge() -> None:
     world.run(60.0)
     assert world.is_in(State.HELD)
     assert not world.charger.running
-    assert Action.RUN not in {order.action for order in world.orders[-1:] if order is not None}
+    assert Action.RUN not in {command.action for command in world.commands[-1:] if command is not None}

@@ -1,6 +1,6 @@
 """A bay whose time jumps: an obedient charger and a healthy battery, which a test then spoils.
 
-Each tick the charger hears the last standing order, both devices are read, and one step is taken. Nothing is late and
+Each tick the charger hears the last standing command, both devices are read, and one step is taken. Nothing is late and
 nothing gets lost unless a test says so; for that there is `site.py`.
 """
 
@@ -9,11 +9,11 @@ from typing import Any
 
 from orchestrator.config.load import load_policy
 from orchestrator.config.policy import Pack, Policy
-from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits
+from orchestrator.config.station import BatteryConfig, BayConfig, ChargerConfig, Limits
 from orchestrator.core.cells import chemistry
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory, with_values
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import step
 from orchestrator.keys import Range
 from orchestrator.model import (
     Action,
@@ -61,9 +61,9 @@ def with_full(**changes: Any) -> Policy:
     return replace(POLICY, finish=replace(finish, full=replace(finish.full, **changes)))
 
 
-def bay(policy: Policy | None = None, control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> Bay:
+def bay(policy: Policy | None = None, control: ControlMode = ControlMode.MANUAL, current_a: float = 15.0) -> BayConfig:
     """A bay on li-ion-48v with the design's example limits."""
-    return Bay(
+    return BayConfig(
         name="bay-1",
         charger=ChargerConfig(port="/dev/ttyX", control=control, steps_a=STEPS_A),
         battery=BatteryConfig(can="can0", node_id=0x10, map=ObjectMap(map="none", objects=())),
@@ -132,7 +132,7 @@ def remembering(memory: Memory | None = None, **values: Any) -> Memory:
 class World:
     """Everything true of one bay; `run` lets time pass in ticks, `decision` is the newest."""
 
-    def __init__(self, the_bay: Bay | None = None, **battery: float) -> None:
+    def __init__(self, the_bay: BayConfig | None = None, **battery: float) -> None:
         self.rules = Rules.of(the_bay or bay())
         self.memory = Memory()
         self.now_s = 1000.0
@@ -195,8 +195,8 @@ class World:
         return {fault.id: say(fault.told) for fault in self.decision.faults}
 
     @property
-    def orders(self) -> list[Command | None]:
-        """The standing orders so far, each once."""
+    def commands(self) -> list[Command | None]:
+        """The standing commands so far, each once."""
         commands = [decision.command for decision in self.decisions]
         return [now for before, now in zip([None, *commands], commands, strict=False) if now != before]
 
@@ -211,7 +211,7 @@ class World:
         self._fit()
         self._obey(dt_s)
         internal, self.internal = self.internal, ""
-        decision, self.memory = step(self.now_s, self.snapshot(request, internal), self.memory, self.rules)
+        decision, self.memory = decide(self.now_s, self.snapshot(request, internal), self.memory, self.rules)
         self.decisions.append(decision)
         return decision
 
@@ -301,7 +301,7 @@ class World:
             "current_a": self._amps(),
             "control_mode": self.rules.bay.charger.control,
             "operation": Operation.RUNNING if charger.running else Operation.STOPPED,
-            "current_limit": charger.limit,
+            "current_step": charger.limit,
             "charge_mode": charger.shown_mode,
             "precharge": charger.precharge,
             "connection": Connection.NORMAL,

@@ -26,5 +26,5 @@ def charger(pty: Pty) -> Iterator[FakeCharger]:
 def bench(pty: Pty, charger: FakeCharger) -> Iterator[Bench]:
     """A port that only polls; its first stop is over."""
     with running(pty.path) as made:
-        made.wait_online(order=None)
+        made.wait_online(command=None)
         yield made

@@ -87,13 +87,13 @@ class FakeCharger:
         self._thread.start()
 
     @property
-    def orders(self) -> list[bytes]:
+    def commands(self) -> list[bytes]:
         """Everything received but the polls."""
         return [frame for _, frame in self.frames if frame[4] != 0x01]
 
     @property
     def polls(self) -> int:
-        return len(self.frames) - len(self.orders)
+        return len(self.frames) - len(self.commands)
 
     def say(self, data: bytes) -> None:
         """Send something unsolicited."""

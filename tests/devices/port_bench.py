@@ -55,17 +55,17 @@ class Bench:
         assert reading is not None
         return reading
 
-    def wait_online(self, order: Command | None = STOP) -> None:
+    def wait_online(self, command: Command | None = STOP) -> None:
         """Online, with this standing command: a port just opened starts with its own."""
         wait_until(lambda: self.link.online, what="online")
-        self.port.order(order, good())
+        self.port.command(command, good())
 
     def wait_problem(self, text: str) -> None:
         wait_until(lambda: text in say(self.link.problem), what=f"the problem {text!r}")
         assert not self.link.online
 
     def wait_step(self, step: int) -> None:
-        wait_until(lambda: self.reading.current_limit == step, what=f"step {step}")
+        wait_until(lambda: self.reading.current_step == step, what=f"step {step}")
 
     def wait_age(self, age_s: float) -> None:
         asked_s = self.reading.t_s

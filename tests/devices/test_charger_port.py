@@ -27,7 +27,7 @@ def test_in_automatic_mode_a_stop_is_one_frame(pty: Pty, charger: FakeCharger) -
 def test_a_reading_is_what_the_charger_said_as_old_as_its_request(bench: Bench, charger: FakeCharger) -> None:
     asked_s = next(at_s for at_s, frame in charger.frames if frame == POLL)
     first = next(reading for reading, _ in bench.seen if reading)
-    assert (first.voltage_v, first.operation, first.current_limit) == (50.11, Operation.STOPPED, 0)
+    assert (first.voltage_v, first.operation, first.current_step) == (50.11, Operation.STOPPED, 0)
     assert asked_s - SLACK_S < first.t_s <= asked_s
     assert (say(bench.link.problem), bench.link.misses, bench.link.bad_frames) == ("", 0, 0)
 
@@ -46,35 +46,35 @@ def test_each_reading_is_reported(bench: Bench) -> None:
 
 def test_an_order_is_repeated_between_polls_until_it_is_withdrawn(bench: Bench, charger: FakeCharger) -> None:
     before = len(charger.frames)
-    bench.port.order(SET_STEP_2, good())
-    wait_until(lambda: charger.orders[-2:] == [STEP_2, STEP_2])
-    bench.port.order(None)
-    assert bench.reading.current_limit == 1
+    bench.port.command(SET_STEP_2, good())
+    wait_until(lambda: charger.commands[-2:] == [STEP_2, STEP_2])
+    bench.port.command(None)
+    assert bench.reading.current_step == 1
     assert bench.link.sent is not None
     assert bench.link.sent.command == SET_STEP_2
-    count = len(charger.orders)
+    count = len(charger.commands)
     polls = charger.polls
     wait_until(lambda: charger.polls >= polls + 3)
-    assert len(charger.orders) == count
+    assert len(charger.commands) == count
     middle = [frame[4] for _, frame in charger.frames[before:] if frame[4] in (1, 2)]
     assert middle[middle.index(2) :][:3] == [2, 1, 2]
 
 
 def test_what_the_interlock_refuses_is_not_written_and_polls_go_on(bench: Bench, charger: FakeCharger) -> None:
-    orders, polls = len(charger.orders), charger.polls
-    bench.port.order(Command(Action.RUN))
+    commands, polls = len(charger.commands), charger.polls
+    bench.port.command(Command(Action.RUN))
     wait_until(lambda: bench.link.refused)
     assert say(bench.link.refused) == "run: no fresh reading of charger, pack voltage and pack temperature"
     wait_until(lambda: charger.polls >= polls + 4)
-    assert len(charger.orders) == orders
+    assert len(charger.commands) == commands
     assert bench.link.online
-    bench.port.order(None)
+    bench.port.command(None)
     wait_until(lambda: not bench.link.refused)
 
 
 def test_a_grant_that_runs_out_ends_a_standing_order(bench: Bench, charger: FakeCharger) -> None:
-    bench.port.order(SET_STEP_2, good(0.5))
+    bench.port.command(SET_STEP_2, good(0.5))
     wait_until(lambda: "too old" in say(bench.link.refused))
-    assert charger.orders[-1] == STEP_2
-    bench.port.order(SET_STEP_2, good())
+    assert charger.commands[-1] == STEP_2
+    bench.port.command(SET_STEP_2, good())
     wait_until(lambda: not bench.link.refused)

@@ -14,13 +14,13 @@ from tests.waiting import wait_until
 
 
 def test_an_exception_in_the_thread_stops_the_charger_and_is_told(bench: Bench, charger: FakeCharger) -> None:
-    bench.port.order(SET_STEP_2, good())
-    wait_until(lambda: charger.orders[-1] == STEP_2)
-    orders = len(charger.orders)
+    bench.port.command(SET_STEP_2, good())
+    wait_until(lambda: charger.commands[-1] == STEP_2)
+    commands = len(charger.commands)
     bench.upset = RuntimeError("a mistake of ours")
     bench.wait_problem("internal: RuntimeError: a mistake of ours")
     bench.upset = None
-    wait_until(lambda: charger.orders[orders:][-2:] == [REST_STOP, OPERATION_STOP])
+    wait_until(lambda: charger.commands[commands:][-2:] == [REST_STOP, OPERATION_STOP])
     bench.wait_online()
     assert say(bench.link.problem) == ""
 
@@ -30,9 +30,9 @@ def test_an_exception_that_comes_again_each_time_never_ends_the_stops_nor_floods
 ) -> None:
     bench.upset = RuntimeError("for ever")
     bench.wait_problem("internal")
-    count = charger.orders.count(REST_STOP)
+    count = charger.commands.count(REST_STOP)
     begun_s = time.monotonic()
-    wait_until(lambda: charger.orders.count(REST_STOP) >= count + 4)
+    wait_until(lambda: charger.commands.count(REST_STOP) >= count + 4)
     assert time.monotonic() - begun_s > 0.5
     bench.upset = None
     bench.wait_online()

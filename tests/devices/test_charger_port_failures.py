@@ -29,8 +29,8 @@ from tests.waiting import wait_until
 def test_an_unplugged_port_is_a_problem_and_stops_first_when_it_is_back(
     pty: Pty, bench: Bench, charger: FakeCharger
 ) -> None:
-    bench.port.order(SET_STEP_2, good())
-    wait_until(lambda: STEP_2 in charger.orders)
+    bench.port.command(SET_STEP_2, good())
+    wait_until(lambda: STEP_2 in charger.commands)
     charger.say(REST_STOP[:-1] + bytes(1))
     wait_until(lambda: bench.link.bad_frames)
     charger.mute = True
@@ -55,13 +55,13 @@ def test_an_order_given_while_the_port_was_away_is_not_carried_out(
 ) -> None:
     pty.unplug()
     bench.wait_problem("unplugged")
-    bench.port.order(Command(Action.RUN), good())
+    bench.port.command(Command(Action.RUN), good())
     pty.plug()
     bench.wait_online()
-    wait_until(lambda: charger.orders[-4:] == [REST_STOP, OPERATION_STOP] * 2)
-    assert RUN not in charger.orders
-    bench.port.order(Command(Action.RESUME), good())
-    wait_until(lambda: charger.orders[-1] == REST_RESUME)
+    wait_until(lambda: charger.commands[-4:] == [REST_STOP, OPERATION_STOP] * 2)
+    assert RUN not in charger.commands
+    bench.port.command(Command(Action.RESUME), good())
+    wait_until(lambda: charger.commands[-1] == REST_RESUME)
 
 
 def test_a_port_that_appears_later_works(tmp_path: Path) -> None:
@@ -105,9 +105,9 @@ def test_a_port_that_fails_after_a_while_is_opened_at_once_and_its_charger_stopp
         bench.wait_online()
         served_s = time.monotonic() + REOPEN_S
         wait_until(lambda: time.monotonic() > served_s, what="a second of service")
-        stops, failed_s = charger.orders.count(REST_STOP), time.monotonic()
+        stops, failed_s = charger.commands.count(REST_STOP), time.monotonic()
         os.close(lines[-1].fileno())
-        wait_until(lambda: charger.orders.count(REST_STOP) > stops, what="a stop")
+        wait_until(lambda: charger.commands.count(REST_STOP) > stops, what="a stop")
         assert time.monotonic() - failed_s < 0.5 * REOPEN_S
 
 

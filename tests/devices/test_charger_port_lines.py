@@ -52,12 +52,12 @@ def test_every_line_that_answers_in_time_gives_its_readings_and_stays_online(tmp
             bench.wait_online(SET_STEP_2)
         for bench, _ in benches.values():
             bench.wait_step(1)
-            bench.port.order(None)
+            bench.port.command(None)
         for name, (bench, charger) in benches.items():
             bench.wait_readings(12)
             online = [link.online for _, link in bench.seen]
             assert all(online[online.index(True) :]), f"{name} went offline"
-            assert bench.reading == replace(bench.reading, voltage_v=50.11, current_a=0.0, current_limit=1, illegal=())
+            assert bench.reading == replace(bench.reading, voltage_v=50.11, current_a=0.0, current_step=1, illegal=())
             assert charger.running == 0, name
 
 
@@ -127,9 +127,9 @@ def test_a_line_that_never_falls_quiet_does_not_hold_up_a_stop(bench: Bench, cha
         bench.wait_readings(2, since=len(bench.seen))  # answers are found in it
         charger.mute = True
         bench.wait_problem("only broken frames come in")
-        orders = len(charger.orders)
-        bench.port.order(STOP)
-        wait_until(lambda: charger.orders[orders:] == [REST_STOP, OPERATION_STOP])
+        commands = len(charger.commands)
+        bench.port.command(STOP)
+        wait_until(lambda: charger.commands[commands:] == [REST_STOP, OPERATION_STOP])
     charger.mute = False
     bench.wait_online()
 

@@ -22,21 +22,21 @@ def test_a_stop_waits_for_no_slot(bench: Bench, charger: FakeCharger) -> None:
         bench.wait_age(0.1)
         before = len(charger.frames)
         ordered_s = time.monotonic()
-        bench.port.order(STOP)
+        bench.port.command(STOP)
         assert wait_frames(charger, before + 3)[before:] == [REST_STOP, OPERATION_STOP, POLL]
         took_s.append(charger.frames[before][0] - ordered_s)
-        bench.port.order(None)
+        bench.port.command(None)
     assert min(took_s) < 0.05
 
 
 def test_a_stop_waits_for_the_rest_of_a_transaction_and_no_longer(pty: Pty) -> None:
     with charger_on(pty, delayed(0.08)) as charger, running(pty.path) as bench:
-        bench.wait_online(order=None)
+        bench.wait_online(command=None)
         polls = charger.polls
         wait_until(lambda: charger.polls > polls)
         readings, before = len(bench.seen), len(charger.frames)
         ordered_s = time.monotonic()
-        bench.port.order(STOP)
+        bench.port.command(STOP)
         wait_frames(charger, before + 1)
         stopped_s, frame = charger.frames[before]
         assert frame == REST_STOP
@@ -45,10 +45,10 @@ def test_a_stop_waits_for_the_rest_of_a_transaction_and_no_longer(pty: Pty) -> N
 
 
 def test_a_standing_stop_is_repeated_until_it_is_withdrawn(bench: Bench, charger: FakeCharger) -> None:
-    before, orders = len(charger.frames), len(charger.orders)
-    bench.port.order(STOP)
-    wait_until(lambda: charger.orders[orders:] == [REST_STOP, OPERATION_STOP] * 3)
-    bench.port.order(None)
+    before, commands = len(charger.frames), len(charger.commands)
+    bench.port.command(STOP)
+    wait_until(lambda: charger.commands[commands:] == [REST_STOP, OPERATION_STOP] * 3)
+    bench.port.command(None)
     stops_s = [at_s for at_s, frame in charger.frames[before:] if frame == REST_STOP]
     assert stops_s[2] - stops_s[0] == pytest.approx(1.0, abs=SLACK_S)
     assert POLL in [frame for _, frame in charger.frames[before:]]
@@ -58,9 +58,9 @@ def test_a_silent_charger_is_told_to_stop_blindly(bench: Bench, charger: FakeCha
     charger.mute = True
     bench.wait_problem("no answer: check the charger's power")
     assert bench.link.misses == 5
-    orders = len(charger.orders)
-    bench.port.order(STOP)
-    wait_until(lambda: charger.orders[orders:] == [REST_STOP, OPERATION_STOP] * 2)
+    commands = len(charger.commands)
+    bench.port.command(STOP)
+    wait_until(lambda: charger.commands[commands:] == [REST_STOP, OPERATION_STOP] * 2)
     charger.mute = False
     bench.wait_online()
     assert (say(bench.link.problem), bench.link.misses) == ("", 0)
@@ -69,18 +69,18 @@ def test_a_silent_charger_is_told_to_stop_blindly(bench: Bench, charger: FakeCha
 def test_close_writes_an_ordered_stop_whole_and_gives_the_port_back(
     pty: Pty, bench: Bench, charger: FakeCharger
 ) -> None:
-    orders = len(charger.orders)
-    bench.port.order(STOP)
+    commands = len(charger.commands)
+    bench.port.command(STOP)
     bench.port.close()
-    wait_until(lambda: charger.orders[orders:] == [REST_STOP, OPERATION_STOP])
+    wait_until(lambda: charger.commands[commands:] == [REST_STOP, OPERATION_STOP])
     SerialLine.open(pty.path).close()
     bench.port.close()
 
 
 def test_close_orders_nothing_by_itself(bench: Bench, charger: FakeCharger) -> None:
-    orders = len(charger.orders)
+    commands = len(charger.commands)
     bench.port.close()
-    assert len(charger.orders) == orders
+    assert len(charger.commands) == commands
 
 
 def test_close_of_a_port_that_was_never_started_or_never_there_returns_at_once(tmp_path: Path) -> None:

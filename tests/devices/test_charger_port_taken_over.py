@@ -27,12 +27,12 @@ def hard_of_hearing(pty: Pty, charger: FakeCharger) -> FakeCharger:
 def test_a_stop_goes_out_at_the_right_speed_whatever_the_port_was_set_to(
     pty: Pty, bench: Bench, hard_of_hearing: FakeCharger
 ) -> None:
-    bench.port.order(SET_STEP_2, good())
-    wait_until(lambda: hard_of_hearing.orders[-1:] == [STEP_2])
+    bench.port.command(SET_STEP_2, good())
+    wait_until(lambda: hard_of_hearing.commands[-1:] == [STEP_2])
     stty(pty.path, "115200", "echo")
     ordered_s = time.monotonic()
-    bench.port.order(STOP)
-    wait_until(lambda: hard_of_hearing.orders[-2:] == [REST_STOP, OPERATION_STOP])
+    bench.port.command(STOP)
+    wait_until(lambda: hard_of_hearing.commands[-2:] == [REST_STOP, OPERATION_STOP])
     stop_s = next(at_s for at_s, frame in hard_of_hearing.frames if at_s > ordered_s and frame == REST_STOP)
     assert stop_s - ordered_s < 0.4, "not the one that is repeated after 500 ms"
     assert say(bench.link.taken_over) == "115200 baud, echo on"

@@ -18,12 +18,12 @@ Log = list[tuple[float, Turn]]
 
 
 def play(
-    schedule: Schedule, start_s: float, end_s: float, orders: Mapping[float, Command | None], poll_s: float = POLL_S
+    schedule: Schedule, start_s: float, end_s: float, commands: Mapping[float, Command | None], poll_s: float = POLL_S
 ) -> Log:
     """Take every turn when due; give commands at their times, like a control loop while the port sleeps."""
     log: Log = []
     now_s = start_s
-    waiting = sorted(orders.items(), key=lambda item: item[0])
+    waiting = sorted(commands.items(), key=lambda item: item[0])
     while True:
         due = schedule.next()
         at_s = max(now_s, due.at_s)
@@ -182,12 +182,12 @@ COMMANDS = st.none() | st.sampled_from([STOP, RUN, Command(Action.RESUME), Comma
 
 
 @given(
-    orders=st.dictionaries(st.floats(0.0, 8.0), COMMANDS, max_size=30),
+    commands=st.dictionaries(st.floats(0.0, 8.0), COMMANDS, max_size=30),
     control=st.sampled_from(ControlMode),
     poll_s=st.sampled_from([0.0, 0.02, 0.12]),
 )
-def test_whatever_is_ordered_when(orders: dict[float, Command | None], control: ControlMode, poll_s: float) -> None:
-    log = play(opened(control), 0.0, 10.0, orders, poll_s)
+def test_whatever_is_ordered_when(commands: dict[float, Command | None], control: ControlMode, poll_s: float) -> None:
+    log = play(opened(control), 0.0, 10.0, commands, poll_s)
     assert log[0] == (0.0, REST)
     busy_s = {POLL: poll_s, ORDER: ORDER_S, REST: ORDER_S, OPERATION: ORDER_S}
     for (before_s, before), (at_s, turn) in pairwise(log):
@@ -197,7 +197,7 @@ def test_whatever_is_ordered_when(orders: dict[float, Command | None], control: 
             assert turn in (REST, OPERATION)
         if before is ORDER:
             assert turn in (REST, POLL)
-    for given_s, command in orders.items():
+    for given_s, command in commands.items():
         if command == STOP:
             assert any(
                 given_s - STOP_REPEAT_S <= at_s <= given_s + poll_s + ORDER_S + 0.001

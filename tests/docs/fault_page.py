@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterator
 
-from orchestrator.core.faults import FAULTS, RANK, Clear, Row
+from orchestrator.core.faults import FAULTS, RANK, Clear, FaultRow
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.model import Cause, Effect
 from orchestrator.text.catalogue import advise, say
@@ -135,17 +135,17 @@ def _numbers() -> Iterator[str]:
         yield f"| {entry.number} | {entry.about} | {rows or '–'} | {entry.also} |"
 
 
-def rows_of(number: str) -> list[Row]:
+def rows_of(number: str) -> list[FaultRow]:
     """The rows that name this number of the catalogue."""
     return [row for row in FAULTS if number in row.source.split(", ")]
 
 
-def _advice(row: Row) -> str:
+def _advice(row: FaultRow) -> str:
     do = advise(row.id)
     return f"{do}; once it has stopped: {advise(row.at_rest)}" if row.at_rest else do
 
 
-def _end(row: Row) -> str:
+def _end(row: FaultRow) -> str:
     if row.clear is Clear.AUTO:
         return f"by itself, {row.clean_s:g} s after it has gone"
     gone = f" for {row.clean_s:g} s" if row.clean_s else ""

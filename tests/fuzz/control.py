@@ -55,7 +55,7 @@ def _service() -> tuple[Supervisor, Loop]:
     (directory / "station.yaml").write_text(STATION.replace("&", bays), encoding="utf-8")
     ours, _theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     supervisor = Supervisor(load_station(directory / "station.yaml"), GuardianLink(ours.detach()))
-    supervisor._store.kept_revision = sys.maxsize  # the disk is instantaneous
+    supervisor._store.persisted_revision = sys.maxsize  # the disk is instantaneous
     loop = Loop(supervisor)
     supervisor._handler._wake = loop.put
     return supervisor, loop

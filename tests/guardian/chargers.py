@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.model import ChargeMode, Operation
 from orchestrator.sim.background import Background
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.charger_wire import ChargerWire
 from orchestrator.sim.line import LINES
 from tests.sim.wires import Port
@@ -18,7 +18,7 @@ class Bench:
 
     def __init__(self, background: Background, link: Path, line: str) -> None:
         self._background = background
-        self.charger = Charger(voltage_v=50.0, current_a=14.0, mode=ChargeMode.CHARGE, run=True)
+        self.charger = SimulatedCharger(voltage_v=50.0, current_a=14.0, mode=ChargeMode.CHARGE, run=True)
         self.wire = ChargerWire(background.loop, self.charger, line=LINES[line], link=link)
         self.name = str(link)
         self.fd = -1

@@ -31,7 +31,7 @@ NOW_S = 1000.0
 LIMITS = Limits(voltage_v=58.4, current_a=12.0, temperature_c=Range(0.0, 45.0))
 MANUAL = ChargerConfig(port="p", control=ControlMode.MANUAL, steps_a=(2.0, 5.0, 8.0, 11.0, 14.0))
 AUTOMATIC = replace(MANUAL, control=ControlMode.AUTOMATIC)
-GOOD = Grant(expires_s=NOW_S + 0.5, voltage_v=50.0, temperature_c=20.0, current_limit=2)
+GOOD = Grant(expires_s=NOW_S + 0.5, voltage_v=50.0, temperature_c=20.0, current_step=2)
 
 #: Every command with values from well below to well above its range.
 EVERY = [Command(action, value) for action in Action for value in range(-2, 260)]
@@ -47,10 +47,10 @@ SETS = {
 
 
 def passing(
-    evidence: Grant | None, charger: ChargerConfig = MANUAL, limits: Limits = LIMITS, now_s: float = NOW_S
+    grant: Grant | None, charger: ChargerConfig = MANUAL, limits: Limits = LIMITS, now_s: float = NOW_S
 ) -> set[Command]:
     """The commands permitted, out of all."""
-    verdicts = {command: permit(command, evidence, now_s, charger, limits) for command in EVERY}
+    verdicts = {command: permit(command, grant, now_s, charger, limits) for command in EVERY}
     return {command for command, why in verdicts.items() if why is None}
 
 
@@ -82,16 +82,16 @@ WORTHLESS: Mapping[str, Grant | None] = {
 
 @pytest.mark.parametrize("charger", [MANUAL, AUTOMATIC], ids=["manual", "automatic"])
 @pytest.mark.parametrize("evidence", WORTHLESS.values(), ids=WORTHLESS)
-def test_without_good_evidence_only_a_stop_passes(evidence: Grant | None, charger: ChargerConfig) -> None:
-    assert passing(evidence, charger) == STOPS
+def test_without_good_evidence_only_a_stop_passes(grant: Grant | None, charger: ChargerConfig) -> None:
+    assert passing(grant, charger) == STOPS
 
 
 @pytest.mark.parametrize(
     "evidence",
     [replace(GOOD, voltage_v=58.4), replace(GOOD, temperature_c=0.0), replace(GOOD, temperature_c=45.0)],
 )
-def test_a_value_on_the_limit_is_still_inside(evidence: Grant) -> None:
-    assert passing(evidence) == STOPS | SETS | {RESUME, RUN}
+def test_a_value_on_the_limit_is_still_inside(grant: Grant) -> None:
+    assert passing(grant) == STOPS | SETS | {RESUME, RUN}
 
 
 def test_the_time_is_the_callers_and_a_grant_runs_out_with_it() -> None:
@@ -101,12 +101,12 @@ def test_the_time_is_the_callers_and_a_grant_runs_out_with_it() -> None:
 
 @pytest.mark.parametrize("shown", [4, 5, -1, None])
 def test_run_is_refused_while_the_charger_shows_a_step_that_is_too_high_or_unknown(shown: int | None) -> None:
-    assert passing(replace(GOOD, current_limit=shown)) == STOPS | SETS | {RESUME}
+    assert passing(replace(GOOD, current_step=shown)) == STOPS | SETS | {RESUME}
 
 
 @pytest.mark.parametrize("shown", [0, 1, 2, 3])
 def test_run_passes_on_every_step_that_the_station_allows(shown: int) -> None:
-    assert RUN in passing(replace(GOOD, current_limit=shown))
+    assert RUN in passing(replace(GOOD, current_step=shown))
 
 
 @pytest.mark.parametrize(("current_a", "highest"), [(1.9, -1), (2.0, 0), (7.99, 1), (8.0, 2), (14.0, 4), (nan, -1)])
@@ -119,7 +119,7 @@ def test_steps_pass_up_to_the_stations_current(current_a: float, highest: int) -
 def test_a_step_whose_current_the_station_does_not_state_is_refused() -> None:
     three = replace(MANUAL, steps_a=(2.0, 5.0, 8.0))
     assert Command(Action.SET_LIMIT, 3) not in passing(GOOD, three)
-    assert RUN not in passing(replace(GOOD, current_limit=3), three)
+    assert RUN not in passing(replace(GOOD, current_step=3), three)
 
 
 @pytest.mark.parametrize(
@@ -129,32 +129,32 @@ def test_a_step_whose_current_the_station_does_not_state_is_refused() -> None:
         (RUN, replace(GOOD, expires_s=NOW_S - 2), MANUAL, "run: the readings that it rests on are 2.0 s too old"),
         (RUN, replace(GOOD, voltage_v=60.0), MANUAL, "run: 60 V is above the station's 58.4 V"),
         (RESUME, replace(GOOD, temperature_c=50.0), MANUAL, "resume: 50 °C is outside the station's 0 … 45 °C"),
-        (RUN, replace(GOOD, current_limit=4), MANUAL, "run: step 5 is 14 A, above the station's 12 A"),
+        (RUN, replace(GOOD, current_step=4), MANUAL, "run: step 5 is 14 A, above the station's 12 A"),
         (
             RUN,
-            replace(GOOD, current_limit=None),
+            replace(GOOD, current_step=None),
             MANUAL,
             "run: what the charger's current limit – means is not known",
         ),
         (Command(Action.SET_LIMIT, 4), GOOD, MANUAL, "set_limit: step 5 is 14 A, above the station's 12 A"),
-        (Command(Action.SET_MODE, 9), GOOD, MANUAL, "set_mode 9 is no order for a charger in manual mode"),
-        (RUN, GOOD, AUTOMATIC, "run 0 is no order for a charger in automatic mode"),
+        (Command(Action.SET_MODE, 9), GOOD, MANUAL, "set_mode 9 is not a command for a charger in manual mode"),
+        (RUN, GOOD, AUTOMATIC, "run 0 is not a command for a charger in automatic mode"),
     ],
 )
 def test_a_refusal_names_its_reason_with_its_evidence(
-    command: Command, evidence: Grant | None, charger: ChargerConfig, why: str
+    command: Command, grant: Grant | None, charger: ChargerConfig, why: str
 ) -> None:
-    assert say(permit(command, evidence, NOW_S, charger, LIMITS)) == why
+    assert say(permit(command, grant, NOW_S, charger, LIMITS)) == why
 
 
 FLOATS = st.floats()
 GRANTS = st.none() | st.builds(Grant, FLOATS, FLOATS, FLOATS, st.none() | st.integers())
 
 
-@given(evidence=GRANTS, value=st.integers(), now_s=FLOATS, control=st.sampled_from(ControlMode))
-def test_a_stop_always_passes(evidence: Grant | None, value: int, now_s: float, control: ControlMode) -> None:
+@given(grant=GRANTS, value=st.integers(), now_s=FLOATS, control=st.sampled_from(ControlMode))
+def test_a_stop_always_passes(grant: Grant | None, value: int, now_s: float, control: ControlMode) -> None:
     charger = replace(MANUAL, control=control, steps_a=())
-    assert permit(Command(Action.STOP, value), evidence, now_s, charger, LIMITS) is None
+    assert permit(Command(Action.STOP, value), grant, now_s, charger, LIMITS) is None
 
 
 # --- grant -----------------------------------------------------------------------------------------------------------

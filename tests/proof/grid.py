@@ -15,7 +15,7 @@ from unittest.mock import patch
 
 from orchestrator.config.load import load_policy
 from orchestrator.core import latches, safestop
-from orchestrator.core.faults import FAULTS, Row
+from orchestrator.core.faults import FAULTS, FaultRow
 from orchestrator.core.states import SETTLED
 from orchestrator.model import STOP, Action, Alarm, Cause, ControlMode, Effect, Request, State
 from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
@@ -105,7 +105,7 @@ class Cell:
     """One cell of the grid."""
 
     state: State
-    row: Row
+    row: FaultRow
     phase: Phase
 
     def __str__(self) -> str:
@@ -163,7 +163,7 @@ class Run:
             self.wrong.append("a thread of the service ended or hung")
         return self.ended
 
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[FaultRow, ...]:
         """The fault table, with the cell's row under control."""
         row, check = self.cell.row, self.cell.row.check
 
@@ -312,7 +312,7 @@ def play(cell: Cell, used: Used) -> Ended:
             return run.run()
 
 
-def orders(limit_a: float, soc_pct: float | None) -> set[tuple[Action, int]]:
+def commands(limit_a: float, soc_pct: float | None) -> set[tuple[Action, int]]:
     """The commands that leave the interlock in a charge with this station limit.
 
     Without a SOC: a whole charge, from the first pulse to full.
@@ -324,13 +324,13 @@ def orders(limit_a: float, soc_pct: float | None) -> set[tuple[Action, int]]:
         [Situation(soc_pct=soc_pct).nature()],
         end_s=120.0,
     ) as made:
-        made.rigs[0].bay.charger.current_limit = 4  # as the previous controller left it
+        made.rigs[0].bay.charger.current_step = 4  # as the previous controller left it
         port = made.supervisor._ports[0]
         write = port._write
 
-        def written(line: Any, frame: bytes, order: Any, *args: Any, **named: Any) -> None:
-            let_out.add((order.action, order.value))
-            write(line, frame, order, *args, **named)
+        def written(line: Any, frame: bytes, command: Any, *args: Any, **named: Any) -> None:
+            let_out.add((command.action, command.value))
+            write(line, frame, command, *args, **named)
 
         port._write = written  # type: ignore[method-assign]  # whoever watches sees every order
         made.time.call_later(9.0 if soc_pct is not None else 75.0, made.end)

@@ -276,7 +276,7 @@ class Player:
         ordered = bay.rules.manual and charger.control_mode is ControlMode.MANUAL and bay.decision.state in ENERGISED
         ran_before = self.script.bays[number].running and self.watches[number].heard.started_s is None
         if ordered and charger.running and charger.mode is ChargeMode.CHARGE and not ran_before:
-            step_a = charger.steps_a[charger.current_limit]
+            step_a = charger.steps_a[charger.current_step]
             if step_a > limit_a:
                 self._wrong(
                     number,

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
 from orchestrator.core import latches
 from orchestrator.core import step as step_module
 from orchestrator.core.faults import FAULTS
@@ -49,7 +49,7 @@ def skips_qualifying(patch: Patch) -> None:
 
 
 def no_limits(patch: Patch) -> None:
-    of: Callable[[Bay], Rules] = Rules.of
+    of: Callable[[BayConfig], Rules] = Rules.of
     patch.setattr(Rules, "of", lambda bay: replace(of(bay), top_step=4))
     patch.setattr(charger_module, "permit", lambda *_: None)
 

@@ -21,12 +21,12 @@ def played(
     control: ControlMode = ControlMode.MANUAL,
 ) -> list[tuple[State, bool]]:
     """The history of the demo's bay: each change of state or contactor."""
-    course: list[tuple[State, bool]] = []
+    next_transition: list[tuple[State, bool]] = []
 
     def look(_: BayRunner) -> None:
         now = (made.decision().state, made.rigs[0].bay.connected)
-        if course[-1:] != [now]:
-            course.append(now)
+        if next_transition[-1:] != [now]:
+            next_transition.append(now)
 
     pack = PACKS["demo"]()
     pack.set_soc(soc_pct)
@@ -38,7 +38,7 @@ def played(
             made.time.call_later(t_s, happen, made)
         assert made.run() == 0
         assert not made.rigs[0].bay.connected
-        return course
+        return next_transition
 
 
 def asks(request: Request) -> Callable[[World], object]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core import course, faults, latches, outofcontrol, persisted, step
+from orchestrator.core import faults, latches, next_transition, outofcontrol, persisted, step
 from orchestrator.core.facts import Facts
 from orchestrator.lastresort import lastline
 from orchestrator.model import Cause
@@ -90,7 +90,7 @@ def blames(patch: Patch) -> None:
     def disobeys(f: Facts) -> Cause:
         return Cause.of("uncontrollable", port="", since_s=3.0, why=outofcontrol._witnesses(f))
 
-    patch.setattr(course, "out_of_control", disobeys)
+    patch.setattr(next_transition, "out_of_control", disobeys)
 
 
 #: The invariant → a bug that breaks it, and a variant that shows it and is clean without the bug.

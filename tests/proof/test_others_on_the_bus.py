@@ -35,32 +35,32 @@ class Next:
 
 def played(come: Callable[[World], object], *, end_s: float = END_S, main_loop: bool = True, **battery: Any) -> Next:
     """A bay charging from the start; `come(world)` is called at START_S."""
-    course, pack = Next(), PACKS["demo"]()
+    next_transition, pack = Next(), PACKS["demo"]()
     pack.set_soc(30.0)
     the_station = station([ControlMode.MANUAL], [POLICIES["demo"]], **battery)
     with world(the_station, [Nature(pack, main_loop=main_loop, speed=0.1)], end_s=end_s + 60.0) as made:
 
         def look(runner: BayRunner) -> None:
             decision = made.decision()
-            if course.states[-1:] != [decision.state]:
-                course.states.append(decision.state)
-            course.faults |= {fault.id for fault in decision.faults}
-            reading, course.link = runner._snapshot.battery, runner._snapshot.battery_link
+            if next_transition.states[-1:] != [decision.state]:
+                next_transition.states.append(decision.state)
+            next_transition.faults |= {fault.id for fault in decision.faults}
+            reading, next_transition.link = runner._snapshot.battery, runner._snapshot.battery_link
             if decision.state is S.CHARGING and reading.voltage_v is not None:
-                course.reads_s = max(course.reads_s, made.time.now_s - reading.voltage_v.t_s)
+                next_transition.reads_s = max(next_transition.reads_s, made.time.now_s - reading.voltage_v.t_s)
             if (
-                course.stopped_s is None
+                next_transition.stopped_s is None
                 and made.time.now_s >= 1000.0 + START_S
                 and not made.rigs[0].bay.charger.running
             ):
-                course.stopped_s = made.time.now_s - 1000.0 - START_S
+                next_transition.stopped_s = made.time.now_s - 1000.0 - START_S
 
         made.on_step = look
         made.time.call_later(START_S, come, made)
         made.time.call_later(end_s, made.end)
         assert made.run() == 0
-    assert S.CHARGING in course.states
-    return course
+    assert S.CHARGING in next_transition.states
+    return next_transition
 
 
 def master(on: World) -> SecondMaster:
@@ -131,32 +131,32 @@ HARMLESS: Sequence[tuple[str, Callable[[World], object], str]] = (
 @pytest.mark.parametrize("main_loop", [False, True], ids=["immediate", "main loop"])
 @pytest.mark.parametrize(("come", "said"), [one[1:] for one in HARMLESS], ids=[one[0] for one in HARMLESS])
 def test_a_charge_goes_on_beside_others(come: Callable[[World], object], said: str, main_loop: bool) -> None:
-    course = played(come, main_loop=main_loop)
-    assert course.stopped_s is None or course.stopped_s >= END_S - START_S - 0.1, course
-    assert course.faults <= SAID
-    assert said in say(course.link.other_master)
-    assert course.reads_s < 0.8
+    next_transition = played(come, main_loop=main_loop)
+    assert next_transition.stopped_s is None or next_transition.stopped_s >= END_S - START_S - 0.1, next_transition
+    assert next_transition.faults <= SAID
+    assert said in say(next_transition.link.other_master)
+    assert next_transition.reads_s < 0.8
 
 
 def test_a_heartbeat_that_is_set_is_said_and_ours_again() -> None:
-    course = played(sets_heartbeat_unheard)
-    assert "set the BMU's heartbeat to 5 s" in say(course.link.heartbeat_set)
+    next_transition = played(sets_heartbeat_unheard)
+    assert "set the BMU's heartbeat to 5 s" in say(next_transition.link.heartbeat_set)
 
 
 @pytest.mark.parametrize("when", [When.FIRST, When.AFTER, When.UNASKED])
 @pytest.mark.parametrize("main_loop", [False, True], ids=["immediate", "main loop"])
 def test_a_forged_temperature_stops_the_charge_at_once(when: When, main_loop: bool) -> None:
-    course = played(
+    next_transition = played(
         lambda on: Forger(on.time, on.bus, FIRST_NODE, Lie(word=350, when=when)), main_loop=main_loop, end_s=12.0
     )
-    assert course.stopped_s is not None
-    assert course.stopped_s < 0.5
-    assert "temperature_invalid" in course.faults
+    assert next_transition.stopped_s is not None
+    assert next_transition.stopped_s < 0.5
+    assert "temperature_invalid" in next_transition.faults
 
 
 def test_one_that_lies_now_and_then_is_found_out_with_its_first_lie() -> None:
-    course = played(
+    next_transition = played(
         lambda on: Forger(on.time, on.bus, FIRST_NODE, Lie(word=350, when=When.SOMETIMES, share=0.1)), end_s=20.0
     )
-    assert course.stopped_s is not None
-    assert course.stopped_s < 5.0
+    assert next_transition.stopped_s is not None
+    assert next_transition.stopped_s < 5.0

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 from orchestrator import model
-from orchestrator.core import course as course_module
 from orchestrator.core import latches, machine, operator, safestop
+from orchestrator.core import next_transition as course_module
 from orchestrator.core import step as step_module
-from orchestrator.core.course import Next
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import Memory, with_values
+from orchestrator.core.next_transition import Next
 from orchestrator.core.operator import Heard
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.resting import resting_place
@@ -69,7 +69,7 @@ def trip_is_no_latch(patch: Patch) -> None:
 
 
 def stop_is_not_heard(patch: Patch) -> None:
-    hear = operator.hear
+    hear = operator.handle_request
 
     def deaf(memory: Memory, asked: Request, *more: Any) -> Heard:
         return Heard(memory.operator, memory.faults) if asked is Request.STOP else hear(memory, asked, *more)
@@ -81,7 +81,7 @@ def reset_starts(patch: Patch) -> None:
     def reset(memory: Memory, now_s: float) -> Heard:
         return operator._start(with_values(memory, hold=None), now_s, "bay-1")
 
-    hear = operator.hear
+    hear = operator.handle_request
     patch.setattr(
         step_module, "hear",
         lambda m, asked, now_s, *more: reset(m, now_s) if asked is Request.RESET else hear(m, asked, now_s, *more),
@@ -133,7 +133,7 @@ def absent_battery_is_waited_for(patch: Patch) -> None:
     stopping = course_module._stopping
     patch.setattr(
         course_module, "_stopping",
-        lambda f, faults: Next(None, f.memory.cause) if f.departed and f.state_s < 60 else stopping(f, faults),
+        lambda f, faults: Next(None, f.memory.cause) if f.battery_removed and f.state_s < 60 else stopping(f, faults),
     )  # fmt: skip
 
 

@@ -85,7 +85,7 @@ def _over_current(bay: Bay) -> bool:
     charger = bay.rig.bay.charger
     limit_a = bay.rules.bay.limits.current_a
     if bay.rules.manual:
-        limit_a = min(limit_a, STEPS_A[charger.current_limit])
+        limit_a = min(limit_a, STEPS_A[charger.current_step])
     return _shown(bay, Kind.CURRENT, charger.current_a) > limit_a * 1.1 + 0.3 + ROUND_A
 
 

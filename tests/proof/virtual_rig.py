@@ -8,9 +8,9 @@ from typing import Any, cast
 from durand.scheduler import AsyncScheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
 
 from orchestrator.model import ChargeMode, ControlMode
-from orchestrator.sim.bay import Bay
+from orchestrator.sim.bay import SimulatedBay
 from orchestrator.sim.bmu import Bmu
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.charger_frames import Request
 from orchestrator.sim.charger_wire import ChargerWire
 from orchestrator.sim.line import LINES
@@ -39,7 +39,7 @@ class Nature:
     contactor: bool = False  #: between charger and battery
 
 
-class CutBay(Bay):
+class CutBay(SimulatedBay):
     """A bay with a contactor in its cable, if it has one."""
 
     breaker: Breaker | None = None
@@ -54,7 +54,7 @@ class CutBay(Bay):
 class MemoryWire(ChargerWire):
     """The emulated charger's end of a virtual tty."""
 
-    def __init__(self, time: Time, charger: Charger, tty: Tty, line: Any, now: Any) -> None:
+    def __init__(self, time: Time, charger: SimulatedCharger, tty: Tty, line: Any, now: Any) -> None:
         super().__init__(cast("Any", time), charger, line=line, now=now)
         self._time, self._tty = time, tty
         self._plugged = False
@@ -153,9 +153,9 @@ class VirtualRig(Rig):
     steady = False  #: its BMU tells the same lie in every answer
 
     def __init__(self, time: Time, bus: BusWire, tty: Tty, node_id: int, nature: Nature) -> None:
-        charger = Charger(nature.control)
+        charger = SimulatedCharger(nature.control)
         if nature.running:
-            charger.run, charger.mode, charger.current_limit = True, ChargeMode.CHARGE, len(charger.steps_a) - 1
+            charger.run, charger.mode, charger.current_step = True, ChargeMode.CHARGE, len(charger.steps_a) - 1
         self.bay = CutBay(charger, nature.pack)
         self.breaker = self.bay.breaker = Breaker(time) if nature.contactor else None
         if self.breaker is not None:

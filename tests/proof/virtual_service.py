@@ -21,7 +21,7 @@ from orchestrator.config.load import load_map, load_policy
 from orchestrator.config.policy import Policy
 from orchestrator.config.station import (
     BatteryConfig,
-    Bay,
+    BayConfig,
     ChargerConfig,
     ContactorConfig,
     Control,
@@ -124,7 +124,7 @@ class Notebook:
 class Shelf:
     """A store on an instantaneous disk. `memories` are those of the last run, by bay name."""
 
-    kept_revision = 0
+    persisted_revision = 0
 
     def __init__(self, memories: Mapping[str, Memory], *_: object, **__: object) -> None:
         self._memories = memories
@@ -144,12 +144,12 @@ class Shelf:
 
     def put(self, place: Place, persisted: Persisted) -> int:
         self.persisted[place.bay] = persisted
-        return self.kept_revision
+        return self.persisted_revision
 
     def on_disk(self, place: Place) -> Persisted | None:
         return self.persisted.get(place.bay)
 
-    def unkept(self, _now_s: float) -> None:
+    def not_persisted(self, _now_s: float) -> None:
         """It takes everything."""
 
     def stalled(self, _now_s: float) -> bool:
@@ -189,7 +189,7 @@ def station(
         station="virtual",
         can={"can0": {"interface": "virtual", "bitrate": 250_000}},
         bays=tuple(
-            Bay(
+            BayConfig(
                 name=f"bay-{number + 1}",
                 charger=ChargerConfig(port=f"/virtual/{number + 1}", control=control, steps_a=STEPS_A),
                 battery=BatteryConfig(node_id=FIRST_NODE + number, **settings),

@@ -16,7 +16,7 @@ from orchestrator.core.faults import FAULTS
 from orchestrator.interlock import ALLOWED
 from orchestrator.model import Action, ControlMode, State
 from tests.proof.exploring import changes_of_table
-from tests.proof.grid import STOP_WITHIN_S, Cell, Ended, Phase, Used, cells, orders, play
+from tests.proof.grid import STOP_WITHIN_S, Cell, Ended, Phase, Used, cells, commands, play
 from tests.proof.paths import NEVER_MADE, PATHS
 from tests.proof.play import play as play_script
 from tests.proof.report import say
@@ -37,7 +37,7 @@ def orders_let_out() -> set[Order]:
     """The commands used in charges under every limit."""
     let_out: set[Order] = set()
     for limit_a, soc_pct in CHARGES:
-        let_out |= orders(limit_a, soc_pct)
+        let_out |= commands(limit_a, soc_pct)
     return let_out - {(Action.STOP, 0)}
 
 

@@ -130,7 +130,7 @@ def test_a_status_reply_fills_a_reading() -> None:
         current_a=23.11,
         control_mode=ControlMode.MANUAL,
         operation=Operation.RUNNING,
-        current_limit=4,
+        current_step=4,
         charge_mode=ChargeMode.CHARGE,
         precharge=Precharge.CONTINUOUS,
         connection=Connection.NORMAL,
@@ -158,7 +158,7 @@ def test_temperatures_are_signed_tenths(raw: int, celsius: float) -> None:
 LISTED = [
     (2, "control_mode", ControlMode, range(2), "control mode {} (documented: 0, 1)"),
     (3, "operation", Operation, range(2), "operation {} (documented: 0, 1)"),
-    (4, "current_limit", int, range(5), "current limit {} (documented: 0 … 4)"),
+    (4, "current_step", int, range(5), "current limit {} (documented: 0 … 4)"),
     (5, "charge_mode", ChargeMode, range(1, 9), "charge mode {} (documented: 1 … 8)"),
     (6, "precharge", Precharge, range(3), "precharge function {} (documented: 0 … 2)"),
     (7, "connection", Connection, range(2), "battery connection {} (documented: 0, 1)"),
@@ -194,7 +194,7 @@ def test_any_kinds_and_any_words_give_the_values_asked_for(kind1: int, kind2: in
         *(name for bit, name in enumerate(["voltage_v", "current_a", "temperature_1_c", "temperature_2_c"])
           if kind1 >> bit & 1),
         *(["control_mode"] if kind1 & 0x10 else []),
-        *(name for bit, name in enumerate(["operation", "current_limit", "charge_mode", "precharge", "connection"])
+        *(name for bit, name in enumerate(["operation", "current_step", "charge_mode", "precharge", "connection"])
           if kind2 >> bit & 1),
     ]  # fmt: skip
     voids = (kind1 >> 5).bit_count() + (kind2 >> 5).bit_count()

@@ -203,7 +203,7 @@ def test_a_reply_of_the_services_own_length_is_taken_for_its_kinds() -> None:
         "current_a": 23.11,
         "control_mode": 1,
         "operation": 1,
-        "current_limit": 4,
+        "current_step": 4,
         "charge_mode": 2,
         "precharge": 2,
         "connection": 1,

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from orchestrator.model import Action, Command, ControlMode
 from orchestrator.protocol import charger, standby
 from orchestrator.protocol.charger import Kind1, Kind2, encode, status_request
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.charger_frames import Kind, status
 from tests.protocol.streams import streams
 
@@ -16,7 +16,7 @@ ASKED = (Kind1.CURRENT | Kind1.CONTROL_MODE, int(Kind2.OPERATION))
 
 def answer(amps: float, operation: int, kinds: tuple[int, int] = ASKED) -> bytes:
     """As sent by the emulated charger."""
-    return status(Charger(), *kinds, {Kind.CURRENT: round(100 * amps), Kind.OPERATION: operation})
+    return status(SimulatedCharger(), *kinds, {Kind.CURRENT: round(100 * amps), Kind.OPERATION: operation})
 
 
 def test_the_frames_are_those_of_the_codec() -> None:
@@ -50,7 +50,7 @@ def test_standby_is_operation_0_and_no_current(amps: float, operation: int, said
 
 @pytest.mark.parametrize("mode", ControlMode)
 def test_the_control_mode_is_no_matter(mode: ControlMode) -> None:
-    assert standby.stands_by(status(Charger(mode), *ASKED, {Kind.OPERATION: 0})) is True
+    assert standby.stands_by(status(SimulatedCharger(mode), *ASKED, {Kind.OPERATION: 0})) is True
 
 
 @pytest.mark.parametrize("kinds", [(0x13, 0x1F), (0x17, 0x1F), (0x1F, 0x1F), (0x02, 0x01), (0x13, 0x01)])

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.config.load import load_map, load_policy
-from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits
+from orchestrator.config.station import BatteryConfig, BayConfig, ChargerConfig, Limits
 from orchestrator.core.persisted import Persisted
 from orchestrator.interlock import Grant
 from orchestrator.keys import Range
@@ -43,8 +43,8 @@ STEP_S = 0.2
 VOLTS = 50.4
 
 
-def the_bay() -> Bay:
-    return Bay(
+def the_bay() -> BayConfig:
+    return BayConfig(
         name="bay-1",
         charger=ChargerConfig(port="/dev/ttyX", control=ControlMode.MANUAL, steps_a=STEPS_A),
         battery=BatteryConfig(can="can0", node_id=0x10, map=load_map("tabos")),
@@ -57,7 +57,7 @@ class Charger:
     """Has obeyed by the next look. `orders` has every command it got."""
 
     def __init__(self) -> None:
-        self.orders: list[tuple[Command | None, Grant | None]] = []
+        self.commands: list[tuple[Command | None, Grant | None]] = []
         self.reading = ChargerReading(
             0.0,
             VOLTS,
@@ -72,8 +72,8 @@ class Charger:
         self.link = ChargerLink(online=True)
         self.deaf = False  #: disobeys from now on
 
-    def order(self, command: Command | None, grant: Grant | None = None) -> None:
-        self.orders.append((command, grant))
+    def command(self, command: Command | None, grant: Grant | None = None) -> None:
+        self.commands.append((command, grant))
 
     @property
     def view(self) -> tuple[ChargerReading, ChargerLink]:
@@ -81,7 +81,7 @@ class Charger:
 
     def pass_time(self, now_s: float) -> None:
         """Send the command given during the decision, then answer a poll."""
-        command = self.orders[-1][0] if self.orders else None
+        command = self.commands[-1][0] if self.commands else None
         changes: dict[str, object] = {}
         if command is not None:
             sent_s = now_s - STEP_S / 2
@@ -90,14 +90,14 @@ class Charger:
                 self.link = replace(self.link, stop_sent_s=sent_s)
             effects: dict[Action, dict[str, object]] = {
                 Action.STOP: {"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL},
-                Action.SET_LIMIT: {"current_limit": command.value},
+                Action.SET_LIMIT: {"current_step": command.value},
                 Action.SET_MODE: {"charge_mode": ChargeMode(command.value) if command.value else None},
                 Action.RUN: {"operation": Operation.RUNNING},
             }
             changes = {} if self.deaf else effects.get(command.action, {})
         reading = replace(self.reading, **changes)  # type: ignore[arg-type]  # the fields of a reading, by the order
         running = reading.operation is Operation.RUNNING
-        self.reading = replace(reading, t_s=now_s, current_a=STEPS_A[reading.current_limit or 0] if running else 0.0)
+        self.reading = replace(reading, t_s=now_s, current_a=STEPS_A[reading.current_step or 0] if running else 0.0)
 
 
 class Battery:
@@ -130,7 +130,7 @@ class Bench:
         self,
         directory: Path,
         persisted: Persisted | None = None,
-        bay: Bay | None = None,
+        bay: BayConfig | None = None,
         *,
         max_mb: float = 1.0,
         now_s: float = 1000.0,

@@ -7,10 +7,10 @@ from typing import NoReturn
 
 import pytest
 
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory, with_values
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import step
 from orchestrator.model import STOP, Cause, Decision, Request, Snapshot, State
 from orchestrator.model.cause import from_plain
 from orchestrator.service import bay as bay_module
@@ -36,7 +36,7 @@ def test_before_the_first_step_the_status_says_that_it_starts(bench: Bench) -> N
 
 def test_the_first_order_is_a_stop_and_every_later_one_has_its_evidence(bench: Bench) -> None:
     bench.charging()
-    (first, _), *others = bench.charger.orders
+    (first, _), *others = bench.charger.commands
     assert first == STOP
     assert all(grant is not None for command, grant in others if command not in (None, STOP))
     assert all(grant is None for command, grant in others if command is None)
@@ -98,7 +98,7 @@ def test_an_exception_of_our_own_stops_the_bay_latches_and_is_told(
         broken_world.setattr(bay_module, "step", broken)
         assert "ZeroDivisionError('by accident') in broken, line" in bench.ask(Request.PAUSE)
         bench.step(5)
-        assert {command for command, _ in bench.charger.orders[-6:]} == {STOP}
+        assert {command for command, _ in bench.charger.commands[-6:]} == {STOP}
         status = bench.bay.status()
         assert (status["state"], status["alarm"]) == ("STOPPING", "none")
         assert "internal: ZeroDivisionError" in str(status["reason"])
@@ -155,7 +155,7 @@ def test_a_request_that_no_disk_takes_is_answered_with_that(bench: Bench) -> Non
     bench.bay.ask(stop)
     bench.step(12)
     assert stop.done.is_set()
-    assert say(stop.answer).startswith("done, but not kept: a restart would forget what changes: ")
+    assert say(stop.answer).startswith("done, but not saved: a restart would forget what changes: ")
     assert bench.charger.reading.current_a == 0
 
 
@@ -193,8 +193,8 @@ def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, mo
     told: list[bool] = []
 
     def intending(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
-        told.append(snapshot.running_kept)
-        decision, after = step(now_s, snapshot, memory, rules)
+        told.append(snapshot.running_persisted)
+        decision, after = decide(now_s, snapshot, memory, rules)
         return replace(decision, command=None), with_values(after, intends=True)
 
     bench.step(3)
@@ -302,7 +302,7 @@ def test_nothing_begins_while_a_latched_fault_would_be_forgotten(bench: Bench) -
     bench.step(50)
     assert bench.bay.status()["state"] == "SUSPENDED"
     why = f"a restart would forget what changes: {bench.store.path}: No space left on device; "
-    assert faults(bench)["unkept"].startswith(why)
+    assert faults(bench)["not_persisted"].startswith(why)
     fresh.unlink()
     bench.until(State.CHARGING)
     fresh.symlink_to("/dev/full")

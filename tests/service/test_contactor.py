@@ -126,7 +126,7 @@ def test_the_guardian_has_it_for_as_long_as_it_is_held(line: Line) -> None:
 
 def test_it_closes_when_standby_is_verified_and_opens_at_the_end(bench: Bench, line: Line) -> None:
     bench.step()
-    assert bench.charger.orders[0][0] == STOP
+    assert bench.charger.commands[0][0] == STOP
     assert (line.taken, line.closed) == (1, False)
     bench.charging()
     assert line.closed
@@ -158,7 +158,7 @@ def test_an_exception_of_our_own_that_stays_opens_it_once_the_stop_has_had_its_t
     bench.charging()
     monkeypatch.setattr(bay_module, "step", broken)
     bench.step()
-    assert bench.charger.orders[-1][0] == STOP
+    assert bench.charger.commands[-1][0] == STOP
     assert line.closed, "a charger that obeys is without current before it opens"
     bench.step(16)
     assert not line.closed

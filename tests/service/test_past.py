@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.config.station import Rs485
-from orchestrator.core.faults import FAULTS, Clear, Row
+from orchestrator.core.faults import FAULTS, Clear, FaultRow
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.model import Cause, ControlMode, Session
@@ -265,7 +265,7 @@ def test_a_clock_that_tells_nonsense_is_not_asked(wall_s: float) -> None:
 
 
 @pytest.mark.parametrize("row", [row for row in FAULTS if row.clear is Clear.RESET], ids=lambda row: row.id)
-def test_what_has_latched_stays_so(row: Row) -> None:
+def test_what_has_latched_stays_so(row: FaultRow) -> None:
     name = row.id
     entries = [Entry(A, Persisted(faults={name: PersistedFault(cause("seen"), latched=True, raised=1.0)}), 1)]
     (entry,) = decode(encode(NOW, 1, entries), NOW)[1]

@@ -23,6 +23,7 @@ from orchestrator.model import (
     Command,
     Connection,
     ControlMode,
+    CurrentStep,
     Decision,
     Effect,
     Measurement,
@@ -32,7 +33,6 @@ from orchestrator.model import (
     Session,
     Snapshot,
     State,
-    Step,
 )
 from orchestrator.service.records import WHOLE_EVERY, SnapshotRecorder, decision_lines
 from tests.core.bays import charging
@@ -64,7 +64,7 @@ def test_the_first_decision_says_where_the_bay_begins() -> None:
 
 
 def test_nothing_new_says_nothing() -> None:
-    charging = Decision(State.CHARGING, cause("step 4"), step=Step(4, 14.0, cause("rule")), session=Session(1.0))
+    charging = Decision(State.CHARGING, cause("step 4"), step=CurrentStep(4, 14.0, cause("rule")), session=Session(1.0))
     longer = replace(charging, cause=cause("step 4, a second later"), session=Session(1.0, elapsed_s=1.0))
     assert kinds(charging, longer) == {}
 
@@ -76,8 +76,10 @@ def test_a_change_of_state_of_order_and_of_step() -> None:
         "command": {"action": "stop", "value": 0},
         "decision": {"state": "STOPPING", **both("hot"), "step": None},
     }
-    four = Decision(State.CHARGING, cause("a"), Command(Action.SET_LIMIT, 4), step=Step(4, 14.0, cause("rule of four")))
-    three = replace(four, command=Command(Action.SET_LIMIT, 3), step=Step(3, 11.0, cause("rule of three")))
+    four = Decision(
+        State.CHARGING, cause("a"), Command(Action.SET_LIMIT, 4), step=CurrentStep(4, 14.0, cause("rule of four"))
+    )
+    three = replace(four, command=Command(Action.SET_LIMIT, 3), step=CurrentStep(3, 11.0, cause("rule of three")))
     assert kinds(four, three) == {
         "command": {"action": "set_limit", "value": 3},
         "decision": {

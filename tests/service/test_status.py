@@ -21,6 +21,7 @@ from orchestrator.model import (
     ChargerReading,
     Connection,
     ControlMode,
+    CurrentStep,
     Decision,
     Effect,
     Measurement,
@@ -30,7 +31,6 @@ from orchestrator.model import (
     Setpoint,
     Snapshot,
     State,
-    Step,
 )
 from orchestrator.service.status import bay_status, station_status
 from orchestrator.text.catalogue import fields
@@ -43,7 +43,7 @@ CHARGING = Decision(
     State.CHARGING,
     cause("step 4"),
     setpoint=Setpoint(True, 4, ChargeMode.CHARGE, Precharge.OFF),
-    step=Step(4, 14.0, cause("limits.current_a")),
+    step=CurrentStep(4, 14.0, cause("limits.current_a")),
     faults=(
         ActiveFault(
             "noisy_line",

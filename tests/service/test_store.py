@@ -54,7 +54,7 @@ def running(directory: Path, *places: Place, clock: Clock | None = None) -> Iter
 
 
 def kept(store: Store, revision: int) -> None:
-    wait_until(lambda: store.kept_revision >= revision, what="what is kept")
+    wait_until(lambda: store.persisted_revision >= revision, what="what is kept")
 
 
 def as_written(cause: Cause) -> object:
@@ -95,7 +95,7 @@ def test_a_change_is_on_the_disk_when_its_revision_is_kept(tmp_path: Path) -> No
 
 
 def test_file_and_directory_are_synchronised_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a power cut it is the old file or the new one; once `kept_revision` confirms it, the new one."""
+    """After a power cut it is the old file or the new one; once `persisted_revision` confirms it, the new one."""
     worn = WornDisk.under(monkeypatch)
     with running(tmp_path) as store:
         kept(store, 1)
@@ -135,7 +135,7 @@ def session(directory: Path) -> dict[str, float]:
 
 def test_whoever_waits_is_told_what_has_come_to_the_disk(tmp_path: Path) -> None:
     told: list[Collection[Place]] = []
-    store = Store(tmp_path, [A, B], time.monotonic, time.time, on_kept=told.append)
+    store = Store(tmp_path, [A, B], time.monotonic, time.time, on_persisted=told.append)
     store.start()
     assert store.wait(5)
     kept(store, 1)
@@ -162,10 +162,10 @@ def test_a_disk_that_hangs_delays_nobody_and_is_told_after_two_seconds(
         for _ in range(100):
             store.put(B, HELD)
         assert time.monotonic() - began_s < 1
-        assert store.kept_revision < revision
+        assert store.persisted_revision < revision
         assert store.on_disk(A) is None, "nobody knows which of both is there"
-        assert say(store.unkept(clock.now_s + KEPT_WITHIN_S)) == ""
-        assert say(store.unkept(clock.now_s + KEPT_WITHIN_S + 0.1)) == (
+        assert say(store.not_persisted(clock.now_s + KEPT_WITHIN_S)) == ""
+        assert say(store.not_persisted(clock.now_s + KEPT_WITHIN_S + 0.1)) == (
             f"a restart would forget what changes: {tmp_path / FILE} is not written within 2 s"
         )
         began_s = time.monotonic()
@@ -186,12 +186,12 @@ def test_a_disk_that_refuses_is_told_at_once_and_asked_again(
         kept(store, 1)
         worn.fails[call] = FULL
         revision = store.put(A, HELD)
-        wait_until(lambda: store.unkept(time.monotonic()), what="the problem")
-        assert say(store.unkept(time.monotonic())).endswith(f"{FILE}: No space left on device")
-        assert store.kept_revision < revision
+        wait_until(lambda: store.not_persisted(time.monotonic()), what="the problem")
+        assert say(store.not_persisted(time.monotonic())).endswith(f"{FILE}: No space left on device")
+        assert store.persisted_revision < revision
         worn.heal()
         kept(store, revision)
-        assert say(store.unkept(time.monotonic())) == ""
+        assert say(store.not_persisted(time.monotonic())) == ""
 
 
 def test_an_end_on_a_full_disk_says_what_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,12 +213,12 @@ def test_a_change_that_comes_during_a_write_has_its_own_time(tmp_path: Path, mon
         clock.now_s += 1.5
         second = store.put(B, HELD)
         clock.now_s += 1.0
-        assert say(store.unkept(clock.now_s)) != ""
+        assert say(store.not_persisted(clock.now_s)) != ""
         worn.hangs.discard("fsync")
         worn.hangs.add("replace")
         worn.go.set()
         kept(store, second)
-        assert say(store.unkept(clock.now_s)) == ""
+        assert say(store.not_persisted(clock.now_s)) == ""
         worn.heal()
 
 
@@ -243,7 +243,9 @@ def test_a_fault_of_our_own_is_told_and_the_thread_lives_on(tmp_path: Path) -> N
     with running(tmp_path) as store:
         kept(store, 1)
         store.put(A, Persisted(full_pct=float("nan"), hold={1: 2, "a": object()}))  # type: ignore[arg-type]  # no JSON
-        wait_until(lambda: "internal error: TypeError" in say(store.unkept(time.monotonic())), what="the problem")
+        wait_until(
+            lambda: "internal error: TypeError" in say(store.not_persisted(time.monotonic())), what="the problem"
+        )
         assert not store.stalled(time.monotonic())
         kept(store, store.put(A, HELD))
 
@@ -428,7 +430,7 @@ def test_a_disk_that_does_not_tell_the_past_holds_every_bay_and_is_left_alone(
     assert not store.wait(0.1)
     assert say(store.past(A).hold).startswith(f"the disk of {tmp_path} does not answer: nobody knows")
     store.put(B, Persisted(running=True))
-    assert "restart the service once it does" in say(store.unkept(time.monotonic()))
+    assert "restart the service once it does" in say(store.not_persisted(time.monotonic()))
     worn.heal()
     assert say(store.close(5)) == f"the disk of {tmp_path} does not answer"
     assert (tmp_path / FILE).read_bytes() == before

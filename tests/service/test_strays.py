@@ -21,7 +21,7 @@ from tests.waiting import wait_until
 
 LOST = Place("bay-1", "/dev/lost", "can0", 16)
 READING = ChargerReading(
-    0.0, 48.0, 0.0, control_mode=ControlMode.MANUAL, operation=Operation.STOPPED, current_limit=0, charge_mode=None,
+    0.0, 48.0, 0.0, control_mode=ControlMode.MANUAL, operation=Operation.STOPPED, current_step=0, charge_mode=None,
     precharge=None, connection=None,
 )  # fmt: skip
 
@@ -30,15 +30,15 @@ class Port:
     """A charger port driven by hand."""
 
     def __init__(self) -> None:
-        self.orders: list[Command | None] = []
+        self.commands: list[Command | None] = []
         self.started = self.closed = False
         self.view: tuple[ChargerReading | None, ChargerLink] = (None, ChargerLink())
 
     def start(self) -> None:
         self.started = True
 
-    def order(self, command: Command | None) -> None:
-        self.orders.append(command)
+    def command(self, command: Command | None) -> None:
+        self.commands.append(command)
 
     def close(self) -> None:
         self.closed = True
@@ -79,7 +79,7 @@ def _case(tmp_path: Path) -> Iterator[Case]:
 
 def test_it_is_told_to_stop_and_people_are_told_of_it(case: Case) -> None:
     assert case.port.started
-    assert case.port.orders == [STOP]
+    assert case.port.commands == [STOP]
     assert [say(one) for one in case.strays.unverified] == ["bay-1 on /dev/lost"]
     assert case.said == [
         "bay-1 on /dev/lost: the station file has no bay on this port, but its charger may be running: stopping it"

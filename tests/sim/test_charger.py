@@ -5,24 +5,24 @@ from itertools import groupby
 import pytest
 
 from orchestrator.model import ChargeMode, Connection, ControlMode, Operation, Precharge
-from orchestrator.sim.bay import Bay
-from orchestrator.sim.charger import ROGUE_AFTER_S, Charger, Push
+from orchestrator.sim.bay import SimulatedBay
+from orchestrator.sim.charger import ROGUE_AFTER_S, Push, SimulatedCharger
 from orchestrator.sim.pack import Pack
 
 
-def a_bay(charger: Charger, soc: float = 50.0) -> Bay:
+def a_bay(charger: SimulatedCharger, soc: float = 50.0) -> SimulatedBay:
     pack = Pack()
     pack.set_soc(soc)
-    return Bay(charger, pack)
+    return SimulatedBay(charger, pack)
 
 
-def charging(step: int = 2) -> Charger:
-    charger = Charger()
+def charging(step: int = 2) -> SimulatedCharger:
+    charger = SimulatedCharger()
     start(charger, step, ChargeMode.CHARGE, Precharge.OFF)
     return charger
 
 
-def start(charger: Charger, step: int, mode: ChargeMode, function: Precharge) -> None:
+def start(charger: SimulatedCharger, step: int, mode: ChargeMode, function: Precharge) -> None:
     charger.rest(1)
     charger.push(Push.CURRENT_LIMIT, step)
     charger.push(Push.CHARGE_MODE, mode)
@@ -31,7 +31,7 @@ def start(charger: Charger, step: int, mode: ChargeMode, function: Precharge) ->
 
 
 def test_at_power_on_in_manual_it_stands() -> None:
-    bay = a_bay(Charger())
+    bay = a_bay(SimulatedCharger())
     bay.advance(5)
     assert (bay.charger.operation, bay.charger.current_a) == (Operation.STOPPED, 0)
     assert bay.charger.charge_mode is ChargeMode.FULL
@@ -57,22 +57,22 @@ def test_its_current_rises_gently_and_falls_at_once() -> None:
 
 
 def test_values_are_read_back_before_it_runs() -> None:
-    charger = Charger()
+    charger = SimulatedCharger()
     charger.push(Push.CURRENT_LIMIT, 3)
     charger.push(Push.CHARGE_MODE, 3)
     charger.push(Push.PRECHARGE, 2)
-    assert (charger.current_limit, charger.charge_mode, charger.precharge) == (3, ChargeMode.PRECHARGE, 2)
+    assert (charger.current_step, charger.charge_mode, charger.precharge) == (3, ChargeMode.PRECHARGE, 2)
     assert charger.operation is Operation.STOPPED
 
 
 @pytest.mark.parametrize("what", list(Push))
 @pytest.mark.parametrize("value", [0, 1, 2, 3, 4, 5, 6, 255])
 def test_only_documented_values_are_taken(what: Push, value: int) -> None:
-    charger = Charger()
+    charger = SimulatedCharger()
     charger.push(what, value)
     taken = {
         Push.OPERATION: int(charger.run),
-        Push.CURRENT_LIMIT: charger.current_limit,
+        Push.CURRENT_LIMIT: charger.current_step,
         Push.CHARGE_MODE: charger.mode,
         Push.PRECHARGE: charger.precharge,
     }[what]
@@ -88,22 +88,22 @@ def test_only_documented_values_are_taken(what: Push, value: int) -> None:
 
 @pytest.mark.parametrize("what", [0, 3, 0x0F, 0x10])
 def test_combined_and_unknown_pushes_do_nothing(what: int) -> None:
-    charger = Charger()
+    charger = SimulatedCharger()
     charger.push(what, 1)
-    assert charger == Charger()
+    assert charger == SimulatedCharger()
 
 
 def test_in_automatic_nothing_but_rest_is_obeyed() -> None:
-    charger = Charger(ControlMode.AUTOMATIC)
+    charger = SimulatedCharger(ControlMode.AUTOMATIC)
     for what in Push:
         charger.push(what, 3 if what is Push.CHARGE_MODE else 0)
-    assert charger == Charger(ControlMode.AUTOMATIC)
+    assert charger == SimulatedCharger(ControlMode.AUTOMATIC)
     charger.rest(0)
     assert charger.operation is Operation.STOPPED
 
 
 def test_standby_ignores_run_until_it_ends() -> None:
-    bay = a_bay(Charger())
+    bay = a_bay(SimulatedCharger())
     bay.charger.rest(0)
     bay.charger.push(Push.CHARGE_MODE, 4)
     bay.charger.push(Push.OPERATION, 1)
@@ -133,7 +133,7 @@ def test_a_stop_with_operation_0_is_not() -> None:
 
 
 def test_pulses_are_a_second_on_and_a_second_off() -> None:
-    charger = Charger()
+    charger = SimulatedCharger()
     start(charger, 0, ChargeMode.PRECHARGE, Precharge.PULSE)
     bay = a_bay(charger, -50)
     amps = []
@@ -148,7 +148,7 @@ def test_pulses_are_a_second_on_and_a_second_off() -> None:
 
 
 def test_continuous_precharge_is_small_and_steady_and_off_is_nothing() -> None:
-    charger = Charger()
+    charger = SimulatedCharger()
     start(charger, 4, ChargeMode.PRECHARGE, Precharge.CONTINUOUS)
     bay = a_bay(charger, -50)
     bay.advance(3)
@@ -215,7 +215,7 @@ def test_without_a_battery_it_searches() -> None:
 def test_automatic_wakes_charges_ends_and_begins_again() -> None:
     pack = Pack(capacity_ah=0.5, deep_ah=0.01)
     pack.set_soc(-100)
-    bay = Bay(Charger(ControlMode.AUTOMATIC), pack)
+    bay = SimulatedBay(SimulatedCharger(ControlMode.AUTOMATIC), pack)
     modes = [bay.charger.charge_mode]
     for _ in range(6000):
         bay.advance(0.1)
@@ -268,4 +268,4 @@ def test_a_deaf_charger_keeps_its_value() -> None:
     charger = charging(2)
     charger.deaf_to.add(Push.CURRENT_LIMIT)
     charger.push(Push.CURRENT_LIMIT, 4)
-    assert charger.current_limit == 2
+    assert charger.current_step == 2

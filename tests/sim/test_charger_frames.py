@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.model import ChargeMode, ControlMode, Precharge
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.charger_frames import Ear, Kind, Request, complaint, status
 from tests.sim.wires import framed
 
@@ -73,13 +73,13 @@ def test_the_printed_complaint_with_its_own_sum() -> None:
 
 def test_the_printed_reply() -> None:
     # §3.3.3: 50.11 V, 23.11 A, mode 3
-    charger = Charger(voltage_v=50.11, current_a=23.11, mode=ChargeMode.PRECHARGE)
+    charger = SimulatedCharger(voltage_v=50.11, current_a=23.11, mode=ChargeMode.PRECHARGE)
     assert status(charger, 0x03, 0x04, {}) == bytes.fromhex("AF FA 90 09 03 90 13 93 09 07 00 03 E5 AF A0")
 
 
 def test_all_ten_values_come_in_the_list_s_order() -> None:
-    charger = Charger(
-        voltage_v=48.0, current_a=5.0, current_limit=2, mode=ChargeMode.CHARGE, precharge=Precharge.PULSE, run=True
+    charger = SimulatedCharger(
+        voltage_v=48.0, current_a=5.0, current_step=2, mode=ChargeMode.CHARGE, precharge=Precharge.PULSE, run=True
     )
     body = "90 17 03 90 12 C0 01 F4 00 00 00 00 00 01 00 01 00 02 00 04 00 01 00 01"
     assert status(charger, 0xFF, 0xFF, {}) == bytes.fromhex(framed(body))
@@ -90,8 +90,8 @@ def test_what_is_asked_for_is_what_comes(kind1: int, kind2: int) -> None:
     lies = {kind: 0x0100 + kind for kind in Kind}
     asked = [bit for bit in range(5) if kind1 >> bit & 1] + [5 + bit for bit in range(5) if kind2 >> bit & 1]
     body = bytes((0x90, 3 + 2 * len(asked), 0x03, 0x90)) + b"".join(bytes((1, kind)) for kind in asked)
-    assert status(Charger(), kind1, kind2, lies) == bytes.fromhex(framed(body.hex()))
+    assert status(SimulatedCharger(), kind1, kind2, lies) == bytes.fromhex(framed(body.hex()))
 
 
 def test_a_charger_in_automatic_says_so() -> None:
-    assert status(Charger(ControlMode.AUTOMATIC), 0x10, 0, {}) == bytes.fromhex(framed("90 05 03 90 00 00"))
+    assert status(SimulatedCharger(ControlMode.AUTOMATIC), 0x10, 0, {}) == bytes.fromhex(framed("90 05 03 90 00 00"))

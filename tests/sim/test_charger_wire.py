@@ -10,10 +10,10 @@ import pytest
 
 from orchestrator.model import ChargeMode, Operation
 from orchestrator.sim.background import Background
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.charger_frames import Kind
 from orchestrator.sim.charger_wire import ChargerWire
-from orchestrator.sim.line import BYTE_S, LINES, Line
+from orchestrator.sim.line import BYTE_S, LINES, SimulatedLine
 from tests.sim.wires import Port, framed
 from tests.waiting import wait_until
 
@@ -26,8 +26,8 @@ CHECKSUM_COMPLAINT = framed("90 07 1F 08 05 01 90 2E")
 
 
 @contextlib.contextmanager
-def charger_on(line: Line, link: Path | None = None) -> Iterator[tuple[ChargerWire, Port, Background]]:
-    charger = Charger(voltage_v=50.11, current_a=23.11, mode=ChargeMode.PRECHARGE)
+def charger_on(line: SimulatedLine, link: Path | None = None) -> Iterator[tuple[ChargerWire, Port, Background]]:
+    charger = SimulatedCharger(voltage_v=50.11, current_a=23.11, mode=ChargeMode.PRECHARGE)
     with Background() as background:
         wire = ChargerWire(background.loop, charger, line=line, link=link)
         background.call(wire.open)
@@ -124,7 +124,7 @@ def test_a_real_line_takes_the_time_of_its_bytes() -> None:
 
 
 def test_bytewise_answers_come_in_many_pieces() -> None:
-    with charger_on(Line(byte_s=0.004, bytewise=True)) as (_, port, _):
+    with charger_on(SimulatedLine(byte_s=0.004, bytewise=True)) as (_, port, _):
         port.write(POLL)
         sizes: list[int] = []
         while sum(sizes) < 15:

@@ -3,8 +3,8 @@
 import pytest
 
 from orchestrator.model import ChargeMode, Precharge
-from orchestrator.sim.bay import Bay
-from orchestrator.sim.charger import Charger, Push
+from orchestrator.sim.bay import SimulatedBay
+from orchestrator.sim.charger import Push, SimulatedCharger
 from orchestrator.sim.presets import demo
 
 #: What the policy and the core do: pulse to 35.1 V, continuous to 39.0 V, each for 2 s more; step 4 until 90 %, then 2.
@@ -16,7 +16,7 @@ class Charge:
     """One charge and its observations."""
 
     def __init__(self) -> None:
-        self.bay = Bay(Charger(), demo())
+        self.bay = SimulatedBay(SimulatedCharger(), demo())
         self.t_s = 0.0
         self.top_v = self.top_c = 0.0
         self.worst_apart_v = self.worst_jump_pct = 0.0

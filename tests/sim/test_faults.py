@@ -12,9 +12,9 @@ import can
 import pytest
 
 from orchestrator.model import BatteryStatus, ChargeMode, Connection, ControlMode, Operation
-from orchestrator.sim.bay import Bay
+from orchestrator.sim.bay import SimulatedBay
 from orchestrator.sim.can_wire import CanWire
-from orchestrator.sim.charger import ROGUE_AFTER_S, Charger, Push
+from orchestrator.sim.charger import ROGUE_AFTER_S, Push, SimulatedCharger
 from orchestrator.sim.charger_frames import Kind
 from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.presets import pack_48v
@@ -36,10 +36,10 @@ class Scene:
 
 @pytest.fixture(name="scene")
 def _scene(tmp_path: Path) -> Iterator[Scene]:
-    charger = Charger()
+    charger = SimulatedCharger()
     for what, value in ((Push.CURRENT_LIMIT, 2), (Push.CHARGE_MODE, 4), (Push.OPERATION, 1)):
         charger.push(what, value)
-    bay = Bay(charger, pack_48v())
+    bay = SimulatedBay(charger, pack_48v())
     bay.advance(2)
     loop = asyncio.new_event_loop()
     bus = can.Bus(interface="virtual", channel=f"faults-{next(CHANNELS)}")
@@ -81,7 +81,7 @@ def rogue(rig: Rig) -> bool:
 
 def ignores_a_limit(rig: Rig) -> bool:
     rig.bay.charger.push(Push.CURRENT_LIMIT, 4)
-    return rig.bay.charger.current_limit == 0
+    return rig.bay.charger.current_step == 0
 
 
 def ignores_a_stop(rig: Rig) -> bool:
@@ -100,7 +100,7 @@ def does_not_rise(rig: Rig) -> bool:
 def back_at_its_highest(rig: Rig) -> bool:
     rig.bay.charger.push(Push.CURRENT_LIMIT, 0)
     rig.bay.advance(0.3)
-    return rig.bay.charger.current_limit == 4
+    return rig.bay.charger.current_step == 4
 
 
 def runs_again(rig: Rig) -> bool:
@@ -242,8 +242,8 @@ def test_a_battery_can_live_faster_than_the_clock(tmp_path: Path) -> None:
     loop = asyncio.new_event_loop()
     bus = can.Bus(interface="virtual", channel=f"faults-{next(CHANNELS)}")
     wire = CanWire(loop, bus)
-    charger = Charger(run=True, mode=ChargeMode.CHARGE, current_limit=2)
-    rig = Rig(loop, wire, Bay(charger, pack_48v()), Setup(node_id=0x10, speed=1000.0))
+    charger = SimulatedCharger(run=True, mode=ChargeMode.CHARGE, current_step=2)
+    rig = Rig(loop, wire, SimulatedBay(charger, pack_48v()), Setup(node_id=0x10, speed=1000.0))
 
     def soc_pct() -> float:
         rig.catch_up()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from orchestrator.sim.line import LINES, Line, Noise
+from orchestrator.sim.line import LINES, Noise, SimulatedLine
 
 FRAME = bytes(range(20))
 
@@ -29,7 +29,7 @@ def test_the_garbage_line_puts_rubbish_before_every_other_frame() -> None:
 
 
 def test_the_same_seed_spoils_the_same_frames() -> None:
-    line = Line(loss=0.5, garbage=0.5, seed=7)
+    line = SimulatedLine(loss=0.5, garbage=0.5, seed=7)
     first, second = Noise(line), Noise(line)
     assert [first.spoil(FRAME) for _ in range(50)] == [second.spoil(FRAME) for _ in range(50)]
 

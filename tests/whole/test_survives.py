@@ -103,12 +103,12 @@ def test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one(station: Station) -
     journal = service.directory / "run" / "journal"
     (journal / "persisted.json.new").symlink_to("/dev/full")
     answer = service.ask("stop", "bay-1")["bay-1"]
-    assert answer.startswith("done, but not kept: a restart would forget what changes: ")
+    assert answer.startswith("done, but not saved: a restart would forget what changes: ")
     assert answer.endswith("persisted.json: No space left on device")
     assert plant.state(1)["operation"] == 0
     service.signal(signal.SIGTERM)
     assert service.ended() == 1
-    assert service.log().splitlines()[-1] == f"ended: NOT kept: {journal / 'persisted.json'}: No space left on device"
+    assert service.log().splitlines()[-1] == f"ended: NOT saved: {journal / 'persisted.json'}: No space left on device"
     assert (plant.state(1)["operation"], plant.state(2)["operation"]) == (0, 0)
 
 
@@ -127,14 +127,16 @@ def test_a_disk_that_hangs_delays_no_stop_and_is_named_at_the_end(station: Stati
         wait_until(lambda: plant.state(1)["operation"] == 0, 2, "the stop")
         assert time.monotonic() - began_s < 1
         asking.join()
-        assert answers[0].startswith("done, but not kept: a restart would forget what changes: ")
-        wait_until(lambda: "unkept" in [fault["id"] for fault in service.bay("bay-2")["faults"]], what="the fault")
+        assert answers[0].startswith("done, but not saved: a restart would forget what changes: ")
+        wait_until(
+            lambda: "not_persisted" in [fault["id"] for fault in service.bay("bay-2")["faults"]], what="the fault"
+        )
         assert service.bay("bay-2")["state"] == "CHARGING", "what is under way goes on"
         began_s = time.monotonic()
         service.signal(signal.SIGTERM)
         assert service.ended() == 1
         assert time.monotonic() - began_s < 9
-        assert "ended: NOT kept: " in service.log()
+        assert "ended: NOT saved: " in service.log()
         assert service.log().splitlines()[-1].endswith("is not written within 2.5 s: its disk hangs")
         assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
     finally:
@@ -156,7 +158,7 @@ def test_a_disk_that_does_not_tell_the_past_holds_every_bay_after_the_stops(stat
         assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
         service.signal(signal.SIGTERM)
         assert service.ended() == 1
-        assert "NOT kept: " in service.log().splitlines()[-1]
+        assert "NOT saved: " in service.log().splitlines()[-1]
     finally:
         service.close()
     assert {entry["running"] for entry in kept(healthy).values()} == {True}, "what was there was left alone"

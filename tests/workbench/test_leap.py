@@ -8,9 +8,9 @@ import pytest
 
 from orchestrator.config.load import load_policy, load_scenario
 from orchestrator.config.scenario import Ask, Defect, Sensor, SensorFault
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory, names, paths, value_of, with_values
 from orchestrator.core.parts import Kind
-from orchestrator.core.step import step
 from orchestrator.model import Decision, Request, State
 from orchestrator.workbench.processes import cores
 from orchestrator.workbench.simulate import simulation
@@ -91,7 +91,7 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
     memories: list[Memory] = []
 
     def recorded(*arguments: object) -> tuple[Decision, Memory]:
-        decision, memory = step(*arguments)  # type: ignore[arg-type]  # handed on as it came
+        decision, memory = decide(*arguments)  # type: ignore[arg-type]  # handed on as it came
         memories.append(memory)
         return decision, memory
 

@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.config.load import load_policy
-from orchestrator.core import course
+from orchestrator.core import next_transition
 from orchestrator.model import Cause, Request, State
 from orchestrator.service.records import WHOLE_EVERY
 from orchestrator.workbench.replay.again import again
@@ -79,7 +79,7 @@ def test_the_same_rules_decide_the_same_bit_for_bit(journal: Path, capsys: pytes
 def test_a_core_that_decides_otherwise_is_seen(
     journal: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(course, "QUALIFY_S", 2.5)
+    monkeypatch.setattr(next_transition, "QUALIFY_S", 2.5)
     assert main(["replay", str(journal)]) == 1
     assert "the journal says ['transition', {'from': 'QUALIFYING'" in capsys.readouterr().out
 

@@ -19,7 +19,7 @@ from orchestrator.config.yaml.tree import Entries, Items, Mark, Node, Refused, S
 from orchestrator.config.yaml.unknown import unknown_key
 from orchestrator.config.yesterday import ROWS, Yesterday
 from orchestrator.errors import Finding
-from orchestrator.keys import Key, Range, Source
+from orchestrator.keys import KeyRule, Range, Source
 
 MAX_FINDINGS = 200  #: in one file; the rest can wait until these are mended
 
@@ -72,7 +72,7 @@ class Reader:
 
     # --- by kind of type -------------------------------------------------------------------------------------------
 
-    def _value(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+    def _value(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
         value: object
         if get_origin(hint) in (Union, UnionType):
             if scalars.is_null(node):
@@ -98,7 +98,7 @@ class Reader:
             self.values[path] = value
         return value
 
-    def _scalar(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+    def _scalar(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
         if not isinstance(node, Scalar):
             self._report(node.mark, f"{path}: needs one value here, not {_kind(node)}: {key.about}")
             return INVALID
@@ -118,7 +118,7 @@ class Reader:
             self.report(path, str(error))
             return INVALID
 
-    def _range(self, node: Node, path: str, key: Key) -> object:
+    def _range(self, node: Node, path: str, key: KeyRule) -> object:
         if not isinstance(node, Items) or len(node.items) != 2:
             meant = scalars.range_meant(node.text) if isinstance(node, Scalar) else ""
             much = f", two numbers (2.5, not 2,5), not {len(node.items)}" if isinstance(node, Items) else ""
@@ -132,7 +132,7 @@ class Reader:
         self._report(node.mark, f"{path}: [low, high] with low below high, not [{low:g}, {high:g}]")
         return INVALID
 
-    def _items(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+    def _items(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
         if not isinstance(node, Items):
             self.report(path, f"needs a list, [a, b, …] or a line '- …' for each item: {key.about}")
             return INVALID
@@ -142,7 +142,7 @@ class Reader:
         values = tuple(self._element(item, hint, f"{path}[{i}]", key) for i, item in enumerate(node.items))
         return INVALID if INVALID in values else values
 
-    def _as_it_is(self, node: Items | Entries, path: str, key: Key) -> object:
+    def _as_it_is(self, node: Items | Entries, path: str, key: KeyRule) -> object:
         """A list or a mapping for a library that is handed it as it is, whatever is in it."""
         if isinstance(node, Items):
             items = [self._element(item, object, f"{path}[{i}]", key) for i, item in enumerate(node.items)]
@@ -152,12 +152,12 @@ class Reader:
         }
         return INVALID if INVALID in values.values() else values
 
-    def _element(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+    def _element(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
         self.marks[path] = node.mark
         self._lines[path] = node.mark.line
         return self._value(node, hint, path, key)
 
-    def _mapping(self, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - any type expression
+    def _mapping(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
         if not isinstance(node, Entries) or not node.entries:
             self.report(path, f"needs names with their values, indented below it: {key.about}")
             return INVALID
@@ -166,7 +166,7 @@ class Reader:
             values[name.text] = self._entry(name, value, hint, f"{path}.{name.text}", key)
         return INVALID if INVALID in values.values() else values
 
-    def _entry(self, name: Scalar, node: Node, hint: Any, path: str, key: Key) -> object:  # noqa: ANN401 - as above
+    def _entry(self, name: Scalar, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - as above
         self.marks[path] = node.mark if node.mark.line == name.mark.line and not _empty(node) else name.mark
         self._lines[path] = name.mark.line
         return self._value(node, hint, path, key)

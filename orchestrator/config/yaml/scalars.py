@@ -11,7 +11,7 @@ from difflib import SequenceMatcher
 from enum import Enum
 
 from orchestrator.config.yaml.tree import Scalar
-from orchestrator.keys import Key
+from orchestrator.keys import KeyRule
 
 _NUMBER = re.compile(r"[-+]?(0|[1-9]\d*)(\.\d+)?", re.ASCII)
 _HEX = re.compile(r"0x[\da-fA-F]+", re.ASCII)
@@ -56,7 +56,7 @@ def quantity(value: float, unit: str) -> str:
     return f"{value:.10g}" + (f" {unit}" if unit else "")
 
 
-def allowed(key: Key) -> str:
+def allowed(key: KeyRule) -> str:
     """The bounds of a key in words, e.g. "above 0, at most 100 %"."""
     if key.ge is not None and key.le is not None:
         return f"{key.ge:g} … {key.le:g} {key.unit}".rstrip()
@@ -66,7 +66,7 @@ def allowed(key: Key) -> str:
     return f"{bounds} {key.unit}".rstrip() if bounds else ""
 
 
-def bounded(value: float, key: Key) -> float:
+def bounded(value: float, key: KeyRule) -> float:
     """`value` itself, if it lies within the key's bounds."""
     low = (key.ge is not None and value < key.ge) or (key.gt is not None and value <= key.gt)
     high = (key.le is not None and value > key.le) or (key.lt is not None and value >= key.lt)
@@ -75,14 +75,14 @@ def bounded(value: float, key: Key) -> float:
     return value
 
 
-def read_float(node: Scalar, key: Key) -> float:
+def read_float(node: Scalar, key: KeyRule) -> float:
     """A decimal number without exponent."""
     if node.plain and len(node.text) <= _MAX_DIGITS and _NUMBER.fullmatch(node.text):
         return bounded(float(node.text), key)
     raise UnfitError(_why_no_number(node, key))
 
 
-def read_int(node: Scalar, key: Key) -> int:
+def read_int(node: Scalar, key: KeyRule) -> int:
     """A whole number, decimal or 0x… hexadecimal."""
     if node.plain and len(node.text) <= _MAX_DIGITS:
         if _HEX.fullmatch(node.text):
@@ -94,7 +94,7 @@ def read_int(node: Scalar, key: Key) -> int:
     raise UnfitError(_why_no_number(node, key))
 
 
-def read_bool(node: Scalar, _key: Key) -> bool:
+def read_bool(node: Scalar, _key: KeyRule) -> bool:
     """`true` or `false`."""
     if node.plain and node.text in ("true", "false"):
         return node.text == "true"
@@ -103,7 +103,7 @@ def read_bool(node: Scalar, _key: Key) -> bool:
     raise UnfitError(f"write {meant}{'' if node.plain else ' without quotes'}, not {shown(node.text)}")
 
 
-def read_str(node: Scalar, key: Key) -> str:
+def read_str(node: Scalar, key: KeyRule) -> str:
     """One non-empty line of text."""
     if not node.text.strip():
         raise UnfitError(f"needs a text: {key.about}")
@@ -112,7 +112,7 @@ def read_str(node: Scalar, key: Key) -> str:
     return node.text
 
 
-def read_path(node: Scalar, key: Key) -> str:
+def read_path(node: Scalar, key: KeyRule) -> str:
     """A path; a bare name is refused for a device."""
     text = read_str(node, key)
     if len(text) > _MAX_PATH:
@@ -137,7 +137,7 @@ def read_enum(node: Scalar, kind: type[Enum]) -> Enum:
     raise UnfitError(f"{shown(node.text)} is not one of the words allowed here; {did_you_mean(node.text, members)}")
 
 
-def read_any(node: Scalar, key: Key) -> object:
+def read_any(node: Scalar, key: KeyRule) -> object:
     """A value to be passed unchanged to a library: null, true/false, a number or a text."""
     if not node.plain:
         return read_str(node, key) if node.text else ""
@@ -211,7 +211,7 @@ _HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
 )
 
 
-def _why_no_number(node: Scalar, key: Key) -> str:
+def _why_no_number(node: Scalar, key: KeyRule) -> str:
     kind = f"a number in {key.unit}" if key.unit else "a number"
     text = node.text
     if not node.text.strip():

@@ -6,7 +6,7 @@ from dataclasses import dataclass, is_dataclass
 from functools import cache
 from typing import Any, Final, get_args, get_type_hints
 
-from orchestrator.keys import Key, Range
+from orchestrator.keys import KeyRule, Range
 
 INVALID: Final = object()  #: stands in for a value that is already a finding
 
@@ -18,7 +18,7 @@ class Slot:
     name: str
     field: str
     hint: Any
-    key: Key
+    key: KeyRule
     default: object  #: INVALID if the key is required
 
 

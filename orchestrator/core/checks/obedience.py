@@ -71,8 +71,8 @@ def did_not_stop(cause: Cause, lasted_s: float) -> Cause:
 
 def will_not_start(f: Facts) -> Cause | None:
     """FAULTS C7."""
-    order = f.memory.sequence.order
-    if order is None or order.action not in (Action.RUN, Action.RESUME) or not f.energised:
+    command = f.memory.sequence.command
+    if command is None or command.action not in (Action.RUN, Action.RESUME) or not f.energised:
         return None
     return _unconfirmed("will_not_start", f, Action.RUN.value, None)
 
@@ -132,12 +132,12 @@ def loose_plug(f: Facts) -> Cause | None:
 
 def setting_not_obeyed(f: Facts) -> Cause | None:
     """FAULTS C9, C16."""
-    order = f.memory.sequence.order
-    if order is None or order.action in (Action.RUN, Action.RESUME, Action.STOP) or not f.energised:
+    command = f.memory.sequence.command
+    if command is None or command.action in (Action.RUN, Action.RESUME, Action.STOP) or not f.energised:
         return None
-    if order.action is Action.SET_LIMIT:  # said as people count steps
-        return _unconfirmed("setting_not_obeyed", f, "step", order.value + 1)
-    return _unconfirmed("setting_not_obeyed", f, order.action.value.removeprefix("set_"), order.value)
+    if command.action is Action.SET_LIMIT:  # said as people count steps
+        return _unconfirmed("setting_not_obeyed", f, "step", command.value + 1)
+    return _unconfirmed("setting_not_obeyed", f, command.action.value.removeprefix("set_"), command.value)
 
 
 def contactor_lost(f: Facts) -> Cause | None:
@@ -145,12 +145,12 @@ def contactor_lost(f: Facts) -> Cause | None:
     return f.snapshot.contactor_problem
 
 
-def _unconfirmed(id_: str, f: Facts, order: str, value: int | None) -> Cause | None:
-    waited_s = f.now_s - f.memory.sequence.order_s
+def _unconfirmed(id_: str, f: Facts, command: str, value: int | None) -> Cause | None:
+    waited_s = f.now_s - f.memory.sequence.command_s
     if waited_s < OBEY_S:
         return None
     held = Cause.of("held_back", refused=f.charger.refused) if f.charger.refused else None
-    return Cause.of(id_, order=order, value=value, waited_s=waited_s, held=held)
+    return Cause.of(id_, command=command, value=value, waited_s=waited_s, held=held)
 
 
 def over_current(f: Facts) -> Cause | None:
@@ -159,8 +159,8 @@ def over_current(f: Facts) -> Cause | None:
     if reading is None:
         return None
     limit_a = rules.bay.limits.current_a
-    if rules.manual and reading.current_limit is not None:
-        limit_a = min(limit_a, max([rules.steps_a[step] for step in _steps_in_force(f, reading.current_limit)]))
+    if rules.manual and reading.current_step is not None:
+        limit_a = min(limit_a, max([rules.steps_a[step] for step in _steps_in_force(f, reading.current_step)]))
     allowed_a = limit_a * rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
     if reading.current_a <= allowed_a:
         return None

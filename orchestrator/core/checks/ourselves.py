@@ -38,6 +38,6 @@ def suspended(f: Facts) -> Cause | None:
     return Cause.of("suspended", slept_s=slept_s)
 
 
-def unkept(f: Facts) -> Cause | None:
+def not_persisted(f: Facts) -> Cause | None:
     """FAULTS G8: a charge goes on, but none begins of which a latched fault would be forgotten by a restart."""
-    return f.snapshot.unkept
+    return f.snapshot.not_persisted

@@ -50,7 +50,7 @@ def _departure(f: Facts, known: BatteryHistory) -> BatteryHistory:
     """A battery that leaves in mid-charge and is back at once: its plug is loose."""
     if known.returned_s is not None:
         known = changed(known, returned_s=None)
-    if f.departed:
+    if f.battery_removed:
         session, volts = f.memory.session, f.snapshot.battery.voltage_v
         if session is not None and known.left_s is None:
             left_as = (session.soc_pct, volts.value if volts is not None else None)
@@ -75,7 +75,7 @@ def _charge(f: Facts, known: BatteryHistory) -> tuple[tuple[float, float | None]
     A battery that was seen to leave, or whose BMU boots, is forgotten: what comes is qualified as another one.
     """
     newest, charge = f.snapshot.battery.soc_pct, known.charge
-    if f.departed or known.boots != f.battery.boots:
+    if f.battery_removed or known.boots != f.battery.boots:
         charge = (f.now_s, None)
     before_s, before_pct = charge
     if newest is None or f.soc is None or newest.t_s <= before_s:

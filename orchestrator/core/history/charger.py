@@ -38,10 +38,10 @@ def update(f: Facts, passed_s: float) -> ChargerHistory:
 def _settings(f: Facts, known: ChargerHistory, reading: ChargerReading) -> ChargerHistory:
     """The step that the charger shows, and how often it went back from one that it had confirmed."""
     step = f.memory.stage.step
-    if reading.current_limit != known.limit:
-        known = changed(known, limit_before=known.limit, limit=reading.current_limit, limit_s=f.now_s)
+    if reading.current_step != known.limit:
+        known = changed(known, limit_before=known.limit, limit=reading.current_step, limit_s=f.now_s)
     told = f.energised and f.rules.manual and step is not None
-    shows = told and step is not None and reading.current_limit == step.index
+    shows = told and step is not None and reading.current_step == step.index
     if told and known.confirmed and not shows and reading.operation is Operation.RUNNING:
         recent = (t_s for t_s in known.reverts if f.now_s - t_s < REVERTS_S)
         known = changed(known, reverts=(*recent, f.now_s))

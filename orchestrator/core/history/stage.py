@@ -7,7 +7,7 @@ from orchestrator.core.memory import Stage
 from orchestrator.core.parts import changed
 from orchestrator.core.witnesses.followed import FIRST_A
 from orchestrator.core.witnesses.standby import sees_current
-from orchestrator.model import Action, ChargeMode, Operation, State, Step
+from orchestrator.model import Action, ChargeMode, CurrentStep, Operation, State
 
 EMPTY = Stage()
 #: The modes that a charger may be told.
@@ -30,10 +30,10 @@ def _began(f: Facts, stage: Stage) -> Stage:
     The charger says that it runs; or the BMU has seen its current; or the charger, which had left standby and shown the
     mode that it was told, is in standby again.
     """
-    reading, order = f.reading, f.memory.sequence.order
+    reading, command = f.reading, f.memory.sequence.command
     if reading is not None and reading.operation is Operation.RUNNING:
         return changed(stage, ran=True)
-    ordered = order is not None and order.action is Action.RUN
+    ordered = command is not None and command.action is Action.RUN
     if ordered and sees_current(f) and (f.pack_a or 0.0) - f.memory.witnessed.before_a >= FIRST_A:
         return changed(stage, ran=True)
     if reading is None or not f.rules.manual:
@@ -76,7 +76,7 @@ def reaches(f: Facts, stage: Stage, *, holds: bool) -> Stage:
     return stage if reached_s == stage.reached_s else changed(stage, reached_s=reached_s)
 
 
-def chosen(stage: Stage, step: Step, raise_s: float | None, *, anew: bool) -> Stage:
+def chosen(stage: Stage, step: CurrentStep, raise_s: float | None, *, anew: bool) -> Stage:
     """The step for now. `anew`: the charge goes on with another one; another current follows, a taper counts anew."""
     if step is stage.step and raise_s == stage.raise_s:
         return stage

@@ -83,7 +83,7 @@ ADVICE: Mapping[str, str] = {
     "late": "find out what keeps this machine busy",
     "overrun": "find out what keeps this machine busy",
     "suspended": "a gateway must not be suspended: switch that off in its operating system",
-    "unkept": "make space, or mend the disk of the journal's directory",
+    "not_persisted": "make space, or mend the disk of the journal's directory",
     "internal": "this is a defect of the software: report it with the journal, then reset",
     # once the charger stands by
     "stands_by_now": "the charger stands by now: have the cause repaired, then reset",

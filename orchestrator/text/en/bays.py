@@ -9,7 +9,7 @@ TEXTS: Mapping[str, str] = {
     "service_started": "the service has just started",
     "service_ends": "the service ends: {why}",
     "no_answer": "the control loop has not answered: look at the service's log",
-    "not_kept": "done, but not kept: {problem}",
+    "done_not_persisted": "done, but not saved: {problem}",
     "not_done": "not done: {problem}",
     "not_taken": "the disk has not taken it",
     "overtaken": "a stop came meanwhile: ask again if it is still wanted",

@@ -94,7 +94,7 @@ CODES: Mapping[str, str] = {
     # values of a charger's status
     "control_mode": "control mode",
     "operation": "operation",
-    "current_limit": "current limit",
+    "current_step": "current limit",
     "charge_mode": "charge mode",
     "connection": "battery connection",
     # orders to it

@@ -32,11 +32,11 @@ TEXTS: Mapping[str, str] = {
     "did_not_stop": "it did not obey the stop for {lasted_s:.0f} s",
     "stop_was_contradicted": "the BMU saw current for {lasted_s:.0f} s while the charger said none: one of them "
     "was wrong",
-    "will_not_start": "the charger was told '{order:word}' for {waited_s:.1f} s and its status {does|did} not show it{held:after}",
+    "will_not_start": "the charger was told '{command:word}' for {waited_s:.1f} s and its status {does|did} not show it{held:after}",
     "stopped_by_itself": "the charger stopped though it was told to run",
     "stopped_not_full": "the charger stopped though it was told to run, and its mode 5 {is|was} not taken for full: the "
     "current had not tapered off and the pack {has|had} not reached its end voltage",
-    "setting_not_obeyed": "the charger was told '{order:word} {value}' for {waited_s:.1f} s and its status {does|did} not "
+    "setting_not_obeyed": "the charger was told '{command:word} {value}' for {waited_s:.1f} s and its status {does|did} not "
     "show it{held:after}",
     "held_back": "the interlock {holds|held} it back: {refused}",
     "limit_reverted": "the charger confirmed the step that it was told and went back by itself {times} times within a "

@@ -39,14 +39,14 @@ TEXTS: Mapping[str, str] = {
     "program": "{name} (pid {pid})",
     "program_unknown": "an unknown program",
     # what the interlock has held back
-    "no_order": "{order:word} {value} is no order for a charger in {control:word} mode",
-    "no_evidence": "{order:word}: no fresh reading of charger, pack voltage and pack temperature",
-    "not_on_disk": "{order:word}: it is not on disk that this charger may be running",
-    "evidence_old": "{order:word}: the readings that it rests on are {age_s:.1f} s too old",
-    "above_station_v": "{order:word}: {voltage_v:g} V is above the station's {limit_v:g} V",
-    "outside_station_c": "{order:word}: {pack_c:g} °C is outside the station's {low_c:g} … {high_c:g} °C",
-    "step_unknown": "{order:word}: what the charger's current limit {step:d} means is not known",
-    "above_station_a": "{order:word}: step {step} is {step_a:g} A, above the station's {limit_a:g} A",
+    "no_command": "{command:word} {value} is not a command for a charger in {control:word} mode",
+    "no_grant": "{command:word}: no fresh reading of charger, pack voltage and pack temperature",
+    "not_on_disk": "{command:word}: it is not on disk that this charger may be running",
+    "grant_old": "{command:word}: the readings that it rests on are {age_s:.1f} s too old",
+    "above_station_v": "{command:word}: {voltage_v:g} V is above the station's {limit_v:g} V",
+    "outside_station_c": "{command:word}: {pack_c:g} °C is outside the station's {low_c:g} … {high_c:g} °C",
+    "step_unknown": "{command:word}: what the charger's current limit {step:d} means is not known",
+    "above_station_a": "{command:word}: step {step} is {step_a:g} A, above the station's {limit_a:g} A",
     # a contactor's GPIO line
     "gpio_missing": "{chip} line {line}: no such GPIO chip: check the name in the station file (gpiodetect lists them)",
     "gpio_forbidden": "{chip} line {line}: permission denied: add the user that runs this to the chip's group (ls -l "

@@ -12,7 +12,7 @@ TEXTS: Mapping[str, str] = {
     "ended": "ended: {verdicts:then}",
     "ended_well": "ended: every charger stands by, verified",
     "not_verified": "NOT verified: {chargers:word}",
-    "not_written": "NOT kept: {problem}",
+    "not_written": "NOT saved: {problem}",
     # its disk
     "would_forget": "a restart would forget what changes: {problem}",
     "disk_failed": "{file}: {error:word}",
@@ -75,7 +75,7 @@ TEXTS: Mapping[str, str] = {
     "too_many_requests": "too many requests at once: ask again",
     "request_internal": "internal: {error}",
     "request_unanswered": "internal: no answer",
-    "dropped_not_kept": "dropped, but not kept: {problem}",
+    "dropped_not_persisted": "dropped, but not saved: {problem}",
     # around the table of the status
     "alarm": "ALARM: {what}",
     "warning": "WARNING: {what}",

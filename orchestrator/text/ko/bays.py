@@ -9,7 +9,7 @@ TEXTS: Mapping[str, str] = {
     "service_started": "서비스가 방금 시작되었습니다",
     "service_ends": "서비스가 종료됩니다: {why}",
     "no_answer": "제어 루프가 응답하지 않았습니다: 서비스의 로그를 확인하십시오",
-    "not_kept": "수행했으나 저장되지 않았습니다: {problem}",
+    "done_not_persisted": "수행했으나 저장되지 않았습니다: {problem}",
     "not_done": "수행하지 않았습니다: {problem}",
     "not_taken": "디스크가 아직 받아들이지 않았습니다",
     "overtaken": "그 사이에 정지 요청이 있었습니다: 여전히 필요하면 다시 요청하십시오",

@@ -94,7 +94,7 @@ CODES: Mapping[str, str] = {
     # values of a charger's status
     "control_mode": "제어 모드",
     "operation": "동작 상태",
-    "current_limit": "전류 제한",
+    "current_step": "전류 제한",
     "charge_mode": "충전 모드",
     "connection": "연결 상태",
     # orders to it

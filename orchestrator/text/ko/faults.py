@@ -30,11 +30,11 @@ TEXTS: Mapping[str, str] = {
     "did_not_stop": "{lasted_s:.0f} s 동안 정지 명령에 따르지 않았습니다",
     "stop_was_contradicted": "{lasted_s:.0f} s 동안 BMU에는 전류가 보이고 충전기는 전류가 없다고 했습니다: 둘 중 하나가 "
     "틀렸습니다",
-    "will_not_start": "충전기에 '{order:word}' 명령을 {waited_s:.1f} s 동안 보냈으나 상태에 나타나지 {않습니다|않았습니다}{held:after}",
+    "will_not_start": "충전기에 '{command:word}' 명령을 {waited_s:.1f} s 동안 보냈으나 상태에 나타나지 {않습니다|않았습니다}{held:after}",
     "stopped_by_itself": "기동을 명령했는데 충전기가 정지했습니다",
     "stopped_not_full": "기동을 명령했는데 충전기가 정지했습니다. 전류가 줄어들지 않았고 팩이 종료 전압에 도달하지 "
     "않았으므로 모드 5를 충전 완료로 인정하지 {않습니다|않았습니다}",
-    "setting_not_obeyed": "충전기에 '{order:word} {value}' 명령을 {waited_s:.1f} s 동안 보냈으나 상태에 나타나지 "
+    "setting_not_obeyed": "충전기에 '{command:word} {value}' 명령을 {waited_s:.1f} s 동안 보냈으나 상태에 나타나지 "
     "{않습니다|않았습니다}{held:after}",
     "held_back": "인터록이 명령을 막았습니다: {refused}",
     "limit_reverted": "충전기가 지령된 전류 제한 단계를 확인한 뒤 1분 안에 {times}회 스스로 되돌렸습니다",

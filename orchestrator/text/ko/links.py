@@ -35,14 +35,14 @@ TEXTS: Mapping[str, str] = {
     "program": "{name} (pid {pid})",
     "program_unknown": "알 수 없는 프로그램",
     # what the interlock has held back
-    "no_order": "'{order:word} {value}' 명령은 {control:word} 모드의 충전기에 보낼 수 없습니다",
-    "no_evidence": "{order:word}: 충전기, 팩 전압, 팩 온도의 최신 값이 없습니다",
-    "not_on_disk": "{order:word}: 이 충전기가 동작할 수 있다는 사실이 디스크에 기록되지 않았습니다",
-    "evidence_old": "{order:word}: 근거가 되는 값이 {age_s:.1f} s만큼 오래되었습니다",
-    "above_station_v": "{order:word}: {voltage_v:g} V는 스테이션의 한계 {limit_v:g} V를 넘습니다",
-    "outside_station_c": "{order:word}: {pack_c:g} °C는 스테이션의 범위 {low_c:g} … {high_c:g} °C를 벗어납니다",
-    "step_unknown": "{order:word}: 충전기의 전류 제한 {step:d}의 의미를 알 수 없습니다",
-    "above_station_a": "{order:word}: 단계 {step}은(는) {step_a:g} A로 스테이션의 한계 {limit_a:g} A를 넘습니다",
+    "no_command": "'{command:word} {value}' 명령은 {control:word} 모드의 충전기에 보낼 수 없습니다",
+    "no_grant": "{command:word}: 충전기, 팩 전압, 팩 온도의 최신 값이 없습니다",
+    "not_on_disk": "{command:word}: 이 충전기가 동작할 수 있다는 사실이 디스크에 기록되지 않았습니다",
+    "grant_old": "{command:word}: 근거가 되는 값이 {age_s:.1f} s만큼 오래되었습니다",
+    "above_station_v": "{command:word}: {voltage_v:g} V는 스테이션의 한계 {limit_v:g} V를 넘습니다",
+    "outside_station_c": "{command:word}: {pack_c:g} °C는 스테이션의 범위 {low_c:g} … {high_c:g} °C를 벗어납니다",
+    "step_unknown": "{command:word}: 충전기의 전류 제한 {step:d}의 의미를 알 수 없습니다",
+    "above_station_a": "{command:word}: 단계 {step}은(는) {step_a:g} A로 스테이션의 한계 {limit_a:g} A를 넘습니다",
     # a contactor's GPIO line
     "gpio_missing": "{chip} 라인 {line}: GPIO 칩이 없습니다: 스테이션 파일의 이름을 확인하십시오(gpiodetect로 확인)",
     "gpio_forbidden": "{chip} 라인 {line}: 권한이 없습니다: 실행 사용자를 칩의 그룹(ls -l로 확인)에 추가한 뒤 다시 "

@@ -77,7 +77,7 @@ TEXTS: Mapping[str, str] = {
     "too_many_requests": "요청이 한꺼번에 너무 많습니다: 다시 요청하십시오",
     "request_internal": "내부 에러: {error}",
     "request_unanswered": "내부 에러: 응답이 없습니다",
-    "dropped_not_kept": "제외했으나 저장되지 않았습니다: {problem}",
+    "dropped_not_persisted": "제외했으나 저장되지 않았습니다: {problem}",
     # around the table of the status
     "alarm": "경보: {what}",
     "warning": "경고: {what}",

@@ -88,8 +88,8 @@ def _free(memory: Memory) -> bool:
 
 
 def _charging(memory: Memory) -> bool:
-    """With nothing ordered that is not seen yet: no charger leaves an order alone for `SLOWLY_S`."""
-    return memory.state is State.CHARGING and memory.stage.ran and memory.sequence.order is None
+    """With nothing ordered that is not seen yet: no charger leaves a command alone for `SLOWLY_S`."""
+    return memory.state is State.CHARGING and memory.stage.ran and memory.sequence.command is None
 
 
 def _energised(memory: Memory) -> bool:

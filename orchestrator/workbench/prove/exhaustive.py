@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from orchestrator.config.load import load_policy, load_station
 from orchestrator.config.policy import Policy
-from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig, Limits, Station
+from orchestrator.config.station import BatteryConfig, BayConfig, ChargerConfig, Limits, Station
 from orchestrator.core.rules import Rules
 from orchestrator.errors import ConfigError
 from orchestrator.model import ControlMode
@@ -81,9 +81,9 @@ def _with_the_walk(function: Callable[..., T], job: tuple[Any, ...]) -> T:
     return function(_walk, *job)
 
 
-def bay_of(policy: Policy) -> Bay:
+def bay_of(policy: Policy) -> BayConfig:
     """A bay for a policy without a station: its limits are exactly as wide as the policy's, and all steps allowed."""
-    return Bay(
+    return BayConfig(
         name=policy.policy,
         charger=ChargerConfig(port="explored", control=ControlMode.MANUAL, steps_a=STEPS_A),
         battery=BatteryConfig(can="explored", node_id=0x10, map=ObjectMap(map="explored", objects=())),
@@ -95,7 +95,7 @@ def bay_of(policy: Policy) -> Bay:
     )
 
 
-def bays_in(file: str) -> Iterator[tuple[str, Bay]]:
+def bays_in(file: str) -> Iterator[tuple[str, BayConfig]]:
     """The bays to prove in a policy or station file without errors, each with its title."""
     try:
         station = load_station(file)
@@ -107,9 +107,9 @@ def bays_in(file: str) -> Iterator[tuple[str, Bay]]:
         yield f"{file}, {', '.join(bay.name for bay in bays)}", bays[0]
 
 
-def _alike(station: Station) -> Iterable[Sequence[Bay]]:
+def _alike(station: Station) -> Iterable[Sequence[BayConfig]]:
     """The bays, grouped by what affects decisions: within a group only name, port, bus or node differ."""
-    groups: dict[object, list[Bay]] = {}
+    groups: dict[object, list[BayConfig]] = {}
     for bay in station.bays:
         what = (bay.policy.source.file, bay.charger.control, bay.charger.steps_a, bay.limits)
         groups.setdefault(what, []).append(bay)

@@ -9,16 +9,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import step
 from orchestrator.model import Cause, Decision, Snapshot, State
 from orchestrator.workbench.prove.gist import gist, outline
 from orchestrator.workbench.prove.properties import Property
 from orchestrator.workbench.prove.story import BEGIN_S, TICK_S, Counterexample, Move, Taken
 
-Step = Callable[[float, Snapshot, Memory, Rules], tuple[Decision, Memory]]
+Decide = Callable[[float, Snapshot, Memory, Rules], tuple[Decision, Memory]]
 T = TypeVar("T")
 
 
@@ -68,7 +68,7 @@ class Walk:
     inputs: Inputs
     properties: Sequence[Property]
     gist: Callable[[Memory], object] = gist
-    step: Step = step
+    decide: Decide = decide
     _told: set[object] = field(default_factory=set)  # gists already reached, and names of violated properties
 
     def take(self, place: Place, move: Move) -> Taken:
@@ -77,7 +77,7 @@ class Walk:
         memory = Persisted.of(place.memory, now_s).memory(now_s) if move.restart else place.memory
         snapshot = self.inputs.snapshot(move, now_s, memory)
         try:
-            decision, after = self.step(now_s, snapshot, memory, self.rules)
+            decision, after = self.decide(now_s, snapshot, memory, self.rules)
         except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
             stays = Decision(place.memory.state, Cause.of("failed", error=f"{type(error).__name__}: {error}"))
             return Taken(move, now_s, snapshot, place.memory, stays, place.memory, self.rules, error=repr(error))

@@ -44,7 +44,7 @@ def gist(memory: Memory) -> Gist:
 
 
 def _told(value: object) -> object:
-    """What of a value decides: which order it is, what is true or not; of all others that they are there."""
+    """What of a value decides: which command it is, what is true or not; of all others that they are there."""
     if isinstance(value, Command):
         return value.action
     return value if isinstance(value, bool) else value is not None

@@ -186,18 +186,18 @@ class StationInputs:
 
     def _obedient(self, shown: Shown, now_s: float, memory: Memory) -> Said:
         """A charger that has just carried out the last decision's command."""
-        order = memory.sequence.order
+        command = memory.sequence.command
         values = {
             "voltage_v": shown.volts + shown.differs_v if shown.connected else 0.0,
-            "control_mode": self.rules.bay.charger.control, "operation": Operation.STOPPED, "current_limit": 0,
+            "control_mode": self.rules.bay.charger.control, "operation": Operation.STOPPED, "current_step": 0,
             "charge_mode": ChargeMode.FULL, "precharge": Precharge.OFF, "connection": Connection.NORMAL,
         }  # fmt: skip
         if memory.state in ENERGISED:
             values |= _setpoint(memory, manual=self.rules.manual)
-        limit_a = self.rules.steps_a[int(values["current_limit"])] * shown.takes
+        limit_a = self.rules.steps_a[int(values["current_step"])] * shown.takes
         charging = values["charge_mode"] is ChargeMode.CHARGE
         flows_a = 0.0 if not values["operation"] else limit_a if charging else min(PRECHARGE_A, limit_a)
-        sent = order if memory.sequence.resumed and order is not None else Command(Action.RESUME)
+        sent = command if memory.sequence.resumed and command is not None else Command(Action.RESUME)
         return Said(
             {**values, "current_a": flows_a, "full_a": limit_a, "age_s": READ_AGE_S},
             {"online": True, "sent": Sent(sent, now_s - SENT_AGE_S), "stop_sent_s": now_s - SENT_AGE_S},
@@ -210,12 +210,12 @@ SEQUENCE = (Action.SET_LIMIT, Action.SET_MODE, Action.SET_PRECHARGE, Action.RUN)
 
 def _setpoint(memory: Memory, *, manual: bool) -> dict[str, Any]:
     """The setpoint as reported by an obedient charger: everything up to the present command."""
-    action = memory.sequence.order.action if memory.sequence.order is not None else Action.RUN
+    action = memory.sequence.command.action if memory.sequence.command is not None else Action.RUN
     running = memory.stage.ran or action is Action.RUN or (action is Action.RESUME and not manual)
     done = len(SEQUENCE) if running or not manual else SEQUENCE.index(action)
     shows: dict[str, Any] = {"operation": Operation(int(running)), "charge_mode": ChargeMode.CHARGE}
     if manual:
-        shows["current_limit"] = memory.stage.step.index if memory.stage.step is not None else 0
+        shows["current_step"] = memory.stage.step.index if memory.stage.step is not None else 0
         shows["charge_mode"] = STAGES[memory.state][0] if done >= 1 else ChargeMode.FULL
         shows["precharge"] = STAGES[memory.state][1] if done >= SEQUENCE.index(Action.SET_PRECHARGE) else Precharge.OFF
     return shows

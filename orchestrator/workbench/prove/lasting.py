@@ -1,6 +1,6 @@
 """Follows every explored memory to its end in surroundings that last: does it reach the endings, does it settle?
 
-Each memory is left alone, with small steps of time after every change of state or order, and ever larger ones while
+Each memory is left alone, with small steps of time after every change of state or command, and ever larger ones while
 there is none. To change for ever without news from outside is a livelock.
 """
 
@@ -123,15 +123,15 @@ def _circles(walk: Walk, surroundings: Surroundings, places: Sequence[Place]) ->
 
 def lasting(walk: Walk, place: Place, first: Move) -> Iterator[Taken]:
     """What comes of it when the surroundings of a move last: steps until nothing has changed for a long time."""
-    move, order = first, place.memory.sequence.order
+    move, command = first, place.memory.sequence.command
     rungs = _ladder()
     while True:
         taken = walk.take(place, move)
         yield taken
         if taken.error:
             return
-        if (taken.after.state, taken.decision.command) != (taken.before.state, order):
-            order, rungs = taken.decision.command, _ladder()
+        if (taken.after.state, taken.decision.command) != (taken.before.state, command):
+            command, rungs = taken.decision.command, _ladder()
         place = Place(taken.after, taken.now_s)
         dt_s = next(rungs, None)
         if dt_s is None:

@@ -70,7 +70,7 @@ def stop_at_once(taken: Taken) -> str | None:
     """A new fault of effect STOP or worse commands a stop in the same decision."""
     new = [f for f in taken.decision.faults if f.since_s == taken.now_s and f.effect >= Effect.STOP]
     if new and taken.decision.command != STOP:
-        return f"{new[0].id} ({new[0].effect.name}) is new, the order is {taken.decision.command}"
+        return f"{new[0].id} ({new[0].effect.name}) is new, the command is {taken.decision.command}"
     return None
 
 
@@ -113,9 +113,9 @@ def rest_is_verified(taken: Taken) -> str | None:
 def within_current(taken: Taken) -> str | None:
     """No step above the station's current limit, whatever the policy allows."""
     setpoint, rules = taken.decision.setpoint, taken.rules
-    if not setpoint.run or setpoint.current_limit is None:
+    if not setpoint.run or setpoint.current_step is None:
         return None
-    amps = rules.bay.charger.steps_a[setpoint.current_limit]
+    amps = rules.bay.charger.steps_a[setpoint.current_step]
     return f"step of {amps:g} A above {rules.bay.limits.current_a:g} A" if amps > rules.bay.limits.current_a else None
 
 
@@ -138,7 +138,7 @@ def within_temperature(taken: Taken) -> str | None:
 def unproved_stops(taken: Taken) -> str | None:
     """In states that wait for verified standby, the command is stop."""
     if taken.after.state in UNVERIFIED and taken.decision.command != STOP:
-        return f"the order in {taken.after.state} is {taken.decision.command}"
+        return f"the command in {taken.after.state} is {taken.decision.command}"
     return None
 
 

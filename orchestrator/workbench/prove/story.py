@@ -81,10 +81,10 @@ def _told(taken: Taken) -> str:
 
 
 def _order(decision: Decision) -> str:
-    order = decision.command
-    if order is None:
-        return "no order"
-    return f"order: {order.action}" + (f" {order.value}" if order.action in WITH_VALUE else "")
+    command = decision.command
+    if command is None:
+        return "no command"
+    return f"command: {command.action}" + (f" {command.value}" if command.action in WITH_VALUE else "")
 
 
 def _values(snapshot: Snapshot) -> str:

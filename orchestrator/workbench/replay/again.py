@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
 
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory, names, value_of
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import step
 from orchestrator.model import Decision
 from orchestrator.service.records import decision_lines, without_texts
 from orchestrator.workbench.replay.recording import Event, Recorded
@@ -44,7 +44,7 @@ def again(steps: Iterable[Recorded]) -> Iterator[Again]:
             memory, rules = recorded.memory, recorded.rules
         assert memory is not None
         assert rules is not None
-        decision, after = step(recorded.at_s, recorded.snapshot, memory, rules)
+        decision, after = decide(recorded.at_s, recorded.snapshot, memory, rules)
         if not recorded.snapshot.internal and not recorded.unsure and (before is not None or memory.last_s is None):
             wrong = wrong or _said_otherwise(recorded, list(decision_lines(before, decision)))
         yield Again(recorded, rules, memory, decision, after, wrong)

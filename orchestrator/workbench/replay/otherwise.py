@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from orchestrator.config.policy import Policy
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory, by_policy, value_of, with_values
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import RESTING
-from orchestrator.core.step import step
-from orchestrator.model import Decision, Snapshot, State, Step
+from orchestrator.model import CurrentStep, Decision, Snapshot, State
 from orchestrator.text.catalogue import say
 from orchestrator.workbench.replay.again import Again
 
@@ -35,7 +35,7 @@ class Difference:
         return self.was.state is not self.now.state
 
 
-def _as_told(snapshot: Snapshot, was: Step | None, now: Step | None, rules: Rules) -> Snapshot:
+def _as_told(snapshot: Snapshot, was: CurrentStep | None, now: CurrentStep | None, rules: Rules) -> Snapshot:
     """What the devices would have shown on the other policy's step: the record's charger obeyed its own one.
 
     Where the steps are the same, or nothing is charged, as it was recorded.
@@ -44,11 +44,11 @@ def _as_told(snapshot: Snapshot, was: Step | None, now: Step | None, rules: Rule
     if was is None or now is None or was.index == now.index or charger is None or not rules.manual:
         return snapshot
     share = min(1.0, now.current_a / was.current_a)
-    told = now.index if charger.current_limit == was.index else charger.current_limit
+    told = now.index if charger.current_step == was.index else charger.current_step
     battery = snapshot.battery
     if pack_a is not None:
         battery = replace(battery, current_a=replace(pack_a, value=pack_a.value * share))
-    charger = replace(charger, current_a=charger.current_a * share, current_limit=told)
+    charger = replace(charger, current_a=charger.current_a * share, current_step=told)
     return replace(snapshot, charger=charger, battery=battery)
 
 
@@ -76,7 +76,7 @@ class Comparison:
         )
         rules = self._other(one.rules)
         snapshot = _as_told(one.recorded.snapshot, one.memory.stage.step, given.stage.step, rules)
-        decision, self._own = step(one.recorded.at_s, snapshot, given, rules)
+        decision, self._own = decide(one.recorded.at_s, snapshot, given, rules)
         if decision.state is one.decision.state and _step(decision) == _step(one.decision):
             self._open = None
             return

@@ -20,7 +20,7 @@ from cattrs import Converter
 from cattrs.errors import BaseValidationError
 
 from orchestrator.config.plainfile import check_plain
-from orchestrator.config.station import Bay
+from orchestrator.config.station import BayConfig
 from orchestrator.core.memory import Memory, in_parts
 from orchestrator.core.rules import Rules
 from orchestrator.errors import ConfigError, Finding
@@ -150,7 +150,7 @@ class _Reader:
                 raise ValueError(
                     "its policy is of the first edition, which spoke of steps: replay it with that version"
                 )
-            rules = Rules.of(_CONVERTER.structure(line["config"], Bay))
+            rules = Rules.of(_CONVERTER.structure(line["config"], BayConfig))
         elif bay in parts:
             before = parts[bay]
             changed = {name: line[name] for name in Snapshot.__slots__ if name in line}

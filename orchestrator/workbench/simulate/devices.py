@@ -19,7 +19,7 @@ from orchestrator.model import (
     Sent,
     Snapshot,
 )
-from orchestrator.sim.charger import Charger, Push
+from orchestrator.sim.charger import Push, SimulatedCharger
 from orchestrator.sim.pack import Pack
 from orchestrator.workbench.simulate.plant import Plant
 
@@ -29,13 +29,13 @@ TICK_S = 0.25
 SILENT_S = 1.5
 
 
-def _stop(charger: Charger, _value: int) -> None:
+def _stop(charger: SimulatedCharger, _value: int) -> None:
     charger.rest(0)
     charger.push(Push.OPERATION, 0)
 
 
 #: The effect of each command on the charger.
-ORDERS: dict[Action, Callable[[Charger, int], None]] = {
+ORDERS: dict[Action, Callable[[SimulatedCharger, int], None]] = {
     Action.STOP: _stop,
     Action.RESUME: lambda charger, _: charger.rest(1),
     Action.SET_LIMIT: lambda charger, value: charger.push(Push.CURRENT_LIMIT, value),
@@ -59,7 +59,7 @@ class Devices:
         twin.faults, twin._link, twin._told = self.faults, self._link, self._told
         return twin
 
-    def obey(self, command: Command | None, charger: Charger, now_s: float) -> None:
+    def obey(self, command: Command | None, charger: SimulatedCharger, now_s: float) -> None:
         """Deliver the command to the charger."""
         if command is None:
             return
@@ -123,14 +123,14 @@ DECIMALS = {"voltage_v": 2, "current_a": 2, "status": 0, "temperature_c": 1, "so
 ONLINE, OFFLINE = BatteryLink(online=True), BatteryLink()
 
 
-def _reading(charger: Charger, now_s: float) -> ChargerReading:
+def _reading(charger: SimulatedCharger, now_s: float) -> ChargerReading:
     return ChargerReading(
         t_s=now_s,
         voltage_v=round(charger.voltage_v, 2),
         current_a=round(charger.current_a, 2),
         control_mode=charger.control_mode,
         operation=charger.operation,
-        current_limit=charger.current_limit,
+        current_step=charger.current_step,
         charge_mode=charger.charge_mode,
         precharge=charger.precharge,
         connection=charger.connection,

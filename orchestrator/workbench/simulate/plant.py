@@ -8,7 +8,7 @@ midpoint method), so that the size of the pieces does not affect the result.
 from copy import copy
 
 from orchestrator.config.scenario import BatteryModel, Cell, Scenario, Visit
-from orchestrator.sim.charger import Charger
+from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.chemistry import LFP, NMC, Chemistry, interpolate
 from orchestrator.sim.pack import Pack
 
@@ -42,7 +42,7 @@ class Plant:
 
     def __init__(self, scenario: Scenario) -> None:
         model = scenario.charger
-        self.charger = Charger(
+        self.charger = SimulatedCharger(
             steps_a=model.steps_a,
             cv_v=model.cv_v,
             precharge_a=model.precharge_a,
@@ -101,11 +101,11 @@ class Plant:
                 self._charge(piece_s, self.charger, self.pack, midpoint=tapers)
             dt_s -= piece_s
 
-    def _tapers(self, charger: Charger, pack: Pack) -> bool:
+    def _tapers(self, charger: SimulatedCharger, pack: Pack) -> bool:
         demand_a = charger.demand_a
         return demand_a > 0 and charger.room_a(pack) < demand_a * NEARLY_TAPERING
 
-    def _charge(self, dt_s: float, charger: Charger, pack: Pack, *, midpoint: bool) -> None:
+    def _charge(self, dt_s: float, charger: SimulatedCharger, pack: Pack, *, midpoint: bool) -> None:
         pack.ambient_c = self._ambient_c(self.t_s - dt_s / 2)
         current_a = self._middle_a(dt_s / 2, charger, pack) if midpoint else charger.current_a
         pack.advance(dt_s, current_a)
@@ -115,7 +115,7 @@ class Plant:
         self.charged_ah += ah
         self.charged_wh += ah * charger.voltage_v
 
-    def _middle_a(self, half_s: float, charger: Charger, pack: Pack) -> float:
+    def _middle_a(self, half_s: float, charger: SimulatedCharger, pack: Pack) -> float:
         """The current in the middle of a piece; the pack is restored afterwards."""
         before = pack.charge_ah, pack.polarisation_v, pack.temperature_c
         pack.advance(half_s, charger.current_a)

@@ -7,11 +7,11 @@ from operator import itemgetter
 
 from orchestrator.config.policy import Policy
 from orchestrator.config.scenario import Ask, Scenario, SensorFault, Visit
-from orchestrator.config.station import BatteryConfig, Bay, ChargerConfig
+from orchestrator.config.station import BatteryConfig, BayConfig, ChargerConfig
+from orchestrator.core.decide import decide
 from orchestrator.core.history.battery import WARMTH_EVERY_S
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
-from orchestrator.core.step import step
 from orchestrator.errors import OrchestratorError
 from orchestrator.model import ControlMode, Decision, Request, State
 from orchestrator.protocol.objects import ObjectMap
@@ -65,7 +65,7 @@ def rules_of(policy: Policy, scenario: Scenario) -> Rules:
                 f"({scenario.source.at(f'batteries.{name}.cells_in_series')})"
             )
     return Rules.of(
-        Bay(
+        BayConfig(
             name=scenario.scenario,
             charger=ChargerConfig(port="simulated", control=ControlMode.MANUAL, steps_a=scenario.charger.steps_a),
             battery=BatteryConfig(can="simulated", node_id=0x10, map=ObjectMap(map="simulated", objects=())),
@@ -169,7 +169,7 @@ class Simulation:
         now_s = (self._tick + ticks) * TICK_S
         devices.obey(self._decision.command, plant.charger, now_s - TICK_S / 2)
         plant.advance(TICK_S)
-        decision, memory = step(now_s, devices.snapshot(plant, now_s, self._request), memory, self._rules)
+        decision, memory = decide(now_s, devices.snapshot(plant, now_s, self._request), memory, self._rules)
         self._steps += 1
         new = outline(decision, memory)
         nothing_happened = new == self._outline

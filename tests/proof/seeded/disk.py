@@ -17,8 +17,8 @@ DISK: tuple[Seed, ...] = (
         ),
         (
             f"{SERVICE}bay.py",
-            "running_kept=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,",
-            "running_kept=True,",
+            "running_persisted=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,",
+            "running_persisted=True,",
         ),
     ),
     scene(
@@ -35,8 +35,8 @@ DISK: tuple[Seed, ...] = (
         ("fsync hangs, begun, killed", "disk full"),
         (
             f"{SERVICE}bay.py",
-            "running_kept=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,",
-            "running_kept=True,",
+            "running_persisted=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,",
+            "running_persisted=True,",
         ),
         (
             f"{SERVICE}store.py",
@@ -74,8 +74,8 @@ DISK: tuple[Seed, ...] = (
         ("tests/whole/test_survives.py::test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one",),
         (
             f"{SERVICE}supervisor.py",
-            "        unkept = self._store.close(KEEP_S)\n",
-            "        self._store.close(KEEP_S)\n        unkept = None\n",
+            "        not_persisted = self._store.close(KEEP_S)\n",
+            "        self._store.close(KEEP_S)\n        not_persisted = None\n",
         ),
     ),
     scene(

@@ -9,21 +9,22 @@ import pytest
 
 from orchestrator.core import latches
 from orchestrator.core.active import active_faults
-from orchestrator.core.course import Next, course
+from orchestrator.core.decide import decide
 from orchestrator.core.facts import Facts
 from orchestrator.core.history import entered, update_history
 from orchestrator.core.history.battery import Warmth, thinned
 from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import FaultMemory, Memory, Sequence, Still, value_of
+from orchestrator.core.next_transition import Next, next_transition
 from orchestrator.core.rules import Rules
-from orchestrator.core.sequence import RESUME, RUN, next_order
-from orchestrator.core.step import step
+from orchestrator.core.sequence import RESUME, RUN, next_command
 from orchestrator.model import (
     STOP,
     Cause,
     ChargeMode,
     Command,
     ControlMode,
+    CurrentStep,
     Decision,
     Measurement,
     Operation,
@@ -33,7 +34,6 @@ from orchestrator.model import (
     Setpoint,
     Snapshot,
     State,
-    Step,
 )
 from tests.core.edges import AT, BMU, CONTINUOUS, NO_PRECHARGE, NOW_S, PULSE, Edge, ago, marked, raised, session
 from tests.core.said import cause, said
@@ -41,7 +41,7 @@ from tests.core.world import bay
 
 
 def course_of(f: Facts) -> Next:
-    return course(f, active_faults(f.memory, f.now_s, "bay-1", f))
+    return next_transition(f, active_faults(f.memory, f.now_s, "bay-1", f))
 
 
 def goes(f: Facts) -> tuple[Trigger | None, Cause]:
@@ -49,7 +49,7 @@ def goes(f: Facts) -> tuple[Trigger | None, Cause]:
 
 
 def holding(**changes: Any) -> dict[str, Any]:
-    return {"step": Step(2, 8.0, cause("because")), **changes}
+    return {"step": CurrentStep(2, 8.0, cause("because")), **changes}
 
 
 def reached(seconds: float) -> dict[str, Any]:
@@ -347,15 +347,15 @@ LATCHES = (
 # --- what is ordered --------------------------------------------------------------------------------------------------
 
 
-def orders(f: Facts) -> Command | None:
+def commands(f: Facts) -> Command | None:
     return ordered(f)[0]
 
 
 def ordered(f: Facts) -> tuple[Command | None, Sequence]:
-    return next_order(f, Setpoint(True, 4, ChargeMode.CHARGE, Precharge.OFF))
+    return next_command(f, Setpoint(True, 4, ChargeMode.CHARGE, Precharge.OFF))
 
 
-RESUMED = {"resumed": False, "ran": False, "resume_s": ago(2), "order": RUN, "order_s": ago(1)}
+RESUMED = {"resumed": False, "ran": False, "resume_s": ago(2), "order": RUN, "command_s": ago(1)}
 
 
 def sent(t_s: float, command: Command = RESUME) -> dict[str, Any]:
@@ -363,31 +363,31 @@ def sent(t_s: float, command: Command = RESUME) -> dict[str, Any]:
 
 
 ORDERS = (
-    Edge(orders, None),
-    Edge(orders, RESUME, RESUMED, charger=STANDS_BY),
-    Edge(orders, RESUME, RESUMED, charger=STANDS_BY, charger_link=sent(ago(2.1))),
-    Edge(orders, RUN, RESUMED, charger=STANDS_BY, charger_link=sent(ago(2))),
-    Edge(orders, RUN, RESUMED, charger=STANDS_BY, charger_link=sent(ago(0.1))),
-    Edge(orders, RESUME, RESUMED, charger=STANDS_BY, charger_link=sent(NOW_S)),
-    Edge(orders, RESUME, RESUMED, charger=STANDS_BY, charger_link=sent(ago(1), RUN)),
-    Edge(orders, RUN, {**RESUMED, "resumed": True, "order_s": ago(1.4)}, charger=STANDS_BY),
-    Edge(orders, RESUME, {**RESUMED, "resumed": True, "order_s": ago(1.5)}, charger=STANDS_BY),
-    Edge(orders, RUN, {**RESUMED, "resumed": True, "order_s": ago(1.5), "tries": 1}, charger=STANDS_BY),
+    Edge(commands, None),
+    Edge(commands, RESUME, RESUMED, charger=STANDS_BY),
+    Edge(commands, RESUME, RESUMED, charger=STANDS_BY, charger_link=sent(ago(2.1))),
+    Edge(commands, RUN, RESUMED, charger=STANDS_BY, charger_link=sent(ago(2))),
+    Edge(commands, RUN, RESUMED, charger=STANDS_BY, charger_link=sent(ago(0.1))),
+    Edge(commands, RESUME, RESUMED, charger=STANDS_BY, charger_link=sent(NOW_S)),
+    Edge(commands, RESUME, RESUMED, charger=STANDS_BY, charger_link=sent(ago(1), RUN)),
+    Edge(commands, RUN, {**RESUMED, "resumed": True, "command_s": ago(1.4)}, charger=STANDS_BY),
+    Edge(commands, RESUME, {**RESUMED, "resumed": True, "command_s": ago(1.5)}, charger=STANDS_BY),
+    Edge(commands, RUN, {**RESUMED, "resumed": True, "command_s": ago(1.5), "tries": 1}, charger=STANDS_BY),
 )  # fmt: skip
 
 
 def test_a_new_order_has_not_been_tried() -> None:
-    f = Edge(orders, RUN, {**RESUMED, "resumed": True, "order": RESUME, "tries": 4}, charger=STANDS_BY).facts
-    order, sequence = ordered(f)
-    assert order == RUN
-    assert (sequence.order, sequence.order_s, sequence.tries) == (RUN, NOW_S, 0)
+    f = Edge(commands, RUN, {**RESUMED, "resumed": True, "order": RESUME, "tries": 4}, charger=STANDS_BY).facts
+    command, sequence = ordered(f)
+    assert command == RUN
+    assert (sequence.command, sequence.command_s, sequence.tries) == (RUN, NOW_S, 0)
 
 
 # --- the whole step ---------------------------------------------------------------------------------------------------
 
 
 def whole(edge: Edge) -> tuple[Decision, Memory]:
-    return step(NOW_S, edge.facts.snapshot, edge.facts.memory, edge.facts.rules)
+    return decide(NOW_S, edge.facts.snapshot, edge.facts.memory, edge.facts.rules)
 
 
 def test_from_stage_to_stage_the_charge_goes_on() -> None:
@@ -409,7 +409,7 @@ def test_a_charge_that_ends_at_rest_says_why_it_ends_there() -> None:
 
 @pytest.mark.parametrize(("index", "changes"), [(2, 2), (4, 1)])
 def test_a_change_of_the_step_is_counted(index: int, changes: int) -> None:
-    memory = {"session": BEGUN, "step": Step(index, 0.0, cause("")), "raise_s": ago(60), "last_s": ago(0.25)}
+    memory = {"session": BEGUN, "step": CurrentStep(index, 0.0, cause("")), "raise_s": ago(60), "last_s": ago(0.25)}
     decision, _ = whole(Edge(goes, None, memory))
     assert decision.session is not None
     assert decision.session.step_changes == changes

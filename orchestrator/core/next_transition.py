@@ -46,7 +46,7 @@ LEADS = {
 }
 
 
-def course(f: Facts, faults: Faults) -> Next:
+def next_transition(f: Facts, faults: Faults) -> Next:
     """The trigger for now (None: stay) and why the bay is, or goes, where it is."""
     state = f.memory.state
     if state in ENERGISED:
@@ -176,7 +176,7 @@ def _qualifying(f: Facts) -> Next:
     changes = {"stage": stage.is_ready(known, intends=waits is None)}
     if waits is not None:
         return Next(None, waits, changes)
-    if not f.snapshot.running_kept:
+    if not f.snapshot.running_persisted:
         return Next(None, Cause("writing_down"), changes)
     rule = f.rules.policy.precharge
     if f.rules.manual and rule is not None and f.pack_v is not None and f.pack_v < rule.below_v:

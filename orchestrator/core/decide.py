@@ -1,23 +1,23 @@
 """`step()`: one decision about one bay. The live service, the simulator, the checker and the replay all call this.
 
-facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the order.
+facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the command.
 """
 
 from orchestrator.core import latches, limits, rows
 from orchestrator.core.active import active_faults
 from orchestrator.core.alarm import alarm
 from orchestrator.core.contactor import closes
-from orchestrator.core.course import course
 from orchestrator.core.facts import Facts
 from orchestrator.core.history import charger, entered, session, update_history
 from orchestrator.core.history import stage as stages
 from orchestrator.core.machine import fire
 from orchestrator.core.memory import Memory, Sequence
-from orchestrator.core.operator import hear
+from orchestrator.core.next_transition import next_transition
+from orchestrator.core.operator import handle_request
 from orchestrator.core.parts import changed
 from orchestrator.core.rules import Rules
 from orchestrator.core.safestop import must_stop, stands_by
-from orchestrator.core.sequence import next_order
+from orchestrator.core.sequence import next_command
 from orchestrator.core.states import ALIKE, ENERGISED, SESSION_ENDS
 from orchestrator.model import (
     STANDBY,
@@ -26,6 +26,7 @@ from orchestrator.model import (
     Cause,
     ChargeMode,
     Command,
+    CurrentStep,
     Decision,
     Effect,
     Precharge,
@@ -33,7 +34,6 @@ from orchestrator.model import (
     Setpoint,
     Snapshot,
     State,
-    Step,
 )
 
 #: What the charger is told in each state in which current flows; the limit of CHARGING comes from the policy.
@@ -47,7 +47,7 @@ PRECHARGE = Cause("precharge_step", key="precharge")
 BY_ITSELF = Setpoint(run=True)
 
 
-def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
+def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
     """What to do now, and what to remember.
 
     `now_s` is monotonic and never goes back between two calls. `memory` is what the call before returned (at first
@@ -59,7 +59,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     f = update_history(f, now_s - memory.last_s if memory.last_s is not None else 0.0)
     refusal: Cause | None = None
     if snapshot.request is not None:
-        heard = hear(f.memory, snapshot.request, now_s, snapshot.unkept, rules.bay.name)
+        heard = handle_request(f.memory, snapshot.request, now_s, snapshot.not_persisted, rules.bay.name)
         refusal = heard.refusal
         f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
     known = latches.update(f)
@@ -68,7 +68,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
     faults = active_faults(f.memory, now_s, rules.bay.name, f, at_rest=stands_by(f)) if known else ()
     f, cause, ended = _move(f, faults)
     f, setpoint, chosen = _setpoint(f, faults)
-    command, sequence = _order(f, setpoint, faults)
+    command, sequence = _command(f, setpoint, faults)
     closed = closes(f.memory.state, closed=f.memory.closed, standby=f.standby)
     memory = changed(f.memory, cause=cause, sequence=sequence, closed=closed, looked_s=now_s, last_s=now_s)
     decision = Decision(
@@ -89,7 +89,7 @@ def step(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tupl
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Cause, Session | None]:
     """Let the state follow the facts: with the reason, and the session that has ended by it, if any."""
     before = f.memory.state
-    trigger, cause, changes = course(f, faults)
+    trigger, cause, changes = next_transition(f, faults)
     if changes:
         f = f.with_memory(changed(f.memory, **changes))
     state = fire(before, trigger) if trigger is not None else before
@@ -112,12 +112,12 @@ def _is_over(f: Facts, before: State) -> bool:
     if after not in SESSION_ENDS:
         return False
     exchanged = f.memory.faults.get("battery_exchanged")
-    another = f.departed or (exchanged is not None and exchanged.raised_s is not None)
+    another = f.battery_removed or (exchanged is not None and exchanged.raised_s is not None)
     goes_on = after is before or before is State.STARTING or {before, after} == ALIKE
     return another or not goes_on
 
 
-def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoint, Step | None]:
+def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoint, CurrentStep | None]:
     """What the charger shall do in the present state, and the current step that goes with it."""
     memory, rules = f.memory, f.rules
     if memory.state not in ENERGISED:
@@ -128,7 +128,7 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoin
     if memory.state is State.CHARGING:
         chosen, raise_s = limits.choose(f, faults[0] if faults else None)
     else:
-        chosen, raise_s = Step(0, rules.steps_a[0], PRECHARGE), None
+        chosen, raise_s = CurrentStep(0, rules.steps_a[0], PRECHARGE), None
     anew = before is not None and memory.session is not None and chosen.index != before.index
     stage = stages.chosen(memory.stage, chosen, raise_s, anew=anew)
     if stage is not memory.stage:
@@ -144,16 +144,16 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoin
             )
         )
     mode, precharge = SETPOINTS[memory.state]
-    return f, Setpoint(run=True, current_limit=chosen.index, charge_mode=mode, precharge=precharge), chosen
+    return f, Setpoint(run=True, current_step=chosen.index, charge_mode=mode, precharge=precharge), chosen
 
 
-def _order(f: Facts, setpoint: Setpoint, faults: tuple[ActiveFault, ...]) -> tuple[Command | None, Sequence]:
-    """The standing order: a stop, the next value of the setpoint, or nothing.
+def _command(f: Facts, setpoint: Setpoint, faults: tuple[ActiveFault, ...]) -> tuple[Command | None, Sequence]:
+    """The standing command: a stop, the next value of the setpoint, or nothing.
 
     A fault that stops and is new orders a stop in every state, also where the charger was just seen to stand by.
     """
     memory = f.memory
     if memory.state in ENERGISED:
-        return next_order(f, setpoint)
+        return next_command(f, setpoint)
     news = any(fault.since_s == f.now_s and fault.effect >= Effect.STOP for fault in faults)
     return (STOP if news or must_stop(f, memory.state) else None), memory.sequence

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import ENERGISED
-from orchestrator.core.step import step
 from orchestrator.model import (
     STANDBY,
     STOP,
@@ -66,7 +66,7 @@ def readings(draw: st.DrawFn, now_s: float) -> ChargerReading | None:
         current_a=draw(numbers),
         control_mode=draw(st.sampled_from([None, *ControlMode])),
         operation=draw(st.sampled_from([None, *Operation])),
-        current_limit=draw(st.sampled_from([None, 0, 1, 2, 3, 4])),
+        current_step=draw(st.sampled_from([None, 0, 1, 2, 3, 4])),
         charge_mode=draw(st.sampled_from([None, *ChargeMode])),
         precharge=draw(st.sampled_from([None, *Precharge])),
         connection=draw(st.sampled_from([None, *Connection])),
@@ -139,7 +139,7 @@ def nearly_good(draw: st.DrawFn, now_s: float, world: World) -> Snapshot:
     assert good.charger is not None
     shown = {
         "operation": draw(st.sampled_from([*Operation])),
-        "current_limit": draw(st.sampled_from([0, 4, 2])),
+        "current_step": draw(st.sampled_from([0, 4, 2])),
         "charge_mode": draw(st.sampled_from([ChargeMode.CHARGE, ChargeMode.PRECHARGE, ChargeMode.FULL])),
         "precharge": draw(st.sampled_from([*Precharge])),
     }
@@ -195,13 +195,13 @@ def check(before: Memory, now_s: float, snapshot: Snapshot, decision: Decision, 
     assert command is None or command.action is not Action.STOP
     if decision.step is not None:
         assert 0 <= decision.step.index <= rules.top_step
-        assert decision.setpoint.current_limit == decision.step.index
+        assert decision.setpoint.current_step == decision.step.index
     if not rules.manual:
         assert command in (None, Command(Action.RESUME))
     elif command == Command(Action.RUN):
         assert shown is not None
         wanted = decision.setpoint
-        assert shown.current_limit == wanted.current_limit
+        assert shown.current_step == wanted.current_step
         assert shown.charge_mode is wanted.charge_mode
         assert shown.precharge is wanted.precharge
 
@@ -216,9 +216,9 @@ def test_whatever_comes_it_decides_soberly(data: st.DataObject, control: Control
         now_s += data.draw(st.sampled_from([0.0, 0.02, 0.25, 1.0, 4.0, 100.0, 1e6]))
         snapshot = data.draw(nearly_good(now_s, world) if data.draw(st.integers(0, 5)) else snapshots(now_s))
         kept, seen = deepcopy(memory), deepcopy(snapshot)
-        decision, after = step(now_s, snapshot, memory, rules)
+        decision, after = decide(now_s, snapshot, memory, rules)
         assert (repr(memory), repr(snapshot)) == (repr(kept), repr(seen)), "an argument was changed"
-        assert repr(step(now_s, snapshot, memory, rules)) == repr((decision, after)), "not the same twice"
+        assert repr(decide(now_s, snapshot, memory, rules)) == repr((decision, after)), "not the same twice"
         check(memory, now_s, snapshot, decision, rules)
         memory = after
 
@@ -288,6 +288,6 @@ def test_a_step_at_the_same_time_changes_nothing_but_itself(state: State) -> Non
     """Two readings may come at once: a second step at the same moment is harmless."""
     world = IN[state]()
     first = world.tick()
-    decision, _ = step(world.now_s, world.snapshot(None, ""), world.memory, world.rules)
+    decision, _ = decide(world.now_s, world.snapshot(None, ""), world.memory, world.rules)
     assert decision.state is first.state or first.state in (State.IDLE, State.HELD, State.SUSPENDED)
     assert decision.alarm is first.alarm
