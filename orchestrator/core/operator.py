@@ -39,7 +39,7 @@ def handle_request(
 ) -> Heard:
     """What becomes of the request; `bay` is the name for commands.
 
-    A request that would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never is.
+    What would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never is.
     """
     if not_persisted is not None and request in (Request.START, Request.RESET):
         return _refused(memory, Cause.of("not_done", advice="not_persisted", problem=not_persisted))

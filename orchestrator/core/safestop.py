@@ -1,7 +1,8 @@
 """The safe stop: when a charger must be told to stop, what proves that it did, and when it is out of control.
 
 Theory of operation. The safe state is *verified* standby, by both witnesses (`witnesses/standby.py`). Until then the
-standing command is STOP, repeated by the port every 500 ms. A charger not verified after `OBEY_STOP_S` is uncontrollable: the command stays, the contactor opens, people are alarmed, and only a standby that lasts for `LASTS_S`
+standing command is STOP, repeated by the port every 500 ms. A charger not verified after `OBEY_STOP_S` is
+uncontrollable: the command stays, the contactor opens, people are alarmed, and only a standby that lasts for `LASTS_S`
 ends it. In states of rest there is no standing command as long as fresh replies show standby; the moment one does not,
 or the BMU sees current, it is STOP again.
 
