@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent / PACKAGE
 
 @dataclass(frozen=True)
 class Module:
-    """One source file; `name` is dotted and without the package: "core.step"."""
+    """One source file; `name` is dotted and without the package: "core.decide"."""
 
     name: str
     source: str

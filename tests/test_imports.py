@@ -185,30 +185,30 @@ def test_the_edges_point_one_way() -> None:
 #: (rule, module, source that breaks the rule)
 BROKEN: tuple[tuple[Rule, str, str], ...] = (
     (edges, "model", "from orchestrator.errors import LinkError"),
-    (edges, "core.step", "from orchestrator.config.load import load"),
-    (edges, "core.step", "from orchestrator.config import load"),
-    (edges, "core.step", "import orchestrator.protocol.charger"),
-    (edges, "core.step", "import orchestrator"),
-    (edges, "core.step", "from orchestrator import service"),
-    (edges, "core.step", "from ..protocol import charger"),
-    (edges, "core.step", "def f():\n    from orchestrator.link.serial import Port"),
+    (edges, "core.decide", "from orchestrator.config.load import load"),
+    (edges, "core.decide", "from orchestrator.config import load"),
+    (edges, "core.decide", "import orchestrator.protocol.charger"),
+    (edges, "core.decide", "import orchestrator"),
+    (edges, "core.decide", "from orchestrator import service"),
+    (edges, "core.decide", "from ..protocol import charger"),
+    (edges, "core.decide", "def f():\n    from orchestrator.link.serial import Port"),
     (edges, "devices.charger", "if TYPE_CHECKING:\n    from orchestrator.link.serial import Port"),
     (edges, "sim.charger", "from orchestrator.protocol.frame import FrameDecoder"),
-    (edges, "core.step", "from orchestrator.modelling import x"),
+    (edges, "core.decide", "from orchestrator.modelling import x"),
     (edges, "weather", "x = 1"),
     (owners, "service.loop", "import serial"),
     (owners, "service.loop", "from serial.rs485 import RS485Settings"),
     (owners, "link.serial", "import can"),
     (owners, "link.canopen", "import can"),
     (owners, "sim.bmu", "import canopen"),
-    (owners, "core.step", "from transitions import Machine"),
+    (owners, "core.decide", "from transitions import Machine"),
     (owners, "cli", "import yaml"),
     (owners, "service.status", "import rich.table"),
     (owners, "service.loop", "import requests"),
     (owners, "service.loop", "from tests.waiting import wait_until"),
-    (purity, "core.step", "import time"),
-    (purity, "core.step", "from logging import getLogger"),
-    (purity, "core.step", "def f():\n    import os"),
+    (purity, "core.decide", "import time"),
+    (purity, "core.decide", "from logging import getLogger"),
+    (purity, "core.decide", "def f():\n    import os"),
     (purity, "core.witnesses.measured", "import threading"),
     (purity, "protocol.frame", "import socket"),
     (purity, "interlock", "import random"),
@@ -221,8 +221,8 @@ BROKEN: tuple[tuple[Rule, str, str], ...] = (
     (clocks, "config.load", "from datetime import datetime"),
     (light_packages, "config", "from orchestrator.config.load import load"),
     (light_packages, "", "import orchestrator.cli"),
-    (sizes, "core.step", "x = 1\n" * 251),
-    (sizes, "core.step", "def f():\n" + "    x = 1\n" * 40),
+    (sizes, "core.decide", "x = 1\n" * 251),
+    (sizes, "core.decide", "def f():\n" + "    x = 1\n" * 40),
 )
 
 
@@ -233,9 +233,9 @@ def test_a_broken_rule_is_seen(rule: Rule, name: str, source: str) -> None:
 
 #: (module, source that keeps all rules)
 KEPT: tuple[tuple[str, str], ...] = (
-    ("core.step", "from orchestrator.config.policy import Policy"),
-    ("core.step", "from orchestrator.config import policy"),
-    ("core.step", "from .machine import Machine\nfrom ..model import State\nimport math"),
+    ("core.decide", "from orchestrator.config.policy import Policy"),
+    ("core.decide", "from orchestrator.config import policy"),
+    ("core.decide", "from .machine import Machine\nfrom ..model import State\nimport math"),
     ("core.machine", "from transitions import Machine"),
     ("link.serial", "import serial.rs485\nimport time\ntime.sleep(1)"),
     ("service.loop", "import time\nfrom orchestrator import __version__\nnow_s = time.monotonic()"),
@@ -321,7 +321,7 @@ def test_what_is_said_of_a_bay_is_said_in_the_catalogue_alone() -> None:
 @pytest.mark.parametrize(
     ("name", "source"),
     [
-        ("core.step", '"""Of the module."""\nx = f"the pack has {y} V, below"\n'),
+        ("core.decide", '"""Of the module."""\nx = f"the pack has {y} V, below"\n'),
         ("service.bay", 'x = f"{bay} is {state} again"\n'),
         ("devices.charger", 'raise LinkError("the port is gone")\n'),
         ("link.serial", 'x = {1: "no such port"}\n'),
@@ -341,4 +341,4 @@ def test_a_sentence_elsewhere_is_seen(name: str, source: str) -> None:
     ],
 )
 def test_what_is_no_sentence_about_a_bay_is_let_be(source: str) -> None:
-    assert not list(sentences(Module("core.step", source)))
+    assert not list(sentences(Module("core.decide", source)))

@@ -26,6 +26,8 @@ from orchestrator.text.catalogue import fields, say
 
 #: The parts of a charger's reading in the status; `t_s` is when it was requested, in monotonic seconds of this machine.
 SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
+#: What the document calls a value otherwise: its names are fixed.
+NAMED = {"current_step": "current_limit"}
 #: The battery's values that are read several times a second; the others once a second.
 FAST = ("voltage_v", "current_a", "status", "temperature_c")
 
@@ -123,7 +125,7 @@ def _level(alarm: Alarm) -> str:
 def _setpoint(setpoint: Setpoint) -> dict[str, object]:
     return {
         "operation": int(setpoint.run),
-        "current_limit": setpoint.current_step,
+        NAMED["current_step"]: setpoint.current_step,
         "charge_mode": setpoint.charge_mode,
         "precharge": setpoint.precharge,
     }
@@ -132,7 +134,7 @@ def _setpoint(setpoint: Setpoint) -> dict[str, object]:
 def _charger(reading: ChargerReading | None, now_s: float) -> dict[str, object]:
     age_s = _age_s(reading, now_s)
     return {
-        **{name: getattr(reading, name) if reading else None for name in SHOWN},
+        **{NAMED.get(name, name): getattr(reading, name) if reading else None for name in SHOWN},
         "age_s": age_s,
         "old": age_s is not None and age_s > CHARGER_STALE_S,
     }

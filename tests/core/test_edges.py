@@ -42,7 +42,7 @@ def heart(age_s: float, nmt_state: int | None = 5) -> dict[str, Any]:
 
 
 def command(command: Command, seconds: float) -> dict[str, Any]:
-    return {"order": command, "command_s": ago(seconds)}
+    return {"command": command, "command_s": ago(seconds)}
 
 
 def still(seconds: float, pack_v: float, pack_a: float) -> dict[str, Any]:

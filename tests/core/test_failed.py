@@ -60,7 +60,7 @@ class Switch:
 @pytest.fixture
 def raises(monkeypatch: pytest.MonkeyPatch) -> Switch:
     switch = Switch()
-    monkeypatch.setattr(worlds, "step", switch)
+    monkeypatch.setattr(worlds, "decide", switch)
     return switch
 
 

@@ -355,7 +355,7 @@ def ordered(f: Facts) -> tuple[Command | None, Sequence]:
     return next_command(f, Setpoint(True, 4, ChargeMode.CHARGE, Precharge.OFF))
 
 
-RESUMED = {"resumed": False, "ran": False, "resume_s": ago(2), "order": RUN, "command_s": ago(1)}
+RESUMED = {"resumed": False, "ran": False, "resume_s": ago(2), "command": RUN, "command_s": ago(1)}
 
 
 def sent(t_s: float, command: Command = RESUME) -> dict[str, Any]:
@@ -377,7 +377,7 @@ ORDERS = (
 
 
 def test_a_new_order_has_not_been_tried() -> None:
-    f = Edge(commands, RUN, {**RESUMED, "resumed": True, "order": RESUME, "tries": 4}, charger=STANDS_BY).facts
+    f = Edge(commands, RUN, {**RESUMED, "resumed": True, "command": RESUME, "tries": 4}, charger=STANDS_BY).facts
     command, sequence = ordered(f)
     assert command == RUN
     assert (sequence.command, sequence.command_s, sequence.tries) == (RUN, NOW_S, 0)

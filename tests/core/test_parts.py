@@ -47,7 +47,7 @@ MADE_BY: dict[str, set[str]] = {
     "Witnessed": {"witnesses/followed"},
     "Session": {"history/session", "persisted"},
     "FaultMemory": {"latches", "failed", "persisted"},
-    "Memory": {"step", "failed", "history/__init__", "persisted"},
+    "Memory": {"decide", "failed", "history/__init__", "persisted"},
 }
 CLASSES: dict[str, type[Any]] = {
     **{kind.__name__: kind for kind in PARTS.values()}, "Session": Session, "FaultMemory": FaultMemory, "Memory": Memory

@@ -71,7 +71,7 @@ class Session:
         for frame in frames:
             assert len(frame.data) <= MAX_DATA
             with suppress(ProtocolError):
-                assert parse_error(frame).bits == frame.command
+                assert parse_error(frame).bits == frame.order
             with suppress(ProtocolError):
                 values = parse_values(frame, *self.kinds)
                 assert len(values) == len(frame.data) // 2

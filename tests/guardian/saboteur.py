@@ -70,10 +70,10 @@ MODES: dict[str, tuple[Any, str, Callable[..., None]]] = {
     "journal_dies": (Journal, "_write", end_thread),
     "loop_hangs": (Supervisor, "_news", hang),
     "loop_fails": (Supervisor, "_news", fail),
-    "step_loops": (bay, "step", loop),
-    "step_keeps_the_gil": (bay, "step", keep_the_gil),
-    "step_leaves": (bay, "step", leave),
-    "step_aborts": (bay, "step", die),
+    "decision_loops": (bay, "decide", loop),
+    "decision_keeps_the_gil": (bay, "decide", keep_the_gil),
+    "decision_leaves": (bay, "decide", leave),
+    "decision_aborts": (bay, "decide", die),
 }
 
 

@@ -56,8 +56,8 @@ CASES = (
         for mode, said in {
             **dict.fromkeys(MODES, "hangs"),
             "loop_fails": "has ended with status 1",
-            "step_leaves": "has ended with status 0",
-            "step_aborts": "was ended by SIGABRT",
+            "decision_leaves": "has ended with status 0",
+            "decision_aborts": "was ended by SIGABRT",
         }.items()
     ),
 )

@@ -81,13 +81,13 @@ WORTHLESS: Mapping[str, Grant | None] = {
 
 
 @pytest.mark.parametrize("charger", [MANUAL, AUTOMATIC], ids=["manual", "automatic"])
-@pytest.mark.parametrize("evidence", WORTHLESS.values(), ids=WORTHLESS)
+@pytest.mark.parametrize("grant", WORTHLESS.values(), ids=WORTHLESS)
 def test_without_good_evidence_only_a_stop_passes(grant: Grant | None, charger: ChargerConfig) -> None:
     assert passing(grant, charger) == STOPS
 
 
 @pytest.mark.parametrize(
-    "evidence",
+    "grant",
     [replace(GOOD, voltage_v=58.4), replace(GOOD, temperature_c=0.0), replace(GOOD, temperature_c=45.0)],
 )
 def test_a_value_on_the_limit_is_still_inside(grant: Grant) -> None:
@@ -123,7 +123,7 @@ def test_a_step_whose_current_the_station_does_not_state_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("command", "evidence", "charger", "why"),
+    ("command", "grant", "charger", "why"),
     [
         (RUN, None, MANUAL, "run: no fresh reading of charger, pack voltage and pack temperature"),
         (RUN, replace(GOOD, expires_s=NOW_S - 2), MANUAL, "run: the readings that it rests on are 2.0 s too old"),

@@ -95,7 +95,7 @@ def test_an_exception_of_our_own_stops_the_bay_latches_and_is_told(
 
     bench.charging()
     with monkeypatch.context() as broken_world:
-        broken_world.setattr(bay_module, "step", broken)
+        broken_world.setattr(bay_module, "decide", broken)
         assert "ZeroDivisionError('by accident') in broken, line" in bench.ask(Request.PAUSE)
         bench.step(5)
         assert {command for command, _ in bench.charger.commands[-6:]} == {STOP}
@@ -198,7 +198,7 @@ def test_whoever_decides_is_told_whether_running_is_on_the_disk(bench: Bench, mo
         return replace(decision, command=None), with_values(after, intends=True)
 
     bench.step(3)
-    monkeypatch.setattr(bay_module, "step", intending)
+    monkeypatch.setattr(bay_module, "decide", intending)
     bench.disk = False
     bench.step(3)
     bench.disk = True

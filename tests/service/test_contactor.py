@@ -156,7 +156,7 @@ def test_an_exception_of_our_own_that_stays_opens_it_once_the_stop_has_had_its_t
         raise ZeroDivisionError
 
     bench.charging()
-    monkeypatch.setattr(bay_module, "step", broken)
+    monkeypatch.setattr(bay_module, "decide", broken)
     bench.step()
     assert bench.charger.commands[-1][0] == STOP
     assert line.closed, "a charger that obeys is without current before it opens"

@@ -95,7 +95,7 @@ def test_the_memory_after_a_leap_is_that_of_the_ticks(monkeypatch: pytest.Monkey
         memories.append(memory)
         return decision, memory
 
-    monkeypatch.setattr(simulation, "step", recorded)
+    monkeypatch.setattr(simulation, "decide", recorded)
     last = []
     for max_leap in (simulation.MAX_LEAP, 1):
         memories.clear()
