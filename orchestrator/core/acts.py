@@ -53,8 +53,13 @@ def _by_itself(memory: Memory, now_s: float, name: str, wait_s: float) -> Cause:
         ends_s, earliest = max(end_s or 0.0 for end_s in others), "_at_the_earliest" if None in others else ""
     left_s = max(ceil(ends_s - now_s), 0)
     return Cause.of(
-        f"{verb}_in{earliest}", gone_t_s=fault.clean_s, left_s=left_s, until_t_s=ends_s, strike=strike
+        f"{verb}_in{earliest}", gone=_gone(fault), left_s=left_s, until_t_s=ends_s, strike=strike
     )  # fmt: skip
+
+
+def _gone(fault: FaultMemory) -> Cause:
+    """Since when it is gone, or not seen: what a silent device does not report may be there still."""
+    return Cause.of("not_seen" if fault.unheard else "gone", gone_t_s=fault.clean_s)
 
 
 def _bars(memory: Memory, name: str) -> bool:
@@ -91,8 +96,8 @@ def _by_person(memory: Memory, now_s: float, bay: str, name: str, *, out: bool) 
     )
     other = next(iter([*refusing(memory, now_s, request), *keeps]), None)
     if other is not None:
-        return Cause.of("waits_for_fault", gone_t_s=fault.clean_s, request=request.value, fault=other)
-    return Cause.of(f"{request.value}_now", gone_t_s=fault.clean_s, bay=bay)
+        return Cause.of("waits_for_fault", gone=_gone(fault), request=request.value, fault=other)
+    return Cause.of(f"{request.value}_now", gone=_gone(fault), bay=bay)
 
 
 def refusing(memory: Memory, now_s: float, request: Request) -> list[str]:
@@ -119,7 +124,7 @@ def refused_for(memory: Memory, now_s: float, name: str, request: Request) -> Ca
         return lasts if locked is None else lasts.with_(then=locked)
     left_s = row.clean_s - (now_s - fault.clean_s)
     if left_s > 0 and locked is None:
-        return Cause.of("refused_for", request=word, gone_t_s=fault.clean_s, left_s=ceil(left_s))
+        return Cause.of("refused_for", request=word, gone=_gone(fault), left_s=ceil(left_s))
     return locked
 
 

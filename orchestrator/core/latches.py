@@ -127,7 +127,8 @@ def _absent(row: FaultRow, fault: FaultMemory, f: Facts, passed_s: float) -> Fau
     cause = fault.cause
     if row.past is not None and cause is not None and f.memory.state in UNVERIFIED and verified(f):
         cause = row.past(cause, row.for_s + clean_s - fault.raised_s)
-    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause, now=None)
+    unheard = f.silent or f.reading is None
+    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause, now=None, unheard=unheard)
 
 
 def clear_after_s(row: FaultRow, fault: FaultMemory) -> float | None:

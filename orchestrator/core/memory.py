@@ -32,6 +32,7 @@ class FaultMemory:
     latched: bool = False  #: a person must reset it
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
     now: Cause | None = None  #: what was seen at the last look; None: it was not there
+    unheard: bool = False  #: whether it may only be unseen: a device was not heard at the last look
     worst: float | None = None  #: the worst value of its one figure since it was raised, if it has one
 
 
@@ -176,7 +177,7 @@ PART_OF = {one.name: part for part in FLAT for one in fields(PARTS[part])}
 RECORDS: Mapping[type[Any], Mapping[Kind, tuple[str, ...]]] = {
     FaultMemory: {
         Kind.EVENT: ("present", "raised_s", "clean_s", "latched", "strikes"),
-        Kind.MEASURED: ("seen_s", "polls", "poll_t_s", "cause", "now", "worst"),
+        Kind.MEASURED: ("seen_s", "polls", "poll_t_s", "cause", "now", "unheard", "worst"),
     },
     Session: {
         Kind.EVENT: ("rise_v", "full"),

@@ -463,7 +463,7 @@ def test_evidence_is_told_in_the_tense_that_is_true() -> None:
     (fault,) = world.decision.faults
     assert (fault.since_s, fault.gone_s) == (raised_s, gone_s)
     assert fault.next == Cause.of(
-        "goes_on_in", gone_t_s=gone_s, left_s=10, until_t_s=gone_s + 10, strike=None
+        "goes_on_in", gone=Cause.of("gone", gone_t_s=gone_s), left_s=10, until_t_s=gone_s + 10, strike=None
     )  # fmt: skip
 
 
@@ -540,6 +540,22 @@ def trip_and_reset(world: World, **trips: float) -> str:
     world.run(8)
     assert world.is_in(State.TRIPPED)
     return world.ask(Request.RESET)
+
+
+def test_what_a_silent_device_does_not_report_is_not_called_gone() -> None:
+    """A hot pack whose BMU falls silent is not known to have cooled down."""
+    world = charging()
+    world.values["temperature_c"] = 46.0
+    world.run(4)
+    assert "by itself 10 s after it is gone" in world.told["over_temperature"]
+    world.battery_answers = False
+    world.run(3)
+    assert "not seen since" in world.told["over_temperature"]
+    assert "gone since" not in world.told["over_temperature"]
+    world.values["temperature_c"] = 30.0
+    world.battery_answers = True
+    world.run(2)
+    assert "gone since" in world.told["over_temperature"]
 
 
 def test_what_comes_again_after_every_reset_is_not_reset_for_ever() -> None:

@@ -57,6 +57,6 @@ def test_what_is_no_time_stays() -> None:
 
 
 def test_without_a_clock_a_moment_is_told_in_seconds() -> None:
-    gone = Cause.of("start_now", gone_t_s=3723.4, bay="bay-1")
+    gone = Cause.of("start_now", gone=Cause.of("gone", gone_t_s=3723.4), bay="bay-1")
     assert say(gone) == "gone since 3723 s: orchestrator start bay-1"
     assert say(CLOCK.told(gone)) == "gone since 22:02:37: orchestrator start bay-1"

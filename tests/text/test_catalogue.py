@@ -48,7 +48,7 @@ def test_every_row_of_the_fault_table_says_what_to_do(language: str) -> None:
 def test_korean_is_korean() -> None:
     for texts in (KO.texts, KO.advice):
         for id_, text in texts.items():
-            bare = "".join(literal for literal, *_ in Formatter().parse(text)).strip(" ,.'")
+            bare = "".join(literal for literal, *_ in Formatter().parse(text)).strip(" ,.:'")
             figure = id_.startswith("figure_")  # a number with its unit
             korean = any("가" <= one <= "힣" for one in bare)
             assert figure or korean or not WORD.search(bare) or bare in NAMES, id_
