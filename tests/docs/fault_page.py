@@ -75,6 +75,7 @@ DOUBTS = Cause.of(
         Cause.of("energy_disagrees", remaining_ah=10, available_wh=100, implied_v=10, pack_v=48),
     ),
 )  # fmt: skip
+GONE = Cause.of("gone", gone_at="21:09:40")
 AT = {"raised_at": "21:02:14", "past": True}
 SAMPLES = {
     "there": HOT.with_(
@@ -84,10 +85,10 @@ SAMPLES = {
     "gone": WAS_HOT.with_(
         "", **AT,
         worst=Cause.of("up_to", figure=Cause.of("figure_c", value=46.8)), now=(Cause.of("figure_c", value=39.8),),
-        then=Cause.of("goes_on_in", gone=Cause.of("gone", gone_at="21:09:40"), left_s=8, strike=None),
+        then=Cause.of("goes_on_in", gone=GONE, left_s=8, strike=None),
     ),
     "there, latched": BITS.with_("", since_at="21:02:14", then=Cause.of("refused_while", request="reset")),
-    "gone, latched": BITS.with_("", **AT, then=Cause.of("reset_now", gone=Cause.of("gone", gone_at="21:09:40"), bay="bay-1")),
+    "gone, latched": BITS.with_("", **AT, then=Cause.of("reset_now", gone=GONE, bay="bay-1")),
     "reset too often": BITS.with_("", **AT, then=Cause.of("reset_locked", until_at="22:05", times=3)),
     "counts for a time": DOUBTS.with_(
         "", since_at="21:02:14", then=Cause.of("refused_until", request="start", until_at="21:18")
