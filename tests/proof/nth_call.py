@@ -36,7 +36,7 @@ from tests.proof.virtual_rig import Nature
 from tests.proof.virtual_service import World, station, world
 
 #: States of a link before it is first heard.
-FIRST = ("not opened yet", "open, no answer yet", "not asked yet")
+FIRST = ("port_not_opened", "port_opened", "bmu_not_asked")
 #: Twice the time of an undisturbed charge, plus a backoff.
 END_S = 75.0
 #: A failure shows within this.
@@ -181,7 +181,7 @@ class Charge:
         self.full = self.full or decision.state is State.FULL
         self.interrupted = self.interrupted or (bool(decision.faults) and not self.full)
         for link in (snapshot.charger_link, snapshot.battery_link):
-            if link.problem and not link.problem.endswith(FIRST):
+            if link.problem is not None and link.problem.id not in FIRST:
                 self.recorded = True
             self.recorded = self.recorded or link.bad_frames > 0 or bool(decision.faults)
         if self.full or (self.brief and self._until_s and self._settled(decision)):

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.config.station import BayConfig
+from orchestrator.core import decide as decide_module
 from orchestrator.core import latches
-from orchestrator.core import step as step_module
 from orchestrator.core.faults import FAULTS
 from orchestrator.core.machine import Trigger, fire
 from orchestrator.core.rules import Rules
@@ -45,7 +45,7 @@ def without(*names: str) -> Callable[[Patch], None]:
 
 def skips_qualifying(patch: Patch) -> None:
     leads = {(State.SUSPENDED, Trigger.QUALIFY): State.CHARGING}
-    patch.setattr(step_module, "fire", lambda state, trigger: leads.get((state, trigger)) or fire(state, trigger))
+    patch.setattr(decide_module, "fire", lambda state, trigger: leads.get((state, trigger)) or fire(state, trigger))
 
 
 def no_limits(patch: Patch) -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from orchestrator import model
+from orchestrator.core import decide as decide_module
 from orchestrator.core import latches, machine, operator, safestop
-from orchestrator.core import next_transition as course_module
-from orchestrator.core import step as step_module
+from orchestrator.core import next_transition as going
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, Clear
 from orchestrator.core.machine import Trigger
@@ -37,16 +37,16 @@ def without(*names: str) -> Callable[[Patch], None]:
 
 
 def only_trips_stop(patch: Patch) -> None:
-    energised = course_module._energised
+    energised = going._energised
     patch.setattr(
-        course_module, "_energised", lambda f, faults: energised(f, tuple(x for x in faults if x.effect != Effect.STOP))
+        going, "_energised", lambda f, faults: energised(f, tuple(x for x in faults if x.effect != Effect.STOP))
     )
 
 
 def pause_goes_on(patch: Patch) -> None:
-    energised = course_module._energised
+    energised = going._energised
     patch.setattr(
-        course_module, "_energised", lambda f, faults: energised(f, tuple(x for x in faults if x.effect > Effect.PAUSE))
+        going, "_energised", lambda f, faults: energised(f, tuple(x for x in faults if x.effect > Effect.PAUSE))
     )
 
 
@@ -65,7 +65,7 @@ def trip_is_no_latch(patch: Patch) -> None:
         tripped = f.memory.state is State.TRIPPED and f.state_s > 60
         return place(f, tuple(x for x in faults if x.effect is not Effect.TRIP) if tripped else faults)
 
-    patch.setattr(course_module, "resting_place", forgets)
+    patch.setattr(going, "resting_place", forgets)
 
 
 def stop_is_not_heard(patch: Patch) -> None:
@@ -74,7 +74,7 @@ def stop_is_not_heard(patch: Patch) -> None:
     def deaf(memory: Memory, asked: Request, *more: Any) -> Heard:
         return Heard(memory.operator, memory.faults) if asked is Request.STOP else hear(memory, asked, *more)
 
-    patch.setattr(step_module, "hear", deaf)
+    patch.setattr(decide_module, "handle_request", deaf)
 
 
 def reset_starts(patch: Patch) -> None:
@@ -83,7 +83,7 @@ def reset_starts(patch: Patch) -> None:
 
     hear = operator.handle_request
     patch.setattr(
-        step_module, "hear",
+        decide_module, "handle_request",
         lambda m, asked, now_s, *more: reset(m, now_s) if asked is Request.RESET else hear(m, asked, now_s, *more),
     )  # fmt: skip
 
@@ -91,7 +91,7 @@ def reset_starts(patch: Patch) -> None:
 def nobody_qualifies(patch: Patch) -> None:
     fire = machine.fire
     leads = {(State.IDLE, Trigger.QUALIFY): State.CHARGING}
-    patch.setattr(step_module, "fire", lambda state, trigger: leads.get((state, trigger)) or fire(state, trigger))
+    patch.setattr(decide_module, "fire", lambda state, trigger: leads.get((state, trigger)) or fire(state, trigger))
 
 
 def any_standby_proves(patch: Patch) -> None:
@@ -103,12 +103,12 @@ def station_limit_is_forgotten(patch: Patch) -> None:
 
 
 def nothing_must_stop(patch: Patch) -> None:
-    patch.setattr(step_module, "must_stop", lambda f, state: False)
+    patch.setattr(decide_module, "must_stop", lambda f, state: False)
 
 
 def silent_alarm(patch: Patch) -> None:
     decide = model.Decision
-    patch.setattr(step_module, "Decision", lambda **fields: decide(**fields | {"alarm": model.Alarm.NONE}))
+    patch.setattr(decide_module, "Decision", lambda **fields: decide(**fields | {"alarm": model.Alarm.NONE}))
 
 
 def a_hold_wears_off(patch: Patch) -> None:
@@ -118,11 +118,11 @@ def a_hold_wears_off(patch: Patch) -> None:
         held = f.memory.state is State.HELD and f.state_s > 60
         return place(f, tuple(x for x in faults if x.effect is not Effect.STOP) if held else faults)
 
-    patch.setattr(course_module, "resting_place", forgets)
+    patch.setattr(going, "resting_place", forgets)
 
 
 def never_gives_up(patch: Patch) -> None:
-    patch.setattr(course_module, "gives_up", lambda f: False)
+    patch.setattr(going, "gives_up", lambda f: False)
 
 
 def nothing_proves(patch: Patch) -> None:
@@ -130,16 +130,16 @@ def nothing_proves(patch: Patch) -> None:
 
 
 def absent_battery_is_waited_for(patch: Patch) -> None:
-    stopping = course_module._stopping
+    stopping = going._stopping
     patch.setattr(
-        course_module, "_stopping",
+        going, "_stopping",
         lambda f, faults: Next(None, f.memory.cause) if f.battery_removed and f.state_s < 60 else stopping(f, faults),
     )  # fmt: skip
 
 
 def silence_is_patient(patch: Patch) -> None:
     gives_up = safestop.gives_up
-    patch.setattr(course_module, "gives_up", lambda f: f.charger.online and gives_up(f))
+    patch.setattr(going, "gives_up", lambda f: f.charger.online and gives_up(f))
 
 
 def strikes_are_forgotten(patch: Patch) -> None:
@@ -152,11 +152,11 @@ def unwritten_row(patch: Patch) -> None:
     def without_row(state: State, trigger: Trigger) -> State:
         return fire(State.TRIPPED if (state, trigger) == (State.STOPPING, Trigger.FILL) else state, trigger)
 
-    patch.setattr(step_module, "fire", without_row)
+    patch.setattr(decide_module, "fire", without_row)
 
 
 def never_sure(patch: Patch) -> None:
-    patch.setattr(course_module, "QUALIFY_S", inf)
+    patch.setattr(going, "QUALIFY_S", inf)
 
 
 def no_tolerance(patch: Patch) -> None:
@@ -168,7 +168,7 @@ def no_tolerance(patch: Patch) -> None:
 
 
 def wakes_with_the_wrong_function(patch: Patch) -> None:
-    patch.setitem(step_module.SETPOINTS, State.PRECHARGE_PULSE, (ChargeMode.PRECHARGE, Precharge.OFF))
+    patch.setitem(decide_module.SETPOINTS, State.PRECHARGE_PULSE, (ChargeMode.PRECHARGE, Precharge.OFF))
 
 
 def nobody_believes_the_bmu(patch: Patch) -> None:
@@ -187,7 +187,7 @@ def counts_anew(persisted: Persisted) -> Persisted:
 
 
 def never_full(patch: Patch) -> None:
-    patch.setattr(course_module, "finished", lambda f: None)
+    patch.setattr(going, "finished", lambda f: None)
 
 
 #: The property that must fail → the bug.

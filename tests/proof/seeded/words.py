@@ -26,7 +26,7 @@ WORDS: tuple[Seed, ...] = (
             "        return False\n",
         ),
         (
-            f"{CORE}course.py",
+            f"{CORE}next_transition.py",
             "if state is State.STARTING and not memory.stop.unverified and not f.charger.online",
             "if state is State.STARTING and not f.charger.online",
         ),
