@@ -168,7 +168,7 @@ def _speed(runs: int) -> Iterator[str]:
     yield ""
     yield f"a charge of {HOURS:g} h, processor time, median of {runs} runs"
     for name, took_s in (
-        ("orchestrator simulate, every decision by step()", ours_s),
+        ("orchestrator simulate, every decision by decide()", ours_s),
         ("PyBaMM's experiment runner, model set up each time", set_up_s),
         ("PyBaMM's experiment runner, model set up before", solved_s),
     ):

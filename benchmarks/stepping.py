@@ -1,4 +1,4 @@
-"""The cost of one decision of the core (`step()`): recorded situations of a live bay, decided repeatedly.
+"""The cost of one decision of the core (`decide()`): recorded situations of a live bay, decided repeatedly.
 
 Processor time of the thread, so the machine's other load does not count. Floors: the look-up of a transition in a dict,
 and `transitions` firing one.

@@ -1,4 +1,4 @@
-"""`step()`: one decision about one bay. The live service, the simulator, the checker and the replay all call this.
+"""`decide()`: one decision about one bay. The live service, the simulator, the checker and the replay all call this.
 
 facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the command.
 """

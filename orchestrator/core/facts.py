@@ -24,7 +24,7 @@ from orchestrator.model import (
     State,
 )
 
-#: A status reply is taken for the charger's present state for this long. Three misses are found earlier, also where
+#: A status reply is taken for the charger's present state for this long. Five misses are found earlier, also where
 #: orders and polls take turns (0.4 s each); this is for a port that no longer polls at all.
 CHARGER_STALE_S = 1.5
 #: Volts, amps, status and temperature of the pack: three sweeps, at most this.

@@ -1,4 +1,4 @@
-"""What to do about a bay when `step()` itself has raised: stop it, by the same deadline and with the same alarm.
+"""What to do about a bay when `decide()` itself has raised: stop it, by the same deadline and with the same alarm.
 
 Nothing is judged here but the plainest words of the charger. The memory knows since when the bay is being stopped, so
 that the next step, if it does not raise, goes on from there.

@@ -1,6 +1,6 @@
 """The state machine: every state, every trigger, every transition, in one table.
 
-Theory of operation. `step()` looks at the facts and picks at most one trigger; this table says where it leads. A pair
+Theory of operation. `decide()` looks at the facts and picks at most one trigger; this table says where it leads. A pair
 that is not in the table is refused with `RefusedError` and the state stays as it is. Three rules can be read off it:
 
 - Current flows in three states only, and they are left only by `stop`, or one to the next.

@@ -147,7 +147,7 @@ class Tables:
 
 @dataclass(frozen=True, slots=True)
 class Memory:
-    """`step()` is given one and returns the next."""
+    """`decide()` is given one and returns the next."""
 
     state: State = event(State.STARTING)
     since_s: float | None = event(None)  #: when the state was entered; None before the first step

@@ -18,7 +18,7 @@ from orchestrator.core.parts import changed
 from orchestrator.core.states import ENERGISED, UNVERIFIED
 from orchestrator.model import Cause, State
 
-#: A stop that is not verified within this is not obeyed (DESIGN §6).
+#: A stop that is not verified within this is not obeyed.
 OBEY_STOP_S = 3.0
 #: A charger that has not answered for this long at the start is not there.
 LOST_S = 3.0

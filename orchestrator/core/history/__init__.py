@@ -18,7 +18,7 @@ def update_history(f: Facts, passed_s: float) -> Facts:
             before,
             charger=charger.update(f, passed_s),
             stage=stage.update(f),
-            witnessed=followed.follow(f, passed_s),
+            witnessed=followed.update(f, passed_s),
             tables=rows.update(f),
             battery=battery.update(f),
         )

@@ -62,7 +62,7 @@ class Witnessed:
     alone_s: float = measured(0.0)  #: for how long the charger has delivered without that; drains
 
 
-def follow(f: "Facts", passed_s: float) -> Witnessed:
+def update(f: "Facts", passed_s: float) -> Witnessed:
     """What is known after this step's facts; `passed_s` since the step before."""
     before = f.memory.witnessed
     stop_s, known = _stop_s(f), _first_amperes(f, before, passed_s)

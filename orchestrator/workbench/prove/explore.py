@@ -86,7 +86,7 @@ class Walk:
     def broken(self, taken: Taken) -> Iterator[tuple[str, str]]:
         """The name of each property that the decision violates, and how."""
         if taken.error:
-            yield "no exception", f"step() raised {taken.error}"
+            yield "no exception", f"decide() raised {taken.error}"
             return
         for rule in self.properties:
             wrong = rule.check(taken)

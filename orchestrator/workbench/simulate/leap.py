@@ -1,6 +1,6 @@
 """Time steps that stretch: when steps may be left out, and what they would have left in the memory.
 
-Theory of operation. While nothing happens, one `step()` after another says the same. A leap takes the last of them
+Theory of operation. While nothing happens, one `decide()` after another says the same. A leap takes the last of them
 only. It counts if its outline, all that a decision says and all that the core keeps but measured values, is that from
 before the leap; else it is taken back and tried again with half the length, down to one tick. So whatever happens is
 decided at its own tick. What the core sums up or keeps from step to step (the charge, the temperatures of the last
