@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core import faults, latches, next_transition, outofcontrol, persisted, step
+from orchestrator.core import decide, faults, latches, next_transition, outofcontrol, persisted
 from orchestrator.core.facts import Facts
 from orchestrator.lastresort import lastline
 from orchestrator.model import Cause
@@ -78,7 +78,7 @@ def test_a_bug_is_found_and_its_script_made_small(name: str, monkeypatch: Patch)
 
 
 def never_opens(patch: Patch) -> None:
-    patch.setattr(step, "closes", lambda *_, **__: True)
+    patch.setattr(decide, "closes", lambda *_, **__: True)
 
 
 def lets_others_run(patch: Patch) -> None:

@@ -43,8 +43,8 @@ PORTS: tuple[Seed, ...] = (
         ("tests/devices/test_charger_port.py::test_an_opened_port_stops_the_whole_charger_before_it_asks_anything",),
         (
             f"{DEVICES}schedule.py",
-            "        self.order: Command | None = STOP  #: the command to repeat\n        self._urgent = True",
-            "        self.order: Command | None = None  #: the command to repeat\n        self._urgent = False",
+            "        self.command: Command | None = STOP  #: the command to repeat\n        self._urgent = True",
+            "        self.command: Command | None = None  #: the command to repeat\n        self._urgent = False",
         ),
     ),
     scene(
