@@ -94,7 +94,7 @@ def test_a_restart_is_neither_a_reset_nor_a_start(tmp_path: Path) -> None:
         assert service.ended() == 0
         service.start().wait("TRIPPED", ["bay-1"])
         bay = service.bay("bay-1")
-        assert "the BMU reports bmu error" in bay["reason"]
+        assert "the BMU reported bmu error" in bay["reason"], "its cause is gone, the trip is not"
         assert (
             service.wait("HELD", ["bay-2"])["bay-2"]["reason"]
             == "stopped by the operator; to go on: orchestrator start bay-2"

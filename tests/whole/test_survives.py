@@ -52,7 +52,7 @@ def test_an_accepted_stop_outlives_a_kill_right_after_it(station: Station) -> No
     service.kill_all()
     assert kept(service)["bay-1"]["hold"]["id"] == "operator_stop"
     service.start()
-    assert "then start: orchestrator start bay-1" in service.wait("HELD")["bay-1"]["reason"]
+    assert ": orchestrator start bay-1" in service.wait("HELD")["bay-1"]["reason"]
     assert plant.state(1)["operation"] == 0
     assert kept(service)["bay-1"]["hold"]["id"] == "operator_stop"
 
