@@ -176,6 +176,9 @@ SCENES: dict[str, Script] = {
     ),
     # 10. The record of the accident.
     "a record over lives": _scene(
+        h(0, "term"), h(4, "boot"), h(16, "kill both"), h(20, "boot"), end_s=T + 36, recorded=True
+    ),
+    "a torn record": _scene(
         h(0, "term"),
         h(4, "boot"),
         h(16, "kill both"),
