@@ -178,12 +178,12 @@ class Facts:
 
     @property
     def unordered(self) -> bool:
-        """The BMU keeps seeing a charging current that nobody ordered: whatever the charger reports, something runs."""
+        """The BMU keeps seeing a charging current without a command: whatever the charger reports, something runs."""
         return self.memory.witnessed.unordered_s >= standby.UNORDERED_S and standby.sees_current(self)
 
     @property
     def stopped(self) -> bool:
-        """Both witnesses answered a stop that was sent in this state with standby."""
+        """Both witnesses show standby after a stop that was sent in this state."""
         return standby.proved(self)
 
     @property

@@ -114,8 +114,7 @@ def tapers(f: Facts) -> bool:
     return f.amps < tapered_a(f) and f.pack_v > taper.above_v
 
 
-# --- all the way, every so many days
-# -----------------------------------------------------------------------------------
+# --- all the way, every `full_every_days` -----------------------------------------------------------------------------
 
 
 def full_due(f: Facts) -> bool:

@@ -1,4 +1,4 @@
-"""How faults come and go: debounce, latch, backoff, clear. Mechanism only; the table says what is a fault.
+"""How faults come and go: debounce, latch, backoff, clear. Mechanism only; the table defines the faults.
 
 Theory of operation. A row's predicate returns what is seen now. Once that has lasted for the row's time and number of
 polls it becomes a fault, is followed in every state, and ends as its `Clear` says. Before that, its time and its polls

@@ -76,7 +76,7 @@ class Stage:
     ran: bool = event(
         default=False, tells=ENERGISED
     )  #: the charger runs, or did: reported by itself, seen by the BMU, or deduced
-    shown: bool = event(default=False)  #: the charger has shown the mode it was told
+    shown: bool = event(default=False)  #: the charger has shown the commanded mode
     qualified_s: float | None = event(None, tells=QUALIFYING)  #: since when every condition for a charge has held
     ready: bool = event(default=False)  #: every condition for a charge holds; it waits for its turn
     intends: bool = event(default=False, tells=QUALIFYING)  #: its turn has come; a charge begins once that is on disk

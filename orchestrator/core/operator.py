@@ -48,7 +48,7 @@ def handle_request(
 
 
 def stopped(known: Operator) -> Operator:
-    """The state after an operator has stopped the bay."""
+    """The operator's part of the memory after a stop."""
     return changed(known, hold=STOPPED)
 
 

@@ -55,7 +55,7 @@ def update(f: Facts, after: State, cause: Cause) -> Stop:
 
 
 def failed(stop: Stop, now_s: float, cause: Cause | None) -> Stop:
-    """Our own code has failed, so nothing about the charger is proved. `cause`: why this stop begins."""
+    """Our own code has failed, so nothing about the charger is proved. `cause`: why a stop begins now, if so."""
     if cause is None:
         return changed(stop, unverified=True)
     return changed(stop, unverified=True, stopping_s=now_s, stop_cause=cause)
@@ -68,7 +68,7 @@ def proved_to_last(f: Facts) -> bool:
 
 
 def verified(f: Facts) -> bool:
-    """The current stop is complete."""
+    """The stop in progress is complete."""
     return proved_to_last(f) if f.memory.state is State.UNCONTROLLABLE else f.stopped
 
 
@@ -78,7 +78,7 @@ def stands_by(f: Facts) -> bool:
 
 
 def _runs_again(f: Facts) -> bool:
-    """Whether it was stopped before without success.
+    """Whether it runs again after an earlier stop in vain.
 
     A single reply may be a stray measurement; a second one, or a second return, is not.
     """

@@ -47,7 +47,7 @@ def update(f: Facts) -> BatteryHistory:
 
 
 def _departure(f: Facts, known: BatteryHistory) -> BatteryHistory:
-    """A battery that is removed in mid-charge and back at once: its plug is loose."""
+    """Detect a loose plug: the battery is removed in mid-charge and back within `LOOSE_PLUG_S`."""
     if known.returned_s is not None:
         known = changed(known, returned_s=None)
     if f.battery_removed:

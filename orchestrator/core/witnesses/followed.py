@@ -53,7 +53,7 @@ class Witnessed:
     stop_s: float | None = event(None)  #: when the first whole stop of the present state was handed to the port
     proof: tuple[float, ...] = measured(())  #: request times of the first and the newest status reply of an
     #: unbroken run of standby replies since then
-    sees: bool = measured(default=False, tells=RESTING)  #: the BMU sees a charging current that nobody ordered …
+    sees: bool = measured(default=False, tells=RESTING)  #: the BMU sees a charging current without a command …
     unordered_s: float = measured(0.0)  #: … and for how long it has; drains
     trail: tuple[Sample, ...] = measured(())  #: of the last seconds under current, oldest first
     frozen: Frozen | None = measured(None)
