@@ -41,7 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _said(error: OrchestratorError) -> str:
-    """What to print of it: in the reader's language where it is told as data."""
+    """The message to print, in the reader's language if the error carries its cause as data."""
     from orchestrator.show import own_language
     from orchestrator.text.catalogue import say
     from orchestrator.text.document import said
@@ -65,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Only for the list of verbs: `__main__` runs it before any of this is imported."""
+    """Only for the list of verbs: `__main__` runs it before importing any of this."""
     verbs.add_parser("estop", help="stop every charger now; needs no running service", add_help=False)
 
 
@@ -125,7 +125,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _station(file: str) -> "Station | None":
-    """The station in a file; None if it is of another kind."""
+    """The station in a file; None if it is another kind of file."""
     from orchestrator.config.load import load_station
 
     try:

@@ -1,22 +1,22 @@
-"""Text for a terminal: how wide it is, and how a long line is folded."""
+"""Text for a terminal: its width, and how a long line is folded."""
 
 import re
 from unicodedata import east_asian_width
 
-#: What is not torn in two at the end of a line: a command that somebody may copy, a figure and its unit, a word.
+#: Never split at the end of a line: a command that somebody may copy, a figure and its unit, a word.
 WORD = re.compile(r"orchestrator \S+ \S+|\d\S* (?:°C|Ah|Wh|V|A|%|s|min|h|K)\S*|\S+")
 
 
 def width_of(text: str) -> int:
-    """How many columns of a terminal it takes: a Korean letter takes two."""
+    """The number of terminal columns it takes: a Korean letter takes two."""
     return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
 
 
 def folded(line: str, width: int, indent: int = 4) -> str:
-    """The line in as many as it takes at this width (0: as long as it is), all but the first one indented."""
+    """The line folded to this width (0: not folded), every line but the first indented."""
     if not width or width_of(line) <= width:
         return line
-    head = max(len(line) - len(line.lstrip()), indent if indent > 4 else 0)  # what is aligned already stays
+    head = max(len(line) - len(line.lstrip()), indent if indent > 4 else 0)  # aligned text stays aligned
     lines, now = [], line[:head]
     for word in WORD.findall(line[head:]):
         if now.strip() and width_of(now) + width_of(word) > width:

@@ -1,1 +1,1 @@
-"""The decisions, and nothing else: pure functions of their arguments. No clock, no log, no thread, no file."""
+"""Pure decision functions of their arguments: no clock, no log, no thread, no file."""

@@ -1,8 +1,8 @@
-"""The faults in force as people read them: in the tense that is true, with their times, their figures and their act.
+"""The active faults as people read them: in the right tense, with their times, their figures and what to do.
 
-The evidence is what is seen now while it is there, and what was seen when it was raised once it is gone; then what the
-same quantities are now stands beside it. Nothing of this is an event: figures and countdowns change with every look, a
-fault is the same for as long as its id and its effect are.
+While the condition is true, the evidence is what is seen now. Once it is gone, the evidence is what was seen when the
+fault was raised, with the present values of the same quantities beside it. None of this is an event: figures and
+countdowns change with every look, and a fault is the same for as long as its id and its effect are.
 """
 
 from collections.abc import Callable, Mapping
@@ -15,7 +15,7 @@ from orchestrator.core.latches import effect, raised
 from orchestrator.core.memory import FaultMemory, Memory
 from orchestrator.model import ActiveFault, Cause, State
 
-#: What is known now of the quantities that stand in evidence, by the names of its parameters.
+#: The present value of each quantity used in evidence, by its parameter name.
 LIVE: Mapping[str, Callable[[Facts], float | None]] = {
     "charger_v": lambda f: f.volts,
     "charger_a": lambda f: f.amps,
@@ -31,15 +31,15 @@ LIVE: Mapping[str, Callable[[Facts], float | None]] = {
 def active_faults(
     memory: Memory, now_s: float, bay: str, f: Facts | None = None, *, at_rest: bool = False
 ) -> tuple[ActiveFault, ...]:
-    """The faults in force, the most dangerous first. `f` is None where nothing is known of the bay now.
+    """The active faults, the most dangerous first. `f` is None if nothing is known of the bay now.
 
-    `at_rest`: the charger stands by, verified.
+    `at_rest`: the charger is in standby, verified.
     """
     return tuple(_active(memory, now_s, bay, name, f, at_rest=at_rest) for name, _ in raised(memory.faults))
 
 
 def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
-    """What is, or was, seen of it, and what to do."""
+    """What is, or was, seen, and what to do about it."""
     more: dict[str, Any] = {"effect": effect(row.id, fault).name}
     if fault.latched and len(fault.strikes) > 1:
         more["strikes"] = len(fault.strikes)
@@ -47,13 +47,13 @@ def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cau
         more["past"] = True
     seen = fault.now if fault.now is not None and not row.moment else fault.cause
     advice = row.at_rest if at_rest and row.at_rest else row.id
-    if row.clear is Clear.AUTO and fault.clean_s is not None:  # nothing is left to be done
+    if row.clear is Clear.AUTO and fault.clean_s is not None:  # nothing is left to do
         advice = ""
     return (seen or Cause(row.id)).with_(advice, **more)
 
 
 def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:
-    """Since when it is, or when it was; and its figures then and now."""
+    """Since when it has been active, or when it was raised; and its figures then and now."""
     names, raised_s = row.figures.split(), fault.raised_s
     then = figures(fault.cause, names)
     if fault.clean_s is not None or row.moment:
@@ -62,7 +62,7 @@ def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tu
         more = {"raised_t_s": raised_s, "worst": _worse(row, fault, then), "now": now if len(now) == len(then) else ()}
     else:
         now_seen = figures(fault.now, names)
-        alike = dict(then).keys() == dict(now_seen).keys()  # evidence may be about another quantity by now
+        alike = dict(then).keys() == dict(now_seen).keys()  # the evidence may be about another quantity by now
         was = _figures(then) if alike and then != now_seen else ()
         worst = None if not now_seen or fault.worst in dict(now_seen).values() else _worse(row, fault, then)
         more = {"since_t_s": raised_s, "was": was, "worst": worst}
@@ -70,17 +70,17 @@ def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tu
 
 
 def figures(cause: Cause | None, names: list[str]) -> list[tuple[str, float]]:
-    """The figures of a piece of evidence."""
+    """The figures in a piece of evidence."""
     return [(name, cause.param(name)) for name in names if cause is not None and cause.param(name) is not None]
 
 
 def _figures(known: list[tuple[str, float]]) -> tuple[Cause, ...]:
-    """Each with its unit, which is what stands behind the last underscore of its name."""
+    """Each with its unit, which follows the first underscore of its name."""
     return tuple(Cause.of(f"figure_{name.partition('_')[2]}", value=value) for name, value in known)
 
 
 def _worse(row: FaultRow, fault: FaultMemory, then: list[tuple[str, float]]) -> Cause | None:
-    """The worst value, where it was another one than at the beginning."""
+    """The worst value, if it differs from the first."""
     if fault.worst is None or len(then) != 1 or fault.worst == then[0][1]:
         return None
     return Cause.of("down_to" if row.lowest else "up_to", figure=_figures([(then[0][0], fault.worst)])[0])

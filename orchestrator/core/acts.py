@@ -1,10 +1,10 @@
-"""What ends a fault: by itself, and when; or by a person, with which command, and until when that is refused.
+"""What ends a fault: itself, and when; or a person, with which command, and until when that is refused.
 
-Theory of operation. The row says who ends it (`Clear`), the memory says what stands in the way now: it is there still,
-it has not been gone for long enough, another fault is there, it was reset too often, or the charger was not seen to
-stop. What a request is refused for (`operator.py`) is worked out by the same functions, so a line of the status never
-names a command that would be refused. Moments are monotonic seconds, in parameters called `…_t_s`; the service turns
-them into the time of day.
+Theory of operation. The row says who ends it (`Clear`); the memory shows what prevents that now: the condition is still
+true, it has not been gone for long enough, another fault is active, it was reset too often, or the charger was not seen
+to stop. The same functions determine why a request is refused (`operator.py`), so a status line never names a command
+that would be refused. Moments are monotonic seconds, in parameters called `…_t_s`; the service converts them to the
+time of day.
 """
 
 from math import ceil
@@ -17,14 +17,14 @@ from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.states import DONE, ENERGISED
 from orchestrator.model import Cause, Effect, Request
 
-#: So many resets of one fault are allowed within this time.
+#: This many resets of one fault are allowed within this time.
 MAX_RESETS, RESETS_S = 3, 3600.0
-#: While what must survive a restart is not kept, nothing is cleared.
+#: While the persisted state cannot be written, nothing is cleared.
 UNKEPT = "not_persisted"
 
 
 def act(memory: Memory, now_s: float, bay: str, name: str, *, out: bool = False) -> Cause:
-    """What ends the fault `name`, which is in force. `out`: its charger is out of control."""
+    """What ends the active fault `name`. `out`: its charger is out of control."""
     fault = memory.faults[name]
     wait_s = clear_after_s(ROW[name], fault)
     if wait_s is None:
@@ -36,7 +36,10 @@ def act(memory: Memory, now_s: float, bay: str, name: str, *, out: bool = False)
 
 
 def _by_itself(memory: Memory, now_s: float, name: str, wait_s: float) -> Cause:
-    """In how long, once it is gone. The bay goes on with its worst fault only, and if no person is needed."""
+    """How long after its condition is gone it ends.
+
+    Only the worst fault says that the bay goes on, and only if no person is needed.
+    """
     row, fault = ROW[name], memory.faults[name]
     strike = None
     if row.clear is Clear.BACKOFF:
@@ -58,21 +61,21 @@ def _by_itself(memory: Memory, now_s: float, name: str, wait_s: float) -> Cause:
 
 
 def _gone(fault: FaultMemory) -> Cause:
-    """Since when it is gone, or not seen: what a silent device does not report may be there still."""
+    """Since when it is gone, or not seen: what a silent device does not report may still be there."""
     return Cause.of("not_seen" if fault.unheard else "gone", gone_t_s=fault.clean_s)
 
 
 def _bars(memory: Memory, name: str) -> bool:
-    """Whether this fault is what a bay waits for that goes on by itself."""
+    """Whether this fault alone keeps a bay waiting that would go on by itself."""
     live = raised(memory.faults)
     waits = memory.operator.hold is not None or memory.operator.paused or memory.state in DONE
     by_person = any(clear_after_s(ROW[one], other) is None for one, other in live)
-    least = Effect.PAUSE if memory.state in ENERGISED else Effect.NO_START  # a charge that runs waits for nothing
+    least = Effect.PAUSE if memory.state in ENERGISED else Effect.NO_START  # a running charge waits for nothing
     return not waits and not by_person and live[0][0] == name and latches.effect(*live[0]) >= least
 
 
 def _ends_s(name: str, fault: FaultMemory) -> float | None:
-    """When a fault clears by itself, by what is known now."""
+    """When a fault clears by itself, as far as known now."""
     wait_s = clear_after_s(ROW[name], fault)
     return None if wait_s is None or fault.clean_s is None else fault.clean_s + wait_s
 
@@ -129,6 +132,6 @@ def refused_for(memory: Memory, now_s: float, name: str, request: Request) -> Ca
 
 
 def locked_until_s(memory: Memory, now_s: float, name: str) -> float | None:
-    """FAULTS P6: what comes again after every reset is not mended by resetting it. None: it may be reset."""
+    """FAULTS P6: a fault that returns after every reset is not fixed by another one. None: it may be reset."""
     times = [t_s for t_s, fault in memory.operator.resets if fault == name and now_s - t_s < RESETS_S]
     return times[-MAX_RESETS] + RESETS_S if len(times) >= MAX_RESETS else None

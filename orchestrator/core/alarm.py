@@ -10,21 +10,21 @@ Faults = tuple[ActiveFault, ...]
 
 
 def alarm(memory: Memory, faults: Faults) -> Alarm:
-    """The level after a step. Who stopped or reset a bay knows that it waits: that is no alarm."""
+    """The level after a decision. A person who stopped or reset a bay knows that it waits: that is no alarm."""
     if _may_run(memory, faults):
         return Alarm.DANGER
     return Alarm.ATTENTION if _waits(memory, faults) else Alarm.NONE
 
 
 def _may_run(memory: Memory, faults: Faults) -> bool:
-    """A charger does not obey, or nobody knows whether the one that ran has stopped, or who else commands it."""
+    """A charger does not obey, or it is unknown whether one that ran has stopped, or who else commands it."""
     unknown = memory.stop.unverified and memory.state in UNSEEN
     locked = any(fault.id == "port_locked" for fault in faults)
     return memory.state is State.UNCONTROLLABLE or unknown or locked
 
 
 def _waits(memory: Memory, faults: Faults) -> bool:
-    """It stands by until a person has seen to a fault, or to something else that no operator has asked for."""
+    """It is in standby until a person has dealt with a fault, or with anything else that no operator asked for."""
     if memory.state is not State.HELD:
         return memory.state is State.TRIPPED
     by_fault = any(ROW[fault.id].clear is Clear.OPERATOR for fault in faults)

@@ -1,8 +1,8 @@
-"""What a cell's voltage says of its state of charge, and the other way round: enough to tell packs apart.
+"""What a cell's voltage says about its state of charge, and the reverse: enough to tell packs apart.
 
-Open-circuit voltages of a cell by chemistry, as data sheets and text books draw them. The bounds around them are wide:
-a gauge may be off by `SOC_ERROR_PCT`, a cell under load or just after it by `BELOW_V`, under charge by the chemistry's
-own overvoltage. What lies outside is another battery, or a SOC that is plainly wrong.
+Open-circuit voltages of a cell by chemistry, as in data sheets and text books. The bounds around them are wide: a gauge
+may be off by `SOC_ERROR_PCT`, a cell under load or just after it by `BELOW_V`, under charge by the chemistry's own
+overvoltage. A value outside means another battery, or a SOC that is plainly wrong.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from orchestrator.config.policy import CellType, Pack
 
 #: An uncalibrated gauge may be wrong by this much.
 SOC_ERROR_PCT = 20.0
-#: Below this a deeply discharged pack may have any low voltage.
+#: At or below this, a deeply discharged pack may have any low voltage.
 EMPTY_PCT = 20.0
 #: After a load a cell is below its open-circuit voltage by up to this.
 BELOW_V = 0.10
@@ -21,14 +21,14 @@ BELOW_V = 0.10
 
 @dataclass(frozen=True, slots=True)
 class Chemistry:
-    """Open-circuit volts of one cell at rising states of charge (%), and how far charging may lift it above."""
+    """Open-circuit volts of one cell at rising states of charge (%), and how far charging may raise them."""
 
     name: str
     curve: tuple[tuple[float, float], ...]
     above_v: float
 
     def ocv_v(self, soc_pct: float) -> float:
-        """Between two points of the curve on a straight line, beyond its ends as at its ends."""
+        """Linear between two points of the curve, constant beyond its ends."""
         last_pct, last_v = self.curve[0]
         if soc_pct <= last_pct:
             return last_v
@@ -39,7 +39,7 @@ class Chemistry:
         return last_v
 
     def bounds_v(self, soc_pct: float) -> tuple[float, float]:
-        """Between what a cell of this chemistry can have at this state of charge."""
+        """The lowest and highest volts of a cell of this chemistry at this state of charge."""
         low = -inf if soc_pct <= EMPTY_PCT else self.ocv_v(soc_pct - SOC_ERROR_PCT) - BELOW_V
         return low, self.ocv_v(soc_pct + SOC_ERROR_PCT) + self.above_v
 
@@ -57,5 +57,5 @@ CHEMISTRIES: Mapping[CellType, Chemistry] = {CellType.NMC: NMC, CellType.NCA: NM
 
 
 def chemistry(pack: Pack) -> Chemistry:
-    """The chemistry that a policy's pack must be of."""
+    """The chemistry that a policy's pack must have."""
     return CHEMISTRIES[pack.chemistry]

@@ -1,6 +1,6 @@
-"""`decide()`: one decision about one bay. The live service, the simulator, the checker and the replay all call this.
+"""`decide()` makes one decision about one bay, for the live service, the simulator, the checker and the replay alike.
 
-facts → what has lasted → the operator's request → faults → the trigger, if any → the state → setpoint → the command.
+facts → history → the operator's request → faults → trigger, if any → state → setpoint → command.
 """
 
 from orchestrator.core import latches, limits, rows
@@ -36,22 +36,22 @@ from orchestrator.model import (
     State,
 )
 
-#: What the charger is told in each state in which current flows; the limit of CHARGING comes from the policy.
+#: The setpoint in each state in which current flows; in CHARGING the current step comes from the policy.
 SETPOINTS: dict[State, tuple[ChargeMode, Precharge]] = {
     State.PRECHARGE_PULSE: (ChargeMode.PRECHARGE, Precharge.PULSE),
     State.PRECHARGE_CONTINUOUS: (ChargeMode.PRECHARGE, Precharge.CONTINUOUS),
     State.CHARGING: (ChargeMode.CHARGE, Precharge.OFF),
 }
 PRECHARGE = Cause("precharge_step", key="precharge")
-#: In automatic mode the charger sets its own values.
+#: In automatic mode the charger chooses its own values.
 BY_ITSELF = Setpoint(run=True)
 
 
 def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tuple[Decision, Memory]:
     """What to do now, and what to remember.
 
-    `now_s` is monotonic and never goes back between two calls. `memory` is what the call before returned (at first
-    `Memory()`). Depends on nothing else, so the same arguments always give the same result.
+    `now_s` is monotonic and never goes back between two calls. `memory` is what the previous call returned (`Memory()`
+    for the first). The result depends on nothing else, so the same arguments always give the same result.
     """
     if memory.since_s is None:
         memory = changed(memory, since_s=now_s)
@@ -87,7 +87,7 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
 
 
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Cause, Session | None]:
-    """Let the state follow the facts: with the reason, and the session that has ended by it, if any."""
+    """Move to the state that the facts call for; returns the cause and the session that this ended, if any."""
     before = f.memory.state
     trigger, cause, changes = next_transition(f, faults)
     if changes:
@@ -98,15 +98,15 @@ def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Cause, Sess
     memory = f.memory
     if memory.session is None or not _is_over(f, before):
         return f, cause, None
-    held = memory.operator.hold if memory.state is State.HELD else None  # the rest of that cause is what to do next
+    held = memory.operator.hold if memory.state is State.HELD else None  # without the advice added to it
     result = (memory.stop.stop_cause if before is State.STOPPING else held) or cause
     return f.with_memory(changed(memory, session=None)), cause, session.ended(memory.session, result)
 
 
 def _is_over(f: Facts, before: State) -> bool:
-    """Whether the open charge has ended. One that the last run of the service left open ends with its battery.
+    """Whether the open charge has ended. One left open by the previous run of the service ends with its battery.
 
-    Who waits for a person, or no longer does, has come no farther: what a restart has left open stays open.
+    Moving between IDLE and HELD is no progress: a charge left open by a restart stays open.
     """
     after = f.memory.state
     if after not in SESSION_ENDS:
@@ -118,7 +118,7 @@ def _is_over(f: Facts, before: State) -> bool:
 
 
 def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoint, CurrentStep | None]:
-    """What the charger shall do in the present state, and the current step that goes with it."""
+    """The setpoint for the present state, and the current step that goes with it."""
     memory, rules = f.memory, f.rules
     if memory.state not in ENERGISED:
         return f, STANDBY, None
@@ -150,7 +150,8 @@ def _setpoint(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Setpoin
 def _command(f: Facts, setpoint: Setpoint, faults: tuple[ActiveFault, ...]) -> tuple[Command | None, Sequence]:
     """The standing command: a stop, the next value of the setpoint, or nothing.
 
-    A fault that stops and is new orders a stop in every state, also where the charger was just seen to stand by.
+    A new fault with a STOP effect or worse commands a stop in every state, even if the charger was just seen in
+    standby.
     """
     memory = f.memory
     if memory.state in ENERGISED:

@@ -1,10 +1,10 @@
-"""How long a condition has held, when it comes and goes: the time drains while it is away, it is not reset.
+"""How long an intermittent condition has held: the time drains while it is false, it is not reset.
 
-A condition that is there most of the time is there. If one clean sample reset its time, a charger and a BMU that
+A condition that is true most of the time counts as true. If one clean sample reset its time, a charger and a BMU that
 disagree for 2.75 s of every 3 s would never be found out.
 """
 
-#: Time that a condition is away takes off this share of itself.
+#: Time in which a condition is false takes off this share of itself.
 DRAIN = 0.25
 
 

@@ -1,6 +1,6 @@
-"""What is true of a bay now: ages, validity and comparisons, worked out once a step for everything that decides.
+"""What is true of a bay now: ages, validity and comparisons, worked out once per decision for everything that decides.
 
-A value here is a number, fresh and in range, or it is None. Nothing downstream looks at a reading's age again.
+A value here is a fresh, finite number, or None. Nothing downstream checks a reading's age again.
 """
 
 from collections.abc import Container
@@ -24,14 +24,14 @@ from orchestrator.model import (
     State,
 )
 
-#: A status reply is taken for the charger's present state for this long. Five misses are found earlier, also where
-#: orders and polls take turns (0.4 s each); this is for a port that no longer polls at all.
+#: A status reply counts as the charger's present state for this long. Five misses are found earlier, even when commands
+#: and polls take turns (0.4 s each); this is for a port that no longer polls at all.
 CHARGER_STALE_S = 1.5
-#: Volts, amps, status and temperature of the pack: three sweeps, at most this.
+#: Volts, amps, status and temperature of the pack: at most three sweeps.
 FAST_STALE_S = 1.5
-#: The objects that are read once a second: three readings.
+#: The objects read once a second: three readings.
 SLOW_STALE_S = 3.0
-#: What a BMU says right after its boot is what its memory held, not what it measured.
+#: Right after its boot a BMU reports what its memory held, not what it measured.
 SETTLE_S = 1.0
 #: Standby may show this much: the resolution and offset of a charger's current measurement.
 STANDBY_A = 0.5
@@ -43,7 +43,7 @@ NONE: frozenset[str] = frozenset()
 
 
 def _fresh(measurement: Measurement | None, now_s: float, oldest_s: float) -> float | None:
-    """The value, if it may be relied on. A time in the future is as wrong as one too long ago."""
+    """The value, if it is reliable. A time in the future is as wrong as one too long ago."""
     if measurement is None or not oldest_s <= measurement.t_s <= now_s + FAST_STALE_S:
         return None
     return measurement.value if isfinite(measurement.value) else None
@@ -57,7 +57,7 @@ def _valid(reading: ChargerReading | None, now_s: float) -> ChargerReading | Non
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What is true now. Who knows more makes other facts: the memory brought up to them, what could not be judged."""
+    """What is true now. Updating the memory, or finding something that cannot be judged, makes new facts."""
 
     now_s: float
     snapshot: Snapshot
@@ -76,14 +76,14 @@ class Facts:
     soc: float | None
     soh: float | None
     connected: bool
-    energised: bool  #: the last step has left the bay so, as the two that follow
+    energised: bool  #: as the previous decision left the bay; so are the next two
     state_s: float
-    raised: Container[str]  #: ids of the faults in force; for thresholds with hysteresis
-    broken: tuple[Cause, ...] = ()  #: what of our own could not be judged in this step
+    raised: Container[str]  #: ids of the active faults; for thresholds with hysteresis
+    broken: tuple[Cause, ...] = ()  #: our own checks that could not be judged in this decision
 
     @classmethod
     def of(cls, now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> "Facts":
-        """What is true by this snapshot."""
+        """The facts in this snapshot."""
         reading, battery, link = _valid(snapshot.charger, now_s), snapshot.battery, snapshot.battery_link
         settled_s = link.boot_t_s + SETTLE_S if link.boot_t_s is not None else -inf
         fast_s, slow_s = max(now_s - FAST_STALE_S, settled_s), max(now_s - SLOW_STALE_S, settled_s)
@@ -115,7 +115,7 @@ class Facts:
         )
 
     def with_memory(self, memory: Memory) -> "Facts":
-        """The same facts, beside what follows from them. (By hand, since every step does this several times.)"""
+        """The same facts with another memory. (Written out, since every decision does this several times.)"""
         return made(
             Facts, self.now_s, self.snapshot, memory, self.rules, self.reading, self.charger, self.battery, self.volts,
             self.amps, self.slow_from_s, self.pack_v, self.pack_a, self.status, self.temperature_c, self.soc, self.soh,
@@ -123,37 +123,37 @@ class Facts:
         )  # fmt: skip
 
     def slow(self, measurement: Measurement | None) -> float | None:
-        """A value of the slow objects that only few rows look at, if it may be relied on."""
+        """A value of the slow objects that only few rows look at, if it is reliable."""
         return _fresh(measurement, self.now_s, self.slow_from_s)
 
     @property
     def silent(self) -> bool:
-        """The BMU answers nothing that a charge is supervised by."""
+        """The BMU reports nothing by which a charge is supervised."""
         return self.pack_v is None and self.temperature_c is None and self.status is None
 
     @property
     def just_booted(self) -> bool:
-        """What the BMU said before counts no more, and it had no time to say anything new: that is no silence."""
+        """Values from before the boot no longer count, and there was no time for new ones yet: that is no silence."""
         boot_s = self.battery.boot_t_s
         return boot_s is not None and self.now_s - boot_s < SETTLE_S + FAST_STALE_S
 
     @property
     def battery_removed(self) -> bool:
-        """The battery has left, as batteries do: its BMU is silent and the charger sees no voltage.
+        """The battery was removed: its BMU is silent and the charger sees no voltage.
 
-        Behind an open contactor it never sees one.
+        Behind an open contactor the charger never sees one, so nothing is concluded there.
         """
         gone = self.volts is not None and self.volts < TERMINAL_V and self.connected
         return gone and self.silent and not self.battery.online
 
     @property
     def present(self) -> bool:
-        """A battery is there, with everything fresh that a charge needs."""
+        """A battery is there, with fresh values for everything that a charge needs."""
         return None not in (self.pack_v, self.pack_a, self.status, self.temperature_c, self.soc, self.soh)
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """What the BMU has not told freshly, of all that a charge needs."""
+        """The values a charge needs that the BMU has not reported freshly."""
         values = {
             "voltage": self.pack_v,
             "current": self.pack_a,
@@ -166,24 +166,24 @@ class Facts:
 
     @property
     def standby(self) -> bool:
-        """The charger says, freshly, that it is stopped and delivers nothing."""
+        """The charger freshly reports that it is stopped and delivers nothing."""
         reading = self.reading
         return reading is not None and reading.operation is Operation.STOPPED and reading.current_a <= STANDBY_A
 
     @property
     def runs(self) -> bool:
-        """The charger says, freshly, that it runs or delivers current."""
+        """The charger freshly reports that it runs or delivers current."""
         reading = self.reading
         return reading is not None and (reading.operation is Operation.RUNNING or reading.current_a > STANDBY_A)
 
     @property
     def unordered(self) -> bool:
-        """The BMU goes on to see a charging current that nobody ordered: whatever the charger says, something runs."""
+        """The BMU keeps seeing a charging current without a command: whatever the charger reports, something runs."""
         return self.memory.witnessed.unordered_s >= standby.UNORDERED_S and standby.sees_current(self)
 
     @property
     def stopped(self) -> bool:
-        """A stop that was sent in this state was answered with standby, by both witnesses."""
+        """Both witnesses show standby after a stop that was sent in this state."""
         return standby.proved(self)
 
     @property

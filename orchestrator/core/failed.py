@@ -1,7 +1,7 @@
-"""What to do about a bay when `decide()` itself has raised: stop it, by the same deadline and with the same alarm.
+"""What to do with a bay when `decide()` itself has raised: stop it, with the usual deadline and alarm.
 
-Nothing is judged here but the plainest words of the charger. The memory knows since when the bay is being stopped, so
-that the next step, if it does not raise, goes on from there.
+The charger's readings are not judged here. The memory holds since when the bay is being stopped, so the next decision
+continues from there if it does not raise.
 """
 
 from orchestrator.core import operator, safestop, sequence
@@ -18,7 +18,7 @@ FAULT = "internal"
 
 
 def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str, bay: str = "BAY") -> tuple[Decision, Memory]:
-    """The decision and the memory after an exception, whose words are `error`; `bay` is the name for commands."""
+    """The decision and the memory after an exception with the text `error`; `bay` is the name for commands."""
     since_s, cause = memory.stop.stopping_s, None
     state = memory.state
     if state not in UNVERIFIED or since_s is None:
@@ -54,7 +54,7 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str, bay: 
 
 
 def _latched(memory: Memory, now_s: float, error: str) -> dict[str, FaultMemory]:
-    """The faults, with this one among them."""
+    """The faults, including this one."""
     known = memory.faults.get(FAULT)
     raised_s = known.raised_s if known is not None and known.raised_s is not None else now_s
     what = Cause.of("internal_error", error=error)

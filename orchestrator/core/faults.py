@@ -1,14 +1,15 @@
-"""The fault table: one row a fault. A new fault is one row here, one predicate in `checks/`, one test.
+"""The fault table: one row per fault. A new fault is one row here, one predicate in `checks/`, one test.
 
 Faults name effects, not states; the worst effect wins. `clear` says how a fault ends once its condition is gone:
 
 - AUTO: after `clean_s` without it.
-- BACKOFF: after 10 s without it, and 10, 60, 300 s for the first, second, third time in an hour; the fourth latches.
+- BACKOFF: after 10 s without it, then another 10, 60 or 300 s for the first, second or third time in an hour; the
+fourth latches.
 - OPERATOR: when an operator starts the bay (or resets it).
-- RESET: when a person resets it; never while the condition is there.
+- RESET: when a person resets it; never while the condition is true.
 
-Of several faults the one with the worst effect is told first, and of those with the same effect the most dangerous one
-(`RANK`), however old it is.
+Of several faults, the one with the worst effect is shown first; among those with the same effect, the most dangerous
+one (`RANK`), however old it is.
 """
 
 from collections.abc import Callable
@@ -42,34 +43,34 @@ ALWAYS = frozenset(State)
 QUALIFYING = frozenset({State.QUALIFYING})
 #: A heartbeat, the NMT start that answers it, and the next heartbeat, at the longest period that can be asked for.
 NMT_OBEY_S = 4.0
-#: Steady values that all change at once are read from the one a moment before the other.
+#: When steady values all change at once, one device is read a moment before the other.
 FOLLOWS_S = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class FaultRow:
-    """One fault: when it is raised, what it does, how it ends. What to do about it stands in `text/`, by its id."""
+    """One fault: when it is raised, what it does, how it ends. What to do about it is in `text/`, under its id."""
 
     id: str
     source: str  #: its number in the fault catalogue
     effect: Effect
     clear: Clear
     check: Check
-    where: frozenset[State]  #: the states it is looked for in; a fault that is raised is followed everywhere
+    where: frozenset[State]  #: the states in which it is looked for; a raised fault is followed everywhere
     for_s: float = 0.0  #: the condition must last this long …
-    polls: int = 1  #: … and be seen in this many charger readings; both drain while it is away
+    polls: int = 1  #: … and be seen in this many charger readings; both drain while it is false
     clean_s: float = 0.0  #: AUTO, RESET: how long the condition must be gone
-    departs: bool = False  #: a battery that leaves in mid-charge looks like this; once it has left, it was no fault
-    moment: bool = False  #: it tells of a moment, not of what is: in the past tense from the beginning
-    figures: str = ""  #: the parameters of its evidence that are told anew while it is there, and still when it is gone
+    departs: bool = False  #: a battery removed in mid-charge looks like this; once it is gone, it was no fault
+    moment: bool = False  #: it describes a moment, not a condition: in the past tense from the beginning
+    figures: str = ""  #: the parameters of its evidence that are updated while it is true, and once it is gone
     lowest: bool = False  #: the worst value of its figure is the lowest one
-    until: Until | None = None  #: when its condition ends by the mere passing of time; None: nobody knows
-    at_rest: str = ""  #: the id of what to do once the charger stands by, verified, where that is something else
-    past: Past | None = None  #: what is said of it from then on, made of its evidence and of how long it lasted, in s
+    until: Until | None = None  #: when its condition ends by the mere passing of time; None: not known
+    at_rest: str = ""  #: the id of the advice once the charger is in standby, verified, if that differs
+    past: Past | None = None  #: its cause from then on, made from its evidence and how long it lasted, in s
 
 
 def _doubts_end_s(memory: Memory) -> float | None:
-    """When so many doubts are gone that not two of them are left; None where nobody knows."""
+    """When fewer than two doubts will remain; None if that is not known."""
     ends_s = []
     for name in state_of_charge.DOUBTS:
         row, fault = ROW[name], memory.faults.get(name)
@@ -180,7 +181,7 @@ FAULTS: tuple[FaultRow, ...] = (
     FaultRow("no_step_allowed", "P12", E.NO_START, Clear.AUTO, charge.no_step_allowed, QUALIFYING, for_s=1, clean_s=5),
     FaultRow("precharge_too_strong", "P12", E.NO_START, Clear.AUTO, charge.precharge_too_strong, QUALIFYING,
              for_s=1, clean_s=5, figures="pack_v"),
-    # who else is on the bus
+    # others on the bus
     FaultRow("other_master", "B27", E.WARN, Clear.AUTO, battery.other_master, ALWAYS, clean_s=10),
     FaultRow("heartbeat_set", "B28", E.WARN, Clear.AUTO, battery.heartbeat_set, ALWAYS, clean_s=10),
     # the charge
@@ -193,14 +194,14 @@ FAULTS: tuple[FaultRow, ...] = (
     FaultRow("overrun", "G6", E.STOP, Clear.BACKOFF, ourselves.overrun, AT_WORK, moment=True),
     FaultRow("suspended", "G7", E.STOP, Clear.BACKOFF, ourselves.suspended, AT_WORK, moment=True),
     FaultRow("not_persisted", "G8, P9", E.NO_START, Clear.AUTO, ourselves.not_persisted, ALWAYS, clean_s=10),
-    # Last, since it tells of rows above that could not be judged.
+    # Last, because it reports rows above that could not be judged.
     FaultRow("internal", "G5, P11", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS),
 )  # fmt: skip
 
 ROW = {row.id: row for row in FAULTS}
 
-#: What is told before all other faults with the same effect, the most dangerous first: current that nobody controls,
-#: then what may burn, then what destroys. All others follow as they stand in the table.
+#: Shown before all other faults with the same effect, the most dangerous first: current that nobody controls, then what
+#: may burn, then what destroys. All others follow in table order.
 DANGERS = (
     "will_not_stop", "current_without_order", "rogue_run", "port_locked", "found_running",
     "hot_trip", "runaway", "pack_collapsed", "over_voltage", "over_current", "above_step", "status_trip",

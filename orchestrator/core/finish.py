@@ -1,8 +1,8 @@
-"""When a charge is over, by the policy. Time and Ah limits are faults and stand in the fault table.
+"""When a charge is over, by the policy. Time and Ah limits are faults and are in the fault table.
 
-A charge goes to the policy's target, or all the way: with a target of 100 %, and once in so many days. What is all the
-way, the pack tells: its current has tapered off at the end voltage, the charger says full after a taper, the BMU's SOC
-if the policy trusts it. Then it may stay on for a while, to balance.
+A charge goes to the policy's target, or all the way: with a target of 100 %, and once every `full_every_days`. The pack
+shows what all the way is: its current has tapered off at the end voltage, the charger reports full after a taper, or
+the BMU's SOC if the policy trusts it. Then it may stay on charge for a while to balance.
 """
 
 from orchestrator.config.amperes import END_SHARE, end_v
@@ -10,13 +10,13 @@ from orchestrator.config.policy import Needs
 from orchestrator.core.facts import Facts
 from orchestrator.model import Cause
 
-#: A charger that ends a charge below this state of charge is wrong, or the BMU is.
+#: If a charger ends a charge below this state of charge, it is wrong, or the BMU is.
 EARLY_FULL_PCT = 80.0
-#: Less than this share of what was set is a current that has tapered off.
+#: A current below this share of the current step has tapered off.
 TAPERED_SHARE = 0.5
 #: A current that has just begun is low, too: it must have flowed for this long.
 SEEN_TAPER_S = 5.0
-#: A pack that was found full and has lost this much is not full any more.
+#: A pack that was found full and has lost this much is no longer full.
 FALLEN_PCT = 3.0
 DAY_S = 86400.0
 
@@ -31,7 +31,7 @@ def finished(f: Facts) -> Cause | None:
         return ended
     session = f.memory.session
     full = known_full(f) if session is None else session.full
-    if not full or session is None or not goes_full(f):  # above a target nothing is held
+    if not full or session is None or not goes_full(f):  # with a lower target nothing is held
         return full
     if session.held_s < rule.hold_min * 60:
         return None
@@ -39,7 +39,7 @@ def finished(f: Facts) -> Cause | None:
 
 
 def known_full(f: Facts) -> Cause | None:
-    """By what the pack is known to be full now; None while it is not."""
+    """The sign by which the pack is known to be full now; None while it is not."""
     rule = f.rules.policy.finish.full
     if rule.needs is Needs.ANY:
         return _by_soc(f) or _by_taper(f) or _by_charger(f)
@@ -74,14 +74,14 @@ def _by_charger(f: Facts) -> Cause | None:
     return f.rules.by_policy("full_charger", "finish.full.charger")
 
 
-#: Each sign of a full pack by its key of the policy.
+#: Each sign of a full pack by its key in the policy.
 SIGNS = {"soc_pct": _by_soc, "taper": _by_taper, "charger": _by_charger}
 
 
 def ends_full(f: Facts) -> bool:
-    """What led to the charger's end looks like full: the current had tapered off, or the pack was at its end voltage.
+    """Whether the charger's end looks like full: the current had tapered off, or the pack was at its end voltage.
 
-    Mode 5 is also what a charger shows that somebody has stopped by other means.
+    A charger that somebody stopped by other means also shows mode 5.
     """
     pack, trail = f.rules.policy.pack, f.memory.witnessed.trail
     full_v = f.rules.taper.above_v if f.rules.taper is not None else END_SHARE * end_v(pack)
@@ -101,7 +101,7 @@ def early_below_pct(f: Facts) -> float:
 
 
 def tapered_a(f: Facts) -> float:
-    """Below this the current has tapered off: on a low step, whose own current is as low, only well below that."""
+    """Below this the current has tapered off; on a low step, whose own current is as low, only well below that."""
     below_a = f.rules.taper.below_a if f.rules.taper is not None else 0.0
     return min(below_a, TAPERED_SHARE * f.memory.stage.step.current_a) if f.memory.stage.step is not None else below_a
 
@@ -114,11 +114,11 @@ def tapers(f: Facts) -> bool:
     return f.amps < tapered_a(f) and f.pack_v > taper.above_v
 
 
-# --- all the way, once in so many days --------------------------------------------------------------------------------
+# --- all the way, every `full_every_days` -----------------------------------------------------------------------------
 
 
 def full_due(f: Facts) -> bool:
-    """The battery was not charged all the way for as long as the policy says."""
+    """The battery was last charged all the way longer ago than the policy allows."""
     days, full_s = f.rules.policy.finish.full_every_days, f.memory.battery.full_s
     return days is not None and full_s is not None and f.now_s - full_s >= days * DAY_S
 
@@ -129,14 +129,14 @@ def goes_full(f: Facts) -> bool:
 
 
 def target(f: Facts) -> tuple[float, str]:
-    """To which state of charge, and the key that says so."""
+    """The target state of charge, and the key that sets it."""
     if full_due(f):
         return 100.0, "finish.full_every_days"
     return f.rules.policy.finish.target_soc_pct, "finish.target_soc_pct"
 
 
 def goes_on(f: Facts) -> Cause | None:
-    """Why a charge that was interrupted on its way to full goes on, whatever the SOC says; None where that decides."""
+    """Why a charge interrupted on its way to full goes on, whatever its SOC; None if the SOC decides."""
     rule, session = f.rules.policy.finish, f.memory.session
     if session is None or not goes_full(f):
         return None

@@ -1,12 +1,12 @@
-"""How faults come and go: debounce, latch, backoff, clear. Mechanism only; what is a fault stands in the table.
+"""How faults come and go: debounce, latch, backoff, clear. Mechanism only; the table defines the faults.
 
-Theory of operation. A row's predicate says what is seen now. It becomes a fault after the row's time and number of
-polls, is then followed in every state, and ends as its `Clear` says. Until it is one, its time and its polls drain
-while the condition is away (`drain.py`): what comes and goes is found out, too. A fault whose condition is there is
-never cleared, and one that has latched only ever by a person.
+Theory of operation. A row's predicate returns what is seen now. Once that has lasted for the row's time and number of
+polls it becomes a fault, is followed in every state, and ends as its `Clear` says. Before that, its time and its polls
+drain while the condition is false (`drain.py`), so an intermittent condition is found, too. A fault is never cleared
+while its condition is true, and a latched one is cleared only by a person.
 
-A predicate that raises is a defect of ours: that row cannot be judged any more, so the bay trips by the row `internal`,
-which is judged last, and all the others go on.
+A predicate that raises is our own defect. That row can no longer be judged, so the bay trips by the row `internal`,
+which is judged last; all other rows continue.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,12 +23,12 @@ from orchestrator.model import Cause, Effect, State
 #: How long the condition must be gone before a backoff begins, and the backoffs (FAULTS, "B").
 CLEAN_S = 10.0
 BACKOFF_S = (10.0, 60.0, 300.0)
-#: Strikes are forgotten after this long; one more than there are backoffs latches.
+#: Strikes are forgotten after this long; one more strike than there are backoffs latches.
 STRIKES_S = 3600.0
 
 
 def update(f: Facts) -> Mapping[str, FaultMemory]:
-    """The fault memory after this step's facts."""
+    """The fault memory after this decision's facts."""
     before, state, looked_s = f.memory.faults, f.memory.state, f.memory.looked_s
     passed_s = f.now_s - looked_s if looked_s is not None else 0.0
     battery_removed = f.battery_removed and not f.energised
@@ -37,7 +37,7 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
         fault = before.get(row.id) if before else None
         if battery_removed and row.departs and not (fault is not None and fault.latched):
             strikes = tuple(t for t in fault.strikes if t != fault.raised_s) if fault is not None else ()
-            if strikes:  # what it has just done was no fault; what it did before was
+            if strikes:  # the removal looked like this fault but was none; earlier strikes count
                 after[row.id] = FaultMemory(strikes=strikes)
             continue
         seen = None
@@ -57,12 +57,12 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
 
 
 def _is_looked_for(row: FaultRow, fault: FaultMemory, state: State, *, battery_removed: bool) -> bool:
-    """Whether a known fault's condition is looked for; one in force is followed in every state."""
+    """Whether to look for a known fault's condition; an active fault is followed in every state."""
     return not (battery_removed and row.departs) and (fault.raised_s is not None or state in row.where)
 
 
 def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[FaultRow]:
-    """The rows that are looked for in a state, and those that are known, in their order."""
+    """The rows looked for in this state, and the known ones, in table order."""
     usual = _USUAL.get(state)
     if usual is None or usual[0] is not FAULTS:
         rows = tuple(row for row in FAULTS if state in row.where)
@@ -72,12 +72,12 @@ def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[Faul
     return [row for row in FAULTS if state in row.where or row.id in known]
 
 
-#: The rows of each state, and their ids; and of which table they are.
+#: The rows of each state and their ids, and the table that they come from.
 _USUAL: dict[State, tuple[Sequence[FaultRow], Sequence[FaultRow], frozenset[str]]] = {}
 
 
 def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
-    """The readings that showed it, one more or a part of one less if there is a new one; and the newest reading."""
+    """The number of readings that showed it, counting or draining a new one; and the time of the newest reading."""
     poll_t_s = f.reading.t_s if f.reading else fault.poll_t_s
     if fault.polls and poll_t_s == fault.poll_t_s:
         return fault.polls, poll_t_s
@@ -86,7 +86,7 @@ def _polls(fault: FaultMemory, f: Facts, *, holds: bool) -> tuple[float, float]:
 
 def _present(row: FaultRow, fault: FaultMemory, seen: Cause, f: Facts, passed_s: float) -> FaultMemory:
     polls, poll_t_s = _polls(fault, f, holds=True)
-    # The time before its first look is nobody's: the condition may have come just now.
+    # Time before the first look does not count: the condition may have begun just now.
     seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
     fault = replace(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
     if fault.raised_s is not None:
@@ -102,7 +102,7 @@ def _present(row: FaultRow, fault: FaultMemory, seen: Cause, f: Facts, passed_s:
 
 
 def _worst(row: FaultRow, seen: Cause, worst: float | None, first: Cause) -> float | None:
-    """The worst value so far of the one figure of the evidence, where it has one, and is about the same as at first."""
+    """The worst value so far of the evidence's single figure, if it has one and its quantity is still the same."""
     names = [name for name in row.figures.split() if seen.param(name) is not None]
     if len(names) != 1 or first.param(names[0]) is None:
         return None
@@ -111,7 +111,7 @@ def _worst(row: FaultRow, seen: Cause, worst: float | None, first: Cause) -> flo
 
 
 def _absent(row: FaultRow, fault: FaultMemory, f: Facts, passed_s: float) -> FaultMemory | None:
-    """What is left of a fault while its condition is not there; None when nothing is."""
+    """What is left of a fault while its condition is false; None if nothing is."""
     now_s = f.now_s
     if fault.raised_s is None:
         remembered = tuple(t for t in fault.strikes if now_s - t < STRIKES_S)
@@ -132,7 +132,7 @@ def _absent(row: FaultRow, fault: FaultMemory, f: Facts, passed_s: float) -> Fau
 
 
 def clear_after_s(row: FaultRow, fault: FaultMemory) -> float | None:
-    """How long the condition must be gone for the fault to clear by itself; None: a person must act."""
+    """How long the condition must be gone before the fault clears by itself; None: a person must act."""
     if fault.latched or row.clear in (Clear.OPERATOR, Clear.RESET):
         return None
     if row.clear is Clear.BACKOFF:
@@ -141,12 +141,12 @@ def clear_after_s(row: FaultRow, fault: FaultMemory) -> float | None:
 
 
 def effect(name: str, fault: FaultMemory) -> Effect:
-    """A fault that has latched trips, whatever its row says."""
+    """A latched fault trips, whatever its row says."""
     return Effect.TRIP if fault.latched else ROW[name].effect
 
 
 def raised(faults: Mapping[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
-    """The faults in force, the most dangerous first."""
+    """The active faults, the most dangerous first."""
     live = [(name, fault) for name, fault in faults.items() if fault.raised_s is not None]
     live.sort(key=lambda item: (-effect(*item), RANK[item[0]]))
     return live
@@ -155,9 +155,9 @@ def raised(faults: Mapping[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
 def release(
     faults: Mapping[str, FaultMemory], now_s: float, *, by_reset: bool
 ) -> tuple[dict[str, FaultMemory], list[str]]:
-    """Clear what a person may clear: by a reset everything, by a start what waits for a start.
+    """Clear what a person may clear: a reset clears everything, a start whatever waits for a start.
 
-    Returns the faults that are left, and those that cannot be cleared now; then none is.
+    Returns the remaining faults, and those that cannot be cleared now; if there are any, nothing is cleared.
     """
     waiting = {name for name, fault in raised(faults) if clear_after_s(ROW[name], fault) is None}
     kept = in_the_way(faults, now_s, by_reset=by_reset)
@@ -165,7 +165,7 @@ def release(
 
 
 def in_the_way(faults: Mapping[str, FaultMemory], now_s: float, *, by_reset: bool) -> list[str]:
-    """The faults for which a person cannot start, or reset, now, the most dangerous first."""
+    """The faults that refuse a start, or a reset, now, the most dangerous first."""
     return [
         name
         for name, fault in raised(faults)

@@ -1,7 +1,7 @@
-"""From what a policy allows, in amperes, to the charger's step: the highest of which the worst case is not above.
+"""From what a policy allows, in amperes, to the charger's step: the highest step whose worst case stays within it.
 
-Of everything that applies the lowest wins, and has a name: its key, the same however it is worded. Down at once, up
-after a hold. Which rows apply, `core/rows.py` follows.
+Of all limits that apply the lowest wins, identified by its key, however it is worded. The step goes down at once, and
+up after a hold. `core/rows.py` tracks which rows apply.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from orchestrator.model import ActiveFault, Cause, CurrentStep, Effect
 def bounds(f: Facts, worst: ActiveFault | None) -> Iterator[Bound]:
     """Everything that limits the current now.
 
-    `worst` is the worst of the faults in force; LIMIT, and what is worse, means the lowest step.
+    `worst` is the worst active fault; an effect of LIMIT or worse means the lowest step.
     """
     rules, rows = f.rules, dict(f.memory.tables.rows)
     yield rules.pack_bound
@@ -30,7 +30,7 @@ def bounds(f: Facts, worst: ActiveFault | None) -> Iterator[Bound]:
     known = values(f)
     for table, allowed in zip(rules.tables, rules.table_bounds, strict=True):
         name, row = table.name, rows.get(table.name)
-        if known[name] is None or row is None:  # a rule of its own ends a charge that no row covers
+        if known[name] is None or row is None:  # another rule ends a charge that no row covers
             yield Bound(rules.worst_a[0], f"current.{name}")
         else:
             yield allowed[row]
@@ -40,7 +40,7 @@ def bounds(f: Facts, worst: ActiveFault | None) -> Iterator[Bound]:
 
 
 def lowest(f: Facts, worst: ActiveFault | None = None) -> Bound:
-    """What limits the current most; of equals the first."""
+    """What limits the current most; of equals, the first."""
     least = f.rules.pack_bound
     for bound in bounds(f, worst):
         if bound.allowed_a < least.allowed_a:
@@ -49,7 +49,7 @@ def lowest(f: Facts, worst: ActiveFault | None = None) -> Bound:
 
 
 def none_allowed(f: Facts) -> Cause | None:
-    """Why not even the lowest step may be taken; None where one may. What is not known is another rule's business."""
+    """Why not even the lowest step is allowed; None if it is. Unknown values are handled by another rule."""
     bound = lowest(f)
     if bound.allowed_a > 0 and (not f.rules.manual or highest_step(bound.allowed_a, f.rules.worst_a) is not None):
         return None
@@ -62,7 +62,7 @@ def none_allowed(f: Facts) -> Cause | None:
 def choose(f: Facts, worst: ActiveFault | None) -> tuple[CurrentStep, float | None]:
     """The step for now, and since when a higher one has been allowed (None: none is)."""
     bound = lowest(f, worst)
-    index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # where none is allowed a fault has ended the charge
+    index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # if none is allowed, a fault has ended the charge
     top = index == len(f.rules.steps_a) - 1
     before, raise_s = f.memory.stage.step, f.memory.stage.raise_s
     if before is not None and index == before.index and before.key == ("" if top else bound.key):
@@ -83,27 +83,27 @@ def _step(f: Facts, index: int, bound: Bound) -> CurrentStep:
 
 # --- as causes --------------------------------------------------------------------------------------------------------
 
-#: The parameter that each quantity has in a cause.
+#: The parameter for each quantity in a cause.
 PARAMS = {"temperature_c": "pack_c", "soc_pct": "soc_pct", "soh_pct": "soh_pct", "voltage_v": "pack_v"}
 #: The words for them.
 WORDS = {"temperature_c": "temperature", "soc_pct": "soc", "soh_pct": "soh", "voltage_v": "pack_voltage"}
 
 
 def limit(f: Facts, bound: Bound) -> Cause:
-    """What limits the current: the row or key, with the evidence and the line where it stands."""
+    """What limits the current: the row or key, with the evidence and its place in the file."""
     id_, params = _what(f, bound)
     return Cause(id_, params, bound.key, _place(f, bound.key))
 
 
 def _place(f: Facts, key: str) -> str:
-    """Where a key stands; "" for what stands in no file."""
+    """Where a key stands; "" if it is in no file."""
     if not key or key.startswith("fault "):
         return ""
     return (f.rules.bay.source if key.startswith("limits.") else f.rules.policy.source).at(key)
 
 
 def _what(f: Facts, bound: Bound) -> tuple[str, tuple[tuple[str, object], ...]]:
-    """The id, and the parameters."""
+    """The id and the parameters."""
     key, row = bound.key, bound.row
     if not key:
         return "limit_none", ()
@@ -131,7 +131,7 @@ def _spans(f: Facts, bound: Bound, row: Band | Where) -> tuple[Cause, ...]:
 
 
 def _span(f: Facts, name: str, low: float, high: float) -> Cause:
-    """A value and the row that it is in, or was in and is not well outside of."""
+    """A value and its row: the row it is in, or one it was in and is not yet well outside of."""
     value = values(f)[name]
     if value is None:
         return Cause.of("span_unknown", quantity=WORDS[name])

@@ -1,15 +1,15 @@
-"""The state machine: every state, every trigger, every transition, in one table.
+"""The state machine: every state, every trigger and every transition, in one table.
 
 Theory of operation. `decide()` looks at the facts and picks at most one trigger; this table says where it leads. A pair
-that is not in the table is refused with `RefusedError` and the state stays as it is. Three rules can be read off it:
+that is not in the table is refused with `RefusedError`, and the state stays as it is. The table shows three rules:
 
-- Current flows in three states only, and they are left only by `stop`, or one to the next.
+- Current flows in three states only, which are left only by `stop` or from one to the next.
 - What follows a stop is chosen after the stop was verified, so no fault names a state.
 - TRIPPED is left by a person's `reset`, or by `stop` if the charger runs again. A reset leads to HELD: it permits a
-  start, it does not make one.
+start but does not make one.
 
-`transitions` is prescribed. It is the engine that walks the table, with a throw-away model for each call: the machine
-itself has no state.
+The `transitions` library is prescribed. It is the engine that walks the table, with a throw-away model per call: the
+machine itself holds no state.
 """
 
 from enum import StrEnum
@@ -23,30 +23,30 @@ from orchestrator.model import State
 
 
 class Trigger(StrEnum):
-    """What can make a bay change its state."""
+    """Everything that can make a bay change its state."""
 
-    STOP = "stop"  #: whatever the reason: no current, and verify it
+    STOP = "stop"  #: for whatever reason: no current, and verify that
     GIVE_UP = "give_up"  #: the charger did not obey a stop in time
     LOSE = "lose"  #: a device does not answer
     REST = "rest"  #: verified standby, nothing to do
     HOLD = "hold"  #: verified standby, a person must start
-    SUSPEND = "suspend"  #: verified standby, goes on by itself later
+    SUSPEND = "suspend"  #: verified standby, continues by itself later
     FILL = "fill"  #: verified standby, the battery is full
     TRIP = "trip"  #: verified standby, a latched fault
     RESET = "reset"  #: a person has reset every latched fault
-    QUALIFY = "qualify"  #: a battery is there and wants to be charged
+    QUALIFY = "qualify"  #: a battery is there and wants a charge
     PULSE = "pulse"  #: begin pulse precharge
     CONTINUE = "continue"  #: begin continuous precharge
     CHARGE = "charge"  #: begin to charge
 
 
 S, T = State, Trigger
-#: Standby was verified, or is verified now: what follows is chosen.
+#: Standby was verified, or is verified now, so the next state can be chosen.
 FROM_REST = (*ordered(RESTING), *ordered(UNVERIFIED))
 
-#: (trigger, the states it is accepted in, the state it leads to; None: the state stays).
+#: (trigger, the states that accept it, the state it leads to; None: the state stays).
 TABLE: tuple[tuple[Trigger, tuple[State, ...], State | None], ...] = (
-    (T.STOP, ordered(UNVERIFIED), None),  # they are stopping already
+    (T.STOP, ordered(UNVERIFIED), None),  # already stopping
     (T.STOP, (*ordered(SETTLED), *ordered(ENERGISED)), S.STOPPING),
     (T.GIVE_UP, (S.STARTING, S.STOPPING), S.UNCONTROLLABLE),
     (T.LOSE, FROM_REST, S.OFFLINE),
@@ -54,7 +54,7 @@ TABLE: tuple[tuple[Trigger, tuple[State, ...], State | None], ...] = (
     (T.HOLD, FROM_REST, S.HELD),
     (T.SUSPEND, FROM_REST, S.SUSPENDED),
     (T.FILL, FROM_REST, S.FULL),
-    (T.TRIP, (S.OFFLINE, *ordered(UNVERIFIED)), S.TRIPPED),  # only after a stop that was verified just now
+    (T.TRIP, (S.OFFLINE, *ordered(UNVERIFIED)), S.TRIPPED),  # only after a stop that was just verified
     (T.RESET, (S.TRIPPED,), S.HELD),
     (T.QUALIFY, ordered(STARTABLE), S.QUALIFYING),
     (T.PULSE, (S.QUALIFYING,), S.PRECHARGE_PULSE),
@@ -64,7 +64,7 @@ TABLE: tuple[tuple[Trigger, tuple[State, ...], State | None], ...] = (
 
 
 class _Bay:
-    """The model that `transitions` moves: made for one call."""
+    """The model that `transitions` moves, made for one call."""
 
     __slots__ = ("state",)
 
@@ -86,11 +86,11 @@ MACHINE = Machine(
 )
 
 
-@cache  # the answers are as fixed as the table
+@cache  # the result is as fixed as the table
 def fire(state: State, trigger: Trigger) -> State:
     """The state that `trigger` leads to from `state`.
 
-    Raises RefusedError where the table has no such pair.
+    Raises RefusedError if the table has no such pair.
     """
     bay = _Bay(state)
     try:

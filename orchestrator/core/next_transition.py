@@ -1,7 +1,7 @@
-"""Where a bay goes next: one trigger at most, and why. The machine's table says where it leads.
+"""Chooses where a bay goes next: at most one trigger, and its cause. The machine's table says where it leads.
 
-Each kind of state has one function here; all of them ask the same questions in the same order: must current stop, can
-the charger be trusted to stand by, does something keep us from charging, does the battery want to be charged.
+Each kind of state has one function here. All ask the same questions in the same order: must current stop, is standby
+proved, does anything prevent a charge, does the battery want one.
 """
 
 from collections.abc import Mapping
@@ -27,15 +27,15 @@ class Next(NamedTuple):
     """Where a bay goes next."""
 
     trigger: Trigger | None  #: None: it stays
-    cause: Cause  #: why it is, or goes, where it is
-    changes: Mapping[str, Any] = {}  #: the parts of the memory that have changed by it
+    cause: Cause  #: why it stays where it is, or goes there
+    changes: Mapping[str, Any] = {}  #: the parts of the memory that change with it
 
 
-#: Everything must have spoken for a charge for this long, with a second, newer sample of each value.
+#: Every condition for a charge must have held for this long, with a second, newer sample of each value.
 QUALIFY_S = 2.0
-#: A stage's voltage must have been reached for this long before the next stage begins.
+#: The pack must have been at a stage's voltage for this long before the next stage begins.
 REACHED_S = 2.0
-#: Where each trigger of rest leads; to be there already is no trigger.
+#: Where each trigger of rest leads; if the bay is there already, there is no trigger.
 LEADS = {
     Trigger.LOSE: State.OFFLINE,
     Trigger.REST: State.IDLE,
@@ -47,7 +47,7 @@ LEADS = {
 
 
 def next_transition(f: Facts, faults: Faults) -> Next:
-    """The trigger for now (None: stay) and why the bay is, or goes, where it is."""
+    """The trigger for now (None: stay), and why the bay is, or goes, where it is."""
     state = f.memory.state
     if state in ENERGISED:
         return _energised(f, faults)
@@ -87,7 +87,7 @@ def _charging(f: Facts, faults: Faults) -> Cause:
 
 
 def _holds(f: Facts) -> Cause | None:
-    """A full pack stays on, to balance: for how long still."""
+    """How much longer a full pack stays on charge to balance."""
     session, finish = f.memory.session, f.rules.policy.finish
     if session is None or not session.full:
         return None
@@ -98,12 +98,12 @@ def _holds(f: Facts) -> Cause | None:
 def _precharging(f: Facts) -> Next:
     memory, rule, by_policy = f.memory, f.rules.policy.precharge, f.rules.by_policy
     session = memory.session
-    if rule is None or session is None or f.pack_v is None:  # unknown means no, whoever lets it come to this
+    if rule is None or session is None or f.pack_v is None:  # unknown means no, whatever the caller assumed
         return Next(Trigger.STOP, Cause("precharge_impossible"))
     pulse = memory.state is State.PRECHARGE_PULSE
     target_v = rule.pulse.until_v if pulse else rule.below_v
     now = stage.reaches(f, memory.stage, holds=f.pack_v >= target_v)
-    if session.rise_s >= rule.rise.within_min * 60:  # it rose: the fault table has looked already
+    if session.rise_s >= rule.rise.within_min * 60:  # it rose: the fault table has already checked that
         session = sessions.rise_counts(f, session)
     changes = {"stage": now, "session": session}
     reached = now.reached_s is not None and f.now_s - now.reached_s >= REACHED_S
@@ -148,7 +148,7 @@ def _resting(f: Facts, faults: Faults) -> Next:
 
 
 def _rest(f: Facts, faults: Faults) -> Next:
-    """Where a bay whose charger stands by belongs."""
+    """Where a bay belongs whose charger is in standby."""
     trigger, why = resting_place(f, faults)
     state = f.memory.state
     if state is State.TRIPPED:
@@ -187,12 +187,12 @@ def _qualifying(f: Facts) -> Next:
 
 
 def _qualified(f: Facts, since_s: float | None) -> bool:
-    """Everything has spoken for a charge for long enough."""
+    """Whether every condition for a charge has held for long enough."""
     return since_s is not None and f.now_s - since_s >= QUALIFY_S and _seen_twice(f, since_s) and f.stopped
 
 
 def _seen_twice(f: Facts, since_s: float) -> bool:
-    """A newer sample of every value has come since; the first one was there when it began."""
+    """Whether a newer sample of every value has come since; the first one was there when the time began."""
     battery = f.snapshot.battery
     values = (battery.voltage_v, battery.temperature_c, battery.status, battery.soc_pct, battery.soh_pct)
     return all(value is not None and value.t_s > since_s for value in values)

@@ -1,7 +1,7 @@
-"""What becomes of an operator's request. A refusal names its cause; a reset permits a start, it does not make one.
+"""Handles an operator's request. A refusal names its cause; a reset permits a start but does not make one.
 
-Accepted is what has an effect, or what is so already. Any other request that would change nothing is refused with what
-the bay does, or waits for; a stop alone is always accepted.
+A request is accepted if it has an effect, or if what it asks for is already so. Any other request that would change
+nothing is refused with what the bay does, or waits for. A stop is always accepted.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,14 +20,14 @@ from orchestrator.model.cause import together
 
 STOPPED = Cause("operator_stop")
 RESET = Cause("operator_reset")
-#: The holds that are an operator's own doing.
+#: The holds that an operator has caused.
 OWN = frozenset({STOPPED, RESET})
 OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What a request has changed; `refusal` is why it was not done."""
+    """What a request has changed; `refusal` is why it was not carried out."""
 
     operator: Operator
     faults: Mapping[str, FaultMemory]
@@ -37,9 +37,10 @@ class Heard:
 def handle_request(
     memory: Memory, request: Request, now_s: float, not_persisted: Cause | None = None, bay: str = "BAY"
 ) -> Heard:
-    """What becomes of the request; `bay` is the name for commands.
+    """Carry out the request or refuse it; `bay` is the name for commands.
 
-    What would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never is.
+    A request that would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never
+    is.
     """
     if not_persisted is not None and request in (Request.START, Request.RESET):
         return _refused(memory, Cause.of("not_done", advice="not_persisted", problem=not_persisted))
@@ -47,7 +48,7 @@ def handle_request(
 
 
 def stopped(known: Operator) -> Operator:
-    """An operator has stopped the bay."""
+    """The operator's part of the memory after a stop."""
     return changed(known, hold=STOPPED)
 
 
@@ -61,7 +62,7 @@ def _stop(memory: Memory, _now_s: float, _bay: str) -> Heard:
 
 def _pause(memory: Memory, _now_s: float, _bay: str) -> Heard:
     latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
-    if latched:  # its reset leads to a start, which would end the pause
+    if latched:  # a reset leads to a start, which would end the pause
         return _refused(memory, Cause.of("reset_first", faults=latched))
     if memory.operator.hold:
         return _refused(memory, Cause.of("not_running", what=memory.operator.hold))
@@ -92,12 +93,12 @@ def _reset(memory: Memory, now_s: float, bay: str) -> Heard:
     cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
     resets = tuple(reset for reset in known.resets if now_s - reset[0] < RESETS_S)
     resets += tuple((now_s, name) for name in cleared)
-    # in whatever state: the way on is a start, also while the stop is verified
+    # in any state, even while the stop is being verified: the way on is a start
     return Heard(changed(known, hold=RESET, resets=resets), faults)
 
 
 def _refusals(memory: Memory, now_s: float, bay: str, request: Request) -> list[Cause]:
-    """Why it cannot be done now, and until when: of each fault that stands in the way, and what to do about it."""
+    """Why the request is refused now, and until when: one cause per fault in the way, with what to do about it."""
     return [
         Cause.of("refused", fault=name, why=why, what=_what(memory, name), then=_first(memory, now_s, bay, name, why))
         for name in refusing(memory, now_s, request)
@@ -111,7 +112,7 @@ def _what(memory: Memory, name: str) -> Cause:
 
 
 def _first(memory: Memory, now_s: float, bay: str, name: str, why: Cause) -> Cause | None:
-    """What ends it, where that is something else than the wait for which the request was refused."""
+    """What ends the fault, if that differs from the wait for which the request was refused."""
     ends = act(memory, now_s, bay, name)
     return None if ends.same_as(why) else ends
 

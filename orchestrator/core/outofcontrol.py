@@ -1,4 +1,4 @@
-"""What is said of a charger that was not seen to stop: first what to do, then what each witness says."""
+"""The message for a charger that was not seen to stop: first what to do, then the report of each witness."""
 
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import LASTS_S
@@ -13,7 +13,7 @@ def out_of_control(f: Facts) -> Cause:
         lasts_s = f.now_s - memory.witnessed.proof[0]
         return Cause.of("uncontrollable_stands_by", port=port, lasts_s=lasts_s, limit_s=LASTS_S)
     if f.charger.online and f.reading is not None and not f.runs and sees_current(f):
-        # a BMU with an offset, or one that stands still, looks the same as a charger that lies
+        # a BMU with an offset, or a frozen one, looks the same as a charger that lies
         charger_a, pack_a = f.reading.current_a, f.pack_a
         return Cause.of("uncontrollable_contradicted", port=port, charger_a=charger_a, pack_a=pack_a)
     since_s = memory.stop.stopping_s if memory.stop.stopping_s is not None else f.now_s - f.state_s
@@ -22,12 +22,15 @@ def out_of_control(f: Facts) -> Cause:
 
 
 def _heard(f: Facts) -> bool:
-    """What the charger says is of now. Only then may it be said not to obey: one that is not heard may have stopped."""
+    """Whether the charger's report is current.
+
+    Only then can it be said not to obey: one that is not heard may have stopped.
+    """
     return f.charger.online and not f.charger.problem and f.reading is not None
 
 
 def _witnesses(f: Facts) -> Cause:
-    """What each witness says, the old marked as old."""
+    """The report of each witness, with its age if it is old."""
     bmu = Cause.of("bmu_sees", pack_a=f.pack_a) if f.pack_a is not None else Cause("bmu_not_heard")
     if not _heard(f) or f.reading is None:
         heard, last = f.snapshot.charger, None
@@ -40,7 +43,7 @@ def _witnesses(f: Facts) -> Cause:
 
 
 def problem(f: Facts, silent: str) -> Cause:
-    """Why the charger cannot be heard; `silent` is the id for one that only does not answer."""
+    """Why the charger cannot be heard; `silent` is the id if it simply does not answer."""
     if f.charger.problem:
         return f.charger.problem
     return Cause.of(silent, port=f.rules.bay.charger.port)

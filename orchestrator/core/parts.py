@@ -1,7 +1,7 @@
-"""What the parts of the memory are made of: frozen records, whose fields say what kind of thing they carry.
+"""Building blocks for the parts of the memory: frozen records whose fields declare what kind of value they carry.
 
-Theory of operation. Who leaves steps out, tells two memories apart, or decides a record again with another policy needs
-to know what a field is. That stands beside the field itself, so that no list elsewhere has to follow the memory.
+Theory of operation. Code that skips decisions, compares two memories, or replays a record under another policy needs to
+know what each field is. That is declared on the field itself, so no separate list has to follow the memory.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,26 +22,26 @@ class Kind(Enum):
     """How a field changes."""
 
     EVENT = auto()  #: only when something happens
-    TOTAL = auto()  #: sums up while a condition holds; that there is anything, or nothing any more, is an event
-    MEASURED = auto()  #: all the time: values, their times, and what is taken from them
+    TOTAL = auto()  #: accumulates while a condition holds; becoming non-zero, or zero again, is an event
+    MEASURED = auto()  #: continuously: values, their times, and what is derived from them
 
 
 def event(default: T, *, by_policy: bool = False, tells: frozenset[State] = NOWHERE) -> T:
     """A field that changes only when something happens.
 
-    `by_policy`: only what the policy says changes it. `tells`: the states in which it decides, once it is there or not,
-    where the bay can go from there.
+    `by_policy`: it depends on the policy alone. `tells`: the states in which its presence or absence determines where
+    the bay can go next.
     """
     return field(default=default, metadata={"kind": Kind.EVENT, "by_policy": by_policy, "tells": tells})
 
 
 def total(default: float) -> float:
-    """A field that sums up."""
+    """A field that accumulates."""
     return field(default=default, metadata={"kind": Kind.TOTAL, "by_policy": False, "tells": NOWHERE})
 
 
 def measured(default: T, *, by_policy: bool = False, tells: frozenset[State] = NOWHERE) -> T:
-    """A field that follows the values."""
+    """A field that follows the measured values."""
     return field(default=default, metadata={"kind": Kind.MEASURED, "by_policy": by_policy, "tells": tells})
 
 
@@ -51,12 +51,12 @@ def of_kind(part: Any, kind: Kind) -> Iterator[str]:  # noqa: ANN401 - any datac
 
 
 def unclassed(part: Any) -> Iterator[Field[Any]]:  # noqa: ANN401 - any dataclass
-    """The fields that do not say what they are."""
+    """The fields that do not declare a kind."""
     return (one for one in fields(part) if "kind" not in one.metadata)
 
 
 def _twin(cls: type[Any]) -> tuple[Callable[[Any], tuple[Any, ...]], type[Any]]:
-    """What reads all values of such a record, and a class of the same slots that can be written to."""
+    """A getter for all values of such a record, and a writable class with the same slots."""
     names = [one.name for one in fields(cls)]
     return attrgetter(*names), make_dataclass(cls.__name__, names, slots=True, eq=False, repr=False, match_args=False)
 
@@ -65,10 +65,10 @@ _TWINS: dict[type[Any], tuple[Callable[[Any], tuple[Any, ...]], type[Any]]] = {}
 
 
 def made(cls: type[T], /, *values: object) -> T:
-    """A frozen record with slots of all these values, three times as fast as by its own constructor.
+    """A frozen record with slots built from all its values, three times as fast as by its constructor.
 
-    That one writes past the record's own guard, field by field; here they are written into the record's twin, which has
-    no guard, and is then declared to be the record.
+    The constructor bypasses the record's own guard field by field. Here the values go into the record's twin, which has
+    no guard and is then declared to be the record.
     """
     if cls not in _TWINS:
         _TWINS[cls] = _twin(cls)
@@ -78,11 +78,11 @@ def made(cls: type[T], /, *values: object) -> T:
 
 
 if TYPE_CHECKING:
-    from dataclasses import replace as changed  # checked as that is, by the names and types of the fields
+    from dataclasses import replace as changed  # type-checked like `replace`, by the names and types of the fields
 else:
 
     def changed(part: T, /, **changes: object) -> T:
-        """`dataclasses.replace` for frozen records with slots, four times as fast: as in `made`."""
+        """`dataclasses.replace` for frozen records with slots, four times as fast; works like `made`."""
         cls = part.__class__
         twin = _TWINS.get(cls)
         if twin is None:

@@ -1,7 +1,8 @@
 """What of a bay's memory survives a restart, and the memory that a restart begins with. Pure: no disk, no clock.
 
-A restart is neither a reset nor a start, and it forgets no limit: what was latched, held, counted or raised goes on. A
-charger that may have been running waits for a person. Times are kept as ages, since monotonic clocks begin anew.
+A restart is neither a reset nor a start, and it forgets no limit: everything latched, held, counted or raised
+continues. A charger that may have been running waits for a person. Times are stored as ages, since monotonic clocks
+start again.
 """
 
 from collections.abc import Mapping
@@ -18,37 +19,37 @@ from orchestrator.model.cause import said, together
 COUNTERS_S = 30.0
 UNFINISHED = Cause("unfinished")
 
-Age = float  #: seconds, at the moment when it was written down
+Age = float  #: in seconds, at the time of writing
 
 
 @dataclass(frozen=True, slots=True)
 class PersistedFault:
-    """One fault in force, or the strikes that are left of one."""
+    """An active fault, or the strikes left of one."""
 
-    cause: Cause | None = None  #: the evidence; None where only strikes are left
+    cause: Cause | None = None  #: the evidence; None if only strikes are left
     latched: bool = False
-    raised: Age | None = None  #: None: it is not in force
-    clean: Age | None = None  #: since when its cause has been gone; None: it was still there
+    raised: Age | None = None  #: None: it is not active
+    clean: Age | None = None  #: since when its condition has been gone; None: it was still true
     strikes: tuple[Age, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Persisted:
-    """Of one bay."""
+    """The persisted state of one bay."""
 
-    running: bool = False  #: the charger may be running: it was told to, and was not verified to stand by since
+    running: bool = False  #: the charger may be running: it was told to, and was not verified in standby since
     hold: Cause | None = None  #: why a person must start; as in the core's memory
     paused: bool = False
     faults: Mapping[str, PersistedFault] = field(default_factory=dict)
     resets: tuple[tuple[Age, str], ...] = ()
-    session: Session | None = None  #: the open charge with all that it has counted; `started_s` is an age
+    session: Session | None = None  #: the open charge with all its counters; `started_s` is an age
     full_pct: float | None = None
-    full: Age | None = None  #: since when the battery was not charged all the way; None: nobody counts yet
-    soc: tuple[Age, float] | None = None  #: the newest SOC of the battery that is in the bay
+    full: Age | None = None  #: how long the battery has not been charged all the way; None: not counted yet
+    soc: tuple[Age, float] | None = None  #: the newest SOC of the battery in the bay
 
     @classmethod
     def of(cls, memory: Memory, now_s: float) -> "Persisted":
-        """What to keep of a bay's memory."""
+        """What to persist of a bay's memory."""
         faults = {
             name: PersistedFault(
                 cause=fault.cause if fault.raised_s is not None else None,
@@ -76,7 +77,7 @@ class Persisted:
 
     @property
     def gist(self) -> tuple[object, ...]:
-        """What must be on disk before it is relied on; the rest are ages and counters, which may be a little older."""
+        """What must be on disk before it is relied on; the rest are ages and counters, which may be slightly older."""
         faults = frozenset(
             (name, fault.latched, fault.raised is not None, len(fault.strikes)) for name, fault in self.faults.items()
         )
@@ -84,7 +85,7 @@ class Persisted:
         return self.running, self.hold, self.paused, faults, resets, self.session is not None, self.full_pct is None
 
     def aged(self, seconds: float, unseen_s: float | None = None) -> "Persisted":
-        """The same so much later; `unseen_s` where that is not for how long nobody has counted."""
+        """The same state this much later; `unseen_s` if the time without counting differs from that."""
         return replace(
             self,
             faults={
@@ -103,8 +104,7 @@ class Persisted:
         )
 
     def _session(self, seconds: float, unseen_s: float | None) -> Session | None:
-        """A charger that ran has gone on after its counters were written, at the longest until they would have been
-        written again."""
+        """A running charger continued after its counters were written, at most until the next writing was due."""
         session = self.session
         if session is None:
             return None
@@ -120,7 +120,7 @@ class Persisted:
         )
 
     def memory(self, now_s: float) -> Memory:
-        """What the bay begins with."""
+        """The memory that the bay begins with."""
         faults = {name: _fault(fault, now_s) for name, fault in self.faults.items() if name in ROW}
         if self.running:
             faults["found_running"] = FaultMemory(raised_s=now_s, cause=UNFINISHED)
@@ -159,8 +159,8 @@ def _fault(fault: PersistedFault, now_s: float) -> FaultMemory:
 
 
 def from_first_format(name: str, text: str) -> PersistedFault:
-    """A fault of the first format, which kept only those that wait for a person, by id and evidence."""
+    """A fault in the first format, which stored only those that wait for a person, by id and evidence."""
     row = ROW.get(name)
-    backoff = row is not None and row.clear is Clear.BACKOFF  # it would not have been kept with fewer strikes
+    backoff = row is not None and row.clear is Clear.BACKOFF  # with fewer strikes it would not have been stored
     strikes = (0.0,) * (len(BACKOFF_S) + 1) if backoff else ()
     return PersistedFault(said(text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes)

@@ -1,4 +1,4 @@
-"""Where a bay belongs whose charger stands by, verified: one row for each reason to rest, the first that holds wins."""
+"""Where a bay belongs whose charger is in verified standby: one row per reason to rest; the first that holds wins."""
 
 from collections.abc import Callable
 
@@ -12,14 +12,14 @@ from orchestrator.model import ActiveFault, Cause, Effect, State
 Faults = tuple[ActiveFault, ...]
 Found = tuple[Trigger, Cause] | None
 
-#: A battery that is to be charged all the way once in so many days, and has this much, is as good as full.
+#: When a battery is due to be charged all the way (`full_every_days`), at this SOC it is as good as full.
 FULL_DUE_PCT = 98.0
 #: A full battery must have lost this much before it is charged again, however high the policy's threshold.
 RECHARGE_DROP_PCT = 3.0
 
 
 def resting_place(f: Facts, faults: Faults) -> tuple[Trigger, Cause]:
-    """The trigger that leads to where the bay belongs (perhaps it is there), and why."""
+    """The trigger that leads to where the bay belongs (it may be there already), and why."""
     return next(found for find in PLACES if (found := find(f, faults)) is not None)
 
 
@@ -90,17 +90,17 @@ def _remains(f: Facts, _faults: Faults) -> Found:
     return (Trigger.QUALIFY if wanted else Trigger.REST), why
 
 
-#: The reasons to rest. Each says where to, or None where it does not hold; each stands where it stands for a reason.
+#: The reasons to rest. Each returns where to, or None if it does not hold; the order is explained row by row.
 PLACES: tuple[Callable[[Facts, Faults], Found], ...] = (
-    _trips,  # a person must look before anything else; a trip that was not verified loses the charger first
-    _loses,  # every place below promises a standby that was verified: first the line
-    _waits,  # a fault that a person ends: its advice is the more urgent one, and the same start ends a hold, too
-    _holds,  # what a person has stopped, nobody and nothing else goes on with
-    _ends,  # no charge begins that the service's end would stop; a pause comes back after it
-    _pauses,  # the operator's word stands before what the battery wants
+    _trips,  # a person must look before anything else; without a verified stop, a lost charger comes first
+    _loses,  # every place below promises a verified standby, so the line comes first
+    _waits,  # a fault that a person ends: its advice is more urgent, and the same start ends a hold, too
+    _holds,  # nobody and nothing else continues what a person has stopped
+    _ends,  # no charge begins that the end of the service would stop; a pause returns after it
+    _pauses,  # the operator's pause comes before what the battery wants
     _absent,  # nothing below can be judged without a battery
     _charged,  # a battery that wants nothing waits for nothing, faults or not
-    _barred,  # it goes on by itself, once nothing keeps it from charging
+    _barred,  # it goes on by itself once nothing prevents a charge
     _remains,  # what the battery wants
 )
 
@@ -115,19 +115,19 @@ def _start(f: Facts) -> Cause:
 
 
 def _wanted(f: Facts) -> tuple[bool, Cause]:
-    """Whether the battery wants to be charged, and why (not)."""
+    """Whether the battery wants a charge, and why (not)."""
     policy, full_pct = f.rules.policy, f.memory.battery.full_pct
     if f.soc is None:
         return False, Cause("soc_unknown")
-    if full_pct is None and f.memory.session is not None:  # what was interrupted is brought to its end
+    if full_pct is None and f.memory.session is not None:  # an interrupted charge is completed
         if unfinished := goes_on(f):
             return True, unfinished
         threshold, key = target(f)
     elif full_pct is None:
         key, threshold = "start.soc_below_pct", policy.start.soc_below_pct
-    elif full_due(f):  # it is full by its target only
+    elif full_due(f):  # it is full only by its target
         key, threshold = "finish.full_every_days", FULL_DUE_PCT
-    else:  # it may have been full by taper at less than the policy's SOC: it must have fallen since
+    else:  # it may be full by taper at less than the policy's SOC, so it must have fallen since
         key, threshold = "recharge.soc_below_pct", min(policy.recharge.soc_below_pct, full_pct - RECHARGE_DROP_PCT)
     below = f.soc < threshold
     id_ = "soc_below" if below else "soc_not_below"
@@ -135,7 +135,7 @@ def _wanted(f: Facts) -> tuple[bool, Cause]:
 
 
 def ending(f: Facts) -> Cause | None:
-    """The service is about to end, and why."""
+    """That the service is about to end, and why; None if it is not."""
     return Cause.of("service_ends", why=f.snapshot.ending) if f.snapshot.ending is not None else None
 
 

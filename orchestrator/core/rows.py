@@ -1,8 +1,8 @@
-"""Which row of each of a policy's tables is in force: the one that the value is in, or a gentler one that holds on.
+"""Which row of each of a policy's tables is in force: the one that the value is in, or a gentler one that still holds.
 
-A row that allows less is left only when the value is well inside the next one (`hysteresis`). One that comes back again
-and again all the same, because less current changes what it is about, stays for the rest of the charge. So nothing
-chatters at a bound.
+A row that allows less is left only when the value is well inside the next one (`hysteresis`). If it keeps coming back
+anyway, because less current changes the quantity itself, it stays for the rest of the charge. So nothing chatters at a
+bound.
 """
 
 from collections.abc import Mapping
@@ -14,22 +14,22 @@ from orchestrator.core.memory import Tables
 from orchestrator.core.parts import changed
 from orchestrator.core.rules import Spans
 
-#: A row that has brought the step down more often than this in one charge is not left any more.
+#: A row that has lowered the step more often than this in one charge is no longer left.
 MOST_RETURNS = 2
 
-Returns = tuple[tuple[str, int], ...]  #: how often each key has brought the step down in this charge
+Returns = tuple[tuple[str, int], ...]  #: how often each key has lowered the step in this charge
 Values = Mapping[str, float | None]
 
 NONE = Tables()
 
 
 def values(f: Facts) -> dict[str, float | None]:
-    """What the tables are about."""
+    """The values that the tables are about."""
     return {"temperature_c": f.temperature_c, "soc_pct": f.soc, "soh_pct": f.soh, "voltage_v": f.pack_v}
 
 
 def update(f: Facts) -> Tables:
-    """The rows that are in force by these facts."""
+    """The rows in force by these facts."""
     memory, rules, before = f.memory, f.rules, f.memory.tables
     if f.battery_removed or f.battery.boots != memory.battery.boots:
         return before if before == NONE else NONE
@@ -52,7 +52,7 @@ def update(f: Facts) -> Tables:
 
 
 def _in_force(table: TableRule, value: float | None, was: int | None, returns: Returns) -> int | None:
-    """The row of one table; None outside of it. A value that is not known changes nothing."""
+    """The row of one table; None outside it. An unknown value changes nothing."""
     rows, amps = table.rows, table.amps
     if value is None or (was is not None and was < len(rows) and rows[was].from_ <= value < rows[was].to):
         return was
@@ -64,7 +64,7 @@ def _in_force(table: TableRule, value: float | None, was: int | None, returns: R
 
 
 def _holds(name: str, spans: Spans, known: Values, returns: Returns, *, was: bool) -> bool:
-    """Whether a rule of `where` holds; what is not known is taken to be inside."""
+    """Whether a rule of `where` holds; unknown values count as inside."""
     for quantity, span, inside in spans:
         value, wider = known[quantity], inside if was else 0.0
         if value is not None and not span.low - wider <= value <= span.high + wider:
@@ -73,18 +73,18 @@ def _holds(name: str, spans: Spans, known: Values, returns: Returns, *, was: boo
 
 
 def _stays(key: str, returns: Returns) -> bool:
-    """Whether it came back too often. A pause is no step, and may come again: it would else be for ever."""
+    """Whether it came back too often. Only steps down count: a pause may recur, or it would last for ever."""
     return dict(returns).get(key, 0) > MOST_RETURNS
 
 
 def lowered(tables: Tables, key: str) -> Tables:
-    """What this key names has brought the step down once more."""
+    """The rule with this key has lowered the step once more."""
     times = dict(tables.row_returns)
     return changed(tables, row_returns=tuple((times | {key: times.get(key, 0) + 1}).items()))
 
 
 def _row(rows: tuple[Band, ...], value: float) -> int | None:
-    """The index of the row that `value` lies in; the last one includes its end."""
+    """The index of the row that `value` is in; the last row includes its end."""
     for index, band in enumerate(rows):
         if band.from_ <= value < band.to:
             return index

@@ -1,4 +1,4 @@
-"""What a bay is decided by: its station entry and its policy, with the stricter of both worked out once."""
+"""The rules for one bay: its station entry and its policy, with the stricter of both worked out once."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +20,7 @@ from orchestrator.config.station import BayConfig
 from orchestrator.keys import Range
 from orchestrator.model import Cause, ControlMode
 
-Spans = tuple[tuple[str, Range, float], ...]  #: quantity, where a rule holds, and its hysteresis
+Spans = tuple[tuple[str, Range, float], ...]  #: quantity, the range in which a rule holds, and its hysteresis
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,25 +38,25 @@ class Rules:
 
     bay: BayConfig
     policy: Policy
-    manual: bool  #: the charger obeys values, not only stop and resume
+    manual: bool  #: the charger takes setpoint values, not only stop and resume
     max_v: float  #: no current above this, at the charger or at the pack
     temperature_c: Range  #: no current outside
-    steps_a: tuple[float, ...]  #: what each current-limit step means
-    worst_a: tuple[float, ...]  #: what may flow on each of them at most
+    steps_a: tuple[float, ...]  #: the nominal current of each current step
+    worst_a: tuple[float, ...]  #: the most that may flow on each of them
     top_step: int  #: the highest step within the station's current limit
     tables: tuple[TableRule, ...]  #: what the policy allows by one quantity …
-    where_a: tuple[float, ...]  #: … and by several, each rule of its `where`
-    pack_bound: Bound  #: what always limits the current …
-    table_bounds: tuple[tuple[Bound, ...], ...]  #: … what does in each row of each table …
+    where_a: tuple[float, ...]  #: … and by several, one value per rule of its `where`
+    pack_bound: Bound  #: the limit that always applies …
+    table_bounds: tuple[tuple[Bound, ...], ...]  #: … the one in each row of each table …
     where_bounds: tuple[Bound, ...]  #: … and in each rule of `where` …
     where_spans: tuple[Spans, ...]  #: … with the quantities that it is about
-    taper: TaperRule | None  #: when the current counts as tapered off; None: it never does
+    taper: TaperRule | None  #: when the current counts as tapered off; None: never
     max_hours: float  #: a charge that takes longer is a fault
-    max_ah: float  #: … and one that takes more
+    max_ah: float  #: … and so is one that takes more
 
     @classmethod
     def of(cls, bay: BayConfig) -> "Rules":
-        """The stricter of station and policy, for each limit that both have."""
+        """The stricter of station and policy for each limit that both have."""
         policy, limits, charger = bay.policy, bay.limits, bay.charger
         worst_a = tuple(round(amps * (1 + charger.tolerance_pct / 100), DIGITS) for amps in charger.steps_a)
         allowed = [index for index, amps in enumerate(worst_a) if amps <= limits.current_a]
@@ -97,17 +97,17 @@ class Rules:
         )
 
     def by_policy(self, id_: str, key: str, /, **params: Any) -> Cause:  # noqa: ANN401 - as those of a cause
-        """The cause with this key of the policy, and the line where that stands."""
+        """The cause with this key of the policy, and the line where it stands."""
         return Cause(id_, tuple(params.items()), key, self.policy.source.at(key))
 
     @property
     def hottest_at(self) -> tuple[str, str]:
-        """Key and place of what says how warm a pack may be: the policy, or the station if its limit is lower."""
+        """Key and place of the upper temperature limit: the policy's, or the station's if that is lower."""
         return self._at(policy_is_stricter=self.policy.pack.temperature_c.high <= self.bay.limits.temperature_c.high)
 
     @property
     def coldest_at(self) -> tuple[str, str]:
-        """The same for how cold it may be."""
+        """Key and place of the lower temperature limit: the policy's, or the station's if that is higher."""
         return self._at(policy_is_stricter=self.policy.pack.temperature_c.low >= self.bay.limits.temperature_c.low)
 
     def _at(self, *, policy_is_stricter: bool) -> tuple[str, str]:

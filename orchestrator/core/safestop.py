@@ -3,13 +3,14 @@
 Theory of operation. The safe state is *verified* standby, by both witnesses (`witnesses/standby.py`). Until then the
 standing command is STOP, repeated by the port every 500 ms. A charger not verified after `OBEY_STOP_S` is
 uncontrollable: the command stays, the contactor opens, people are alarmed, and only a standby that lasts for `LASTS_S`
-ends it. In states of rest there is no standing command as long as fresh replies show standby; the moment one does not,
-or the BMU sees current, it is STOP again.
+ends it. In states of rest there is no standing command as long as fresh replies show standby; as soon as one does not,
+or the BMU keeps seeing current, it is STOP again.
 
-One that runs again within `LASTS_S` was never verified, whatever it said: its time counts on from the first stop.
+A charger that runs again within `LASTS_S` was never verified, whatever it reported: its time counts from the first
+stop.
 
-Standby does not show whether both frames of a stop were heard, and a charger that missed the second one may run on its
-old values as soon as it is resumed. So a bay that qualifies for a charge stops its charger once more.
+Standby does not show whether both frames of a stop were received, and a charger that missed the second one may run on
+its old values as soon as it is resumed. So a bay that qualifies for a charge stops its charger once more.
 """
 
 from orchestrator.core.facts import Facts
@@ -20,9 +21,9 @@ from orchestrator.model import Cause, State
 
 #: A stop that is not verified within this is not obeyed.
 OBEY_STOP_S = 3.0
-#: A charger that has not answered for this long at the start is not there.
+#: A charger that has not answered for this long after the start is absent.
 LOST_S = 3.0
-#: A standby that has lasted for this long is one (FAULTS C30).
+#: A standby counts as lasting after this long (FAULTS C30).
 LASTS_S = 10.0
 
 
@@ -54,31 +55,33 @@ def update(f: Facts, after: State, cause: Cause) -> Stop:
 
 
 def failed(stop: Stop, now_s: float, cause: Cause | None) -> Stop:
-    """Our own code has failed: whatever the charger does is unproved. `cause`: this stop begins with it."""
+    """Our own code has failed, so nothing about the charger is proved. `cause`: why a stop begins now, if so."""
     if cause is None:
         return changed(stop, unverified=True)
     return changed(stop, unverified=True, stopping_s=now_s, stop_cause=cause)
 
 
 def proved_to_last(f: Facts) -> bool:
-    """The charger, which did not obey before, has stood by for long enough to be believed."""
+    """The charger, which did not obey before, has been in standby for long enough to be believed."""
     proof = f.memory.witnessed.proof
     return f.stopped and f.charger.online and f.now_s - proof[0] >= LASTS_S
 
 
 def verified(f: Facts) -> bool:
-    """The stop that is being tried is done."""
+    """The stop in progress is complete."""
     return proved_to_last(f) if f.memory.state is State.UNCONTROLLABLE else f.stopped
 
 
 def stands_by(f: Facts) -> bool:
-    """By what is known now, in whatever state: the charger does not run, and nothing is left to be verified."""
+    """The charger does not run and nothing is left to verify, in any state, as far as known now."""
     return verified(f) if f.memory.state in UNVERIFIED else not must_stop(f, f.memory.state)
 
 
 def _runs_again(f: Facts) -> bool:
-    """It was stopped before, in vain. One reply alone may be a stray measurement: a second one, or a second return, is
-    none."""
+    """Whether it runs again after an earlier stop in vain.
+
+    A single reply may be a stray measurement; a second one, or a second return, is not.
+    """
     since_s, stopping_s, reading = f.memory.since_s, f.memory.stop.stopping_s, f.reading
     if since_s is None or stopping_s is None or f.now_s - stopping_s < OBEY_STOP_S:
         return False
@@ -88,8 +91,8 @@ def _runs_again(f: Facts) -> bool:
 def gives_up(f: Facts) -> bool:
     """The charger has had its time.
 
-    At the start it has first to be found; one that does not answer at all is not there: that is OFFLINE. Unless the
-    last run of the service left it running.
+    After the start it must first be found. One that does not answer at all is absent: that is OFFLINE, unless the
+    previous run of the service left it running.
     """
     memory = f.memory
     if memory.state is State.STOPPING:

@@ -1,9 +1,9 @@
 """How a charger is brought to a setpoint: one command at a time, each seen in a status reply before the next.
 
-Manual mode: resume (rest 1) → limit step → mode → precharge function → run. Automatic mode: resume only. A command
+Manual mode: resume (rest 1) → current step → mode → precharge function → run. Automatic mode: resume only. A command
 stands until its read-back ends it, and the port repeats it meanwhile, so a lost frame costs one slot. A resume has no
-read-back of its own: it counts when a reply was asked for after it was sent. If what follows is not obeyed, the resume
-may have been the frame that was lost, so the sequence begins again with it.
+read-back of its own: it counts once a reply was asked for after it was sent. If what follows is not obeyed, the lost
+frame may have been the resume, so the sequence begins again with it.
 """
 
 from orchestrator.core.facts import Facts
@@ -15,12 +15,12 @@ from orchestrator.model import Action, ChargeMode, ChargerReading, Command, Oper
 RETRY_S = 1.5
 RESUME = Command(Action.RESUME)
 RUN = Command(Action.RUN)
-#: What a charger that was told to run may show before the mode that it was told.
+#: What a charger that was told to run may show before the commanded mode.
 ON_THE_WAY = (ChargeMode.BATTERY_SEARCH, ChargeMode.BATTERY_RECOVERY)
 
 
 def next_command(f: Facts, setpoint: Setpoint) -> tuple[Command | None, Sequence]:
-    """The command that leads towards `setpoint`, None when the status shows all of it; and how far the sequence is."""
+    """The next command towards `setpoint`, None when the status shows all of it; and how far the sequence has come."""
     known, reading = f.memory.sequence, f.reading
     if reading is None:
         return known.command, known
@@ -40,12 +40,12 @@ def next_command(f: Facts, setpoint: Setpoint) -> tuple[Command | None, Sequence
 
 
 def begins(known: Sequence, now_s: float) -> Sequence:
-    """Current is to flow, after a rest in which it did not."""
+    """Current is to flow after a rest."""
     return changed(known, resumed=False, resume_s=now_s, command=None)
 
 
 def ends(known: Sequence) -> Sequence:
-    """No current is to flow any more."""
+    """Current is no longer to flow."""
     return changed(known, command=None) if known.command is not None else known
 
 
@@ -59,7 +59,7 @@ def _resume_seen(f: Facts, reading: ChargerReading) -> bool:
 
 
 def _missing(reading: ChargerReading, setpoint: Setpoint, *, manual: bool) -> Command | None:
-    """The first value of the setpoint that the status does not show."""
+    """The command for the first value of the setpoint that the status does not show."""
     running = _running(reading)
     if not manual:
         return None if running else RESUME

@@ -1,7 +1,7 @@
-"""Which states belong together, and why: one table, and a set of states for each of its columns.
+"""What states have in common and why: one table, and a set of states for each of its kinds.
 
-Theory of operation. Whoever treats several states alike names a class of this table instead of listing states. A new
-state is one row here; a reader sees at a glance what every rule of the product takes it for.
+Theory of operation. Code that treats several states alike names a kind from this table instead of listing states. A new
+state is one row here, and the row shows at a glance how every rule of the product treats it.
 """
 
 from collections.abc import Mapping
@@ -13,23 +13,23 @@ from orchestrator.model import State
 class Kind(Enum):
     """What states can have in common."""
 
-    ENERGISED = auto()  #: the charger is told to run: current flows, and everything supervises it
-    PRECHARGING = auto()  #: … gently, to wake a deeply discharged pack, on the lowest step
+    ENERGISED = auto()  #: the charger is told to run: current flows under full supervision
+    PRECHARGING = auto()  #: … gently, on the lowest step, to wake a deeply discharged pack
     AT_WORK = auto()  #: a charge has been started: energised, or about to be
-    UNVERIFIED = auto()  #: a stop is under way, and nothing has proved it yet
-    UNSEEN = auto()  #: the charger is heard for the first time, or again: what it did meanwhile, nobody saw
-    AT_REST = auto()  #: the charger was verified to stand by, and was not told to run since
-    RESTING = auto()  #: from here a bay goes where the facts lead, without a stop first
+    UNVERIFIED = auto()  #: a stop is under way and not yet proved
+    UNSEEN = auto()  #: the charger is heard for the first time, or again: nobody saw what it did before
+    AT_REST = auto()  #: the charger was verified in standby and has not been told to run since
+    RESTING = auto()  #: a bay goes from here to where the facts lead, without a stop first
     SETTLED = auto()  #: entered after a verified standby, or after a charger that was not heard: nothing is pending
     QUIET = auto()  #: every decision is the same until something happens
-    STARTABLE = auto()  #: a battery that wants to be charged is qualified from here
-    READY = auto()  #: goes on by itself: no person is waited for
-    OBEYS = auto()  #: the charger is known to do as it is told: the contactor may be closed
-    MAY_RUN = auto()  #: a charger may be delivering current: after a restart a person must look
-    SESSION_ENDS = auto()  #: after these a charge is over; a pause, a restart and a silent device do not end it
-    ALIKE = auto()  #: at rest, waiting for a person or not: from one to the other a charge has come no farther
-    DONE = auto()  #: nothing goes on here that was interrupted
-    PASSING = auto()  #: left again within seconds, whatever the surroundings
+    STARTABLE = auto()  #: a battery that wants a charge is qualified from here
+    READY = auto()  #: continues by itself, without waiting for a person
+    OBEYS = auto()  #: the charger is known to obey: the contactor may be closed
+    MAY_RUN = auto()  #: the charger may be delivering current: after a restart a person must look
+    SESSION_ENDS = auto()  #: entering one ends the charge; a pause, a restart and a silent device do not end it
+    ALIKE = auto()  #: at rest, waiting for a person or not: moving between them is no progress of a charge
+    DONE = auto()  #: nothing interrupted is waiting here to continue
+    PASSING = auto()  #: left again within seconds, in any surroundings
 
 
 S, K = State, Kind
@@ -71,5 +71,5 @@ UNVERIFIED, UNSEEN = _of(K.UNVERIFIED), _of(K.UNSEEN)
 AT_REST, RESTING, SETTLED, QUIET = _of(K.AT_REST), _of(K.RESTING), _of(K.SETTLED), _of(K.QUIET)
 STARTABLE, READY, OBEYS, MAY_RUN = _of(K.STARTABLE), _of(K.READY), _of(K.OBEYS), _of(K.MAY_RUN)
 SESSION_ENDS, ALIKE, DONE, PASSING = _of(K.SESSION_ENDS), _of(K.ALIKE), _of(K.DONE), _of(K.PASSING)
-#: In these standby comes first: what else there is decides only then.
+#: States that need standby first; everything else is considered only after that.
 UNPROVED = UNVERIFIED | {State.OFFLINE}

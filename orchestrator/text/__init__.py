@@ -1,1 +1,1 @@
-"""Sentences from causes: the only place where any is made."""
+"""Sentences from causes: the only place where any are made."""

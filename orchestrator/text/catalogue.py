@@ -1,16 +1,16 @@
 """`say()`: the sentence for a cause, in English or Korean.
 
-Theory of operation. A template stands under the id of its cause and names its parameters, with the rounding of the
-figures. What an advice adds stands in a frame; `where` stands before it all, `then` and `how` behind. Beside the formats
-of numbers there are five of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
-`then` (how the parts of a list are joined), `after` (a cause, if there is one, after what stands before it).
+Theory of operation. A template is stored under the id of its cause. It names its parameters, with the rounding of the
+figures. A frame combines it with any advice; `where` precedes the evidence, `then` and `how` follow. Besides the number
+formats there are five of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
+`then` (how the parts of a list are joined), `after` (a cause, if there is one, after what precedes it).
 
-What is gone is said in the past tense: a template has both, `{reports|reported}`, and the cause says which is true
-(`past`). Moments are the time of day by the time they come here, in parameters called `…_at`. A cause from the core,
-which knows no clock, has them in seconds, called `…_t_s`.
+Past conditions use the past tense: a template holds both, `{reports|reported}`, and the cause says which applies
+(`past`). Moments normally arrive as the time of day, in parameters called `…_at`. A cause straight from the core, which
+knows no clock, has them in seconds, called `…_t_s`.
 
-`say` never raises, whatever it is given: what it is asked for is often the reason of a stop. A cause that is not known,
-of an older or newer version say, or lacks something, is shown as its data.
+`say` never raises, whatever it is given: it is often asked for the reason of a stop. A cause that is unknown, for
+example from an older or newer version, or incomplete is shown as its data.
 """
 
 import re
@@ -38,15 +38,15 @@ from orchestrator.text.ko.service import TEXTS as KO_SERVICE
 from orchestrator.text.ko.words import FRAMES as KO_FRAMES
 from orchestrator.text.ko.words import WORDS as KO_WORDS
 
-#: Of a cause that a fault has made, what it does: such a sentence begins with what to do.
+#: The effect of a tripping fault, as a cause carries it: its sentence begins with what to do.
 TRIP = "TRIP"
-#: The present and the past of what stands in a template: {reports|reported}.
+#: The present and the past form in a template: {reports|reported}.
 TENSES = re.compile(r"\{([^{}|]*)\|([^{}|]*)\}")
-#: What a moment is called that is not the time of day yet, and what a template calls it.
+#: How the name of a moment ends before it is the time of day, and in a template.
 MOMENT, TIME_OF_DAY = "_t_s", "_at"
-#: Formats that are not those of a number.
+#: Formats that are not number formats.
 JOINS = {"": "list", "word": "list", "and": "and", "then": "then"}
-#: No sentence is longer, whatever stands in its parameters.
+#: No sentence is longer, whatever its parameters are.
 MOST_CHARACTERS = 4000
 
 
@@ -58,7 +58,7 @@ class Language:
     advice: Mapping[str, str]
     words: Mapping[str, str]
     frames: Mapping[str, str]
-    past: Mapping[str, str]  #: the texts, in the past tense
+    past: Mapping[str, str]  #: the texts in the past tense
 
 
 def _language(
@@ -85,9 +85,9 @@ LANGUAGES: Mapping[str, Language] = {
 
 
 def say(cause: Cause | None, language: str = "en", otherwise: str = "") -> str:
-    """The sentence; "" for no cause. A language that is not known is English.
+    """The sentence; "" for no cause. An unknown language means English.
 
-    `otherwise` is what to say of a cause that is not understood, if its data are not to be shown.
+    `otherwise` is the sentence for a cause that is not understood, if its data is not to be shown.
     """
     if cause is None:
         return ""
@@ -99,12 +99,12 @@ def say(cause: Cause | None, language: str = "en", otherwise: str = "") -> str:
 
 
 def fields(cause: Cause | None, language: str = "en") -> dict[str, object] | None:
-    """A cause with its sentence beside it, as JSON has it."""
+    """A cause with its sentence, as in JSON."""
     return {**plain(cause), "text": say(cause, language)} if cause is not None else None
 
 
 def advise(id_: str, language: str = "en") -> str:
-    """What to do about a fault, alone; "" where nothing is known."""
+    """What to do about a fault, without its evidence; "" if there is no advice."""
     return LANGUAGES.get(language, LANGUAGES["en"]).advice.get(id_, "")
 
 
@@ -121,7 +121,7 @@ def _sentence(cause: Cause, texts: Language) -> str:
 
 
 def _evidence(cause: Cause, texts: Language, params: "_Params") -> str:
-    """What is, or was, with its times and with its figures then, at the worst, and now."""
+    """The evidence, present or past, with its times and its figures: then, at the worst, and now."""
     past = replace(texts, texts=texts.past) if cause.param("past") is True else texts
     what, frames = past.texts[cause.id].format_map(_Params(cause, past) if past is not texts else params), texts.frames
     what = frames["where"].format(where=params["where"], what=what) if "where" in params else what
@@ -136,7 +136,7 @@ def _evidence(cause: Cause, texts: Language, params: "_Params") -> str:
 
 
 def _data(cause: Cause, texts: Language) -> str:
-    """What is there of a cause that no template fits."""
+    """The data of a cause that fits no template."""
     try:
         pairs = [*cause.params, ("key", cause.key), ("place", cause.place)]
         shown = ", ".join(f"{name}={_plainly(value)}" for name, value in pairs if value not in ("", None))
@@ -152,7 +152,7 @@ def _plainly(value: object) -> str:
 
 
 class _Params(dict[str, "_Value"]):
-    """A cause's parameters for `format_map`, and `at`: the place in brackets, where there is one."""
+    """A cause's parameters for `format_map`, with `at`: the place in brackets, if there is one."""
 
     def __init__(self, cause: Cause, texts: Language) -> None:
         super().__init__((name, _Value(value, texts)) for name, value in cause.params)
@@ -165,7 +165,7 @@ class _Params(dict[str, "_Value"]):
 
 @dataclass(frozen=True, slots=True)
 class _Value:
-    """One parameter, which knows how it is written."""
+    """One parameter, which formats itself."""
 
     value: object
     texts: Language

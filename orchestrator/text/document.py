@@ -1,4 +1,4 @@
-"""The status document in another language than the service's: every sentence made anew from its cause."""
+"""The status document in a language other than the service's: every sentence is made again from its cause."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,9 +8,9 @@ from orchestrator.text.catalogue import say
 
 
 def in_language(document: Mapping[str, Any], language: str) -> dict[str, Any]:
-    """The document as `language` says it; "" leaves it as it is.
+    """The document in `language`; "" leaves it as it is.
 
-    What a service of another version says, and is not understood here, stays as that one said it, too.
+    A sentence from a service of another version whose cause is not understood here stays as it was sent.
     """
     if not language:
         return dict(document)
@@ -23,18 +23,18 @@ def in_language(document: Mapping[str, Any], language: str) -> dict[str, Any]:
 
 
 def language_of_answer(answer: Mapping[str, Any], own: str) -> str:
-    """The language to say an answer in: the reader's own, else that of the service."""
+    """The language for an answer: the reader's own, else that of the service."""
     return own or str(answer.get("language", ""))
 
 
 def refusals(answer: Mapping[str, Any], language: str) -> dict[str, str]:
-    """What a service has answered to a request, by bay: "" is yes, else why not."""
+    """A service's answer to a request, by bay: "" means yes, anything else why not."""
     results, causes = answer["results"], answer.get("causes", {})
     return {bay: said(causes.get(bay), text, language) for bay, text in results.items()}
 
 
 def said(cause: object, text: str, language: str) -> str:
-    """The sentence for a cause in plain values; `text` where it is none, or none that is known here, or for ""."""
+    """The sentence for a cause in plain values; `text` if there is no such cause, if it is unknown here, or for ""."""
     if not language:
         return text
     try:
@@ -44,7 +44,7 @@ def said(cause: object, text: str, language: str) -> str:
 
 
 def _problem(part: Mapping[str, Any], language: str) -> dict[str, Any]:
-    """A part of it that says what is wrong with something, if it says that as data, too."""
+    """A part that reports a problem, translated if the problem is there as data, too."""
     if not part.get("cause"):
         return dict(part)
     return {**part, "problem": said(part["cause"], part.get("problem", ""), language)}
@@ -63,6 +63,6 @@ def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
 
 def _fault(fault: Mapping[str, Any], language: str) -> dict[str, Any]:
     told = {**fault, "text": said(fault.get("cause"), fault["text"], language)}
-    if ends := fault.get("clears"):  # a service of an older version does not say it
+    if ends := fault.get("clears"):  # a service of an older version does not send it
         told["clears"] = {**ends, "text": said(ends, ends["text"], language)}
     return told

@@ -26,7 +26,7 @@ def idle() -> World:
 
 
 def held() -> World:
-    """An operator has stopped it in mid-charge."""
+    """An operator stopped it in mid-charge."""
     world = charging()
     world.ask(Request.STOP)
     world.until(S.HELD)
@@ -68,7 +68,7 @@ def suspended() -> World:
 
 
 def offline() -> World:
-    """The BMU does not answer, though there is a battery."""
+    """The BMU does not answer, though a battery is there."""
     world = World()
     world.battery_answers = False
     world.until(S.OFFLINE)

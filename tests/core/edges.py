@@ -1,4 +1,4 @@
-"""A charge in which all is well but for what a test names, and any rule of the core that is asked about it alone."""
+"""A charge in which all is well except what a test names, and any rule of the core applied to it alone."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
@@ -47,13 +47,13 @@ def ago(seconds: float) -> float:
     return NOW_S - seconds
 
 
-#: What a rule says, in a test's name, where it is no sentence.
+#: What a rule returns, for a test's name, if that is no sentence.
 ANSWERS: dict[object, str] = {None: "silent", True: "yes", False: "no"}
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A charge in which all is well but for what is named here; what the rule says of it, None for nothing."""
+    """A charge in which all is well except what is named here; `says` is what the rule returns, None for nothing."""
 
     rule: Callable[[Facts], object]
     says: object
@@ -71,7 +71,7 @@ class Edge:
 
     @property
     def name(self) -> str:
-        """The rule, what is special about the charge, and what it says of that."""
+        """The rule, what is special about the charge, and what the rule returns."""
         usual = Edge(self.rule, self.says)
         special: dict[str, object] = {}
         for name in (each.name for each in fields(self)[2:]):
@@ -103,12 +103,12 @@ def session(hours: float = 1.0, ah: float = 1.0, soc_start_pct: float | None = 0
 
 
 def marked(minutes: float, volts: float) -> dict[str, Any]:
-    """The pack had this voltage so many minutes of precharge ago."""
+    """The pack had this voltage this many minutes of precharge ago."""
     return {"session": Session(ago(9999), rise_s=minutes * 60, rise_v=volts)}
 
 
 def witnessed(**known: Any) -> dict[str, Any]:
-    """What is known of both witnesses; a stop of this state and two replies to it, unless something else is said."""
+    """The state of both witnesses: a stop in this state and two replies to it, unless given otherwise."""
     return {"witnessed": Witnessed(**{"stop_s": ago(1), "proof": (ago(0.5), NOW_S), **known})}
 
 

@@ -1,4 +1,4 @@
-"""One scene for every way in which a row of the fault table comes true, and back."""
+"""One scene for every way in which a row of the fault table becomes true, and false again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -38,7 +38,7 @@ def paused_when_warm() -> World:
 
 
 def too_strong() -> World:
-    """A charger whose lowest step is above what the policy allows in precharge, and for a warm pack."""
+    """A charger whose lowest step is above what the policy allows, in precharge and for a warm pack."""
     assert POLICY.precharge is not None
     table = Table(rows=(Band(from_=0, to=25), Band(from_=25, to=45, max_a=1.9)))
     current = replace(POLICY.current, temperature_c=table)
@@ -60,14 +60,14 @@ def with_soc(percent: float) -> Callable[[], World]:
 
 
 def nearly_at_90() -> World:
-    """With a pack that takes little by now, so that nothing flows above the lower step."""
+    """With a pack that takes so little by now that nothing flows above the lower step."""
     world = World(soc_pct=88.0)
     world.amps = 7.0
     return world.charging()
 
 
 def hot() -> World:
-    """Where a pack may have 56 °C, so that the trip comes before the pause."""
+    """With a pack that may reach 56 °C, so that the trip comes before the pause."""
     policy = replace(POLICY, pack=replace(POLICY.pack, temperature_c=Range(0, 56)))
     the_bay = bay(policy)
     return World(
@@ -88,7 +88,7 @@ def short_continuous() -> World:
 
 
 def tapered() -> World:
-    """What the pack takes has fallen off, as it does before a charger ends."""
+    """The pack's current has fallen off, as it does before a charger ends."""
     world = charging()
     world.amps = 3.5
     world.run(6)
@@ -117,7 +117,7 @@ def beating() -> World:
     return world.charging()
 
 
-# --- what goes wrong, and how that ends -------------------------------------------------------------------------------
+# --- what goes wrong, and how it ends ---------------------------------------------------------------------------------
 
 
 def shows(**values: object) -> Act:
@@ -187,7 +187,7 @@ def thawed(world: World) -> None:
 
 
 def still(**moved: float) -> Act:
-    """The charger goes on saying what it says now, whatever moves."""
+    """The charger keeps reporting its present values, whatever moves."""
 
     def act(world: World) -> None:
         if world.reading is not None:
@@ -207,14 +207,14 @@ def waits(seconds: float) -> Act:
 
 
 def returns_as_another(world: World) -> None:
-    """The BMU falls silent, and one that answers in its place has another SOC; the charger saw nothing of it."""
+    """The BMU falls silent, and one that answers in its place has another SOC; the charger saw none of it."""
     world.battery_answers = False
     world.run(5)
     world.arrive(soc_pct=80.0)
 
 
 def waiting() -> World:
-    """Qualified, while another bay begins its charge."""
+    """Qualified while another bay begins its charge."""
     world = World()
     world.ours = {"waits": "bay-2 begins a charge"}
     world.until(S.QUALIFYING)
@@ -228,7 +228,7 @@ def goes_on(world: World) -> None:
 
 
 def swapped() -> World:
-    """The charger has just begun, and the BMU of its bay sees nothing of it."""
+    """The charger has just begun, and its bay's BMU sees nothing of it."""
     world = World()
     world.shunt = 0.0
     world.until(S.CHARGING)
@@ -238,7 +238,7 @@ def swapped() -> World:
 
 
 def reverts(world: World) -> None:
-    """The charger confirms the step that it is told, and twice goes back from it; the third time is to come."""
+    """The charger confirms the commanded step and twice reverts from it; the third time is still to come."""
     for shown in (0, 4, 0, 4):
         world.shows["current_step"] = shown
         world.tick()
@@ -284,17 +284,17 @@ def stopped_in_vain(world: World) -> None:
 
 @dataclass(frozen=True)
 class Scene:
-    """From a bay that is well to one fault, and back."""
+    """From a healthy bay to one fault, and back."""
 
     fault: str
     spoil: Act
     heal: Act
-    evidence: tuple[str, ...]  #: what the fault's text must have
-    then: State  #: where the bay rests, or goes on, after it
-    after_s: float = TICK_S  #: from the spoil to the fault; one tick before there is none
+    evidence: tuple[str, ...]  #: required parts of the fault's text
+    then: State  #: where the bay rests afterwards, or continues
+    after_s: float = TICK_S  #: from the spoil to the fault; one tick earlier there is none
     begin: Callable[[], World] = charging
-    anywhere: bool = True  #: it can come like this in every state in which current flows
-    lapse: bool = True  #: with its cause gone one tick earlier, it does not come
+    anywhere: bool = True  #: it can occur like this in every state in which current flows
+    lapse: bool = True  #: if its cause ends one tick earlier, it is not raised
 
     @property
     def name(self) -> str:

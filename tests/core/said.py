@@ -1,4 +1,4 @@
-"""What the core says, read as a person reads it. What a template does not fit fails here, in each language."""
+"""The core's causes as a person reads them. A cause that does not fit its template fails here, in each language."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -12,7 +12,7 @@ from orchestrator.text.catalogue import LANGUAGES, _sentence
 
 
 def say(cause: Cause | None) -> str:
-    """In English; in the product a mistake is shown as data, here it is one."""
+    """In English; the product shows a mistake as data, here it is an error."""
     if cause is None:
         return ""
     for texts in LANGUAGES.values():
@@ -21,12 +21,12 @@ def say(cause: Cause | None) -> str:
 
 
 def reason_of(decision: Decision) -> str:
-    """Why the bay is where it is."""
+    """Why the bay is in its state."""
     return say(decision.cause)
 
 
 def said(value: object) -> object:
-    """A value with the causes in it, however deep, as their sentences."""
+    """A value with all causes in it, however deep, as sentences."""
     if isinstance(value, Cause):
         return say(value)
     if isinstance(value, tuple | list):
@@ -35,18 +35,18 @@ def said(value: object) -> object:
 
 
 def cause(text: str, advice: str = "") -> Cause:
-    """A cause that says just this."""
+    """A cause whose sentence is exactly this text."""
     return Cause.of("said", advice=advice, text=text)
 
 
 def into(lines: list[str]) -> Callable[[Cause], None]:
-    """Who is told causes and keeps their sentences."""
+    """Receives causes and keeps their sentences."""
     return lambda cause: lines.append(say(cause))
 
 
 @contextmanager
 def raises(kind: type[CauseError], match: str) -> Iterator[pytest.ExceptionInfo[CauseError]]:
-    """As `pytest.raises`, of the sentence that the error has."""
+    """Like `pytest.raises`, matching the error's sentence."""
     with pytest.raises(kind) as caught:
         yield caught
     assert re.search(match, say(caught.value.cause)), say(caught.value.cause)

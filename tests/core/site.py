@@ -1,6 +1,6 @@
 """A whole bay whose time jumps: the product's core, interlock and port schedule on an emulated charger and pack.
 
-Nothing here answers as the core would like it to: orders take slots, frames get lost, values are as old as they are.
+Nothing here answers to suit the core: commands take slots, frames get lost, and values have their real age.
 """
 
 from dataclasses import replace
@@ -52,7 +52,7 @@ SLOW = ("soc_pct", "soh_pct")
 
 
 class Site:
-    """`run` lets time pass; `moves` has every change of state with its time and reason."""
+    """`run` lets time pass; `moves` holds every change of state with its time and reason."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Site:
         self.battery_link = BatteryLink()
         self.decision = Decision(State.STARTING, Memory().cause)
         self.moves: list[tuple[float, State, str]] = []
-        self.raised: dict[str, int] = {}  #: how often each fault came
+        self.raised: dict[str, int] = {}  #: how often each fault was raised
 
     @property
     def charger(self) -> SimulatedCharger:

@@ -1,4 +1,4 @@
-"""No dead end: each fault says what ends it, and what it says is what a request is answered."""
+"""No dead end: each fault says what ends it, and a request is answered accordingly."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from tests.core.said import cause, reason_of
 from tests.core.world import World, remembering
 
 NOW_S = 10_000.0
-#: What a person types, how long it takes, and what must happen first.
+#: The causes that name a command, that refuse one, and that say that the fault ends by itself.
 COMMANDS = {"start_now": Request.START, "reset_now": Request.RESET}
 REFUSED = {"refused_while", "refused_until", "refused_for", "reset_locked", "waits_for_fault"}
 BY_ITSELF = {"goes_on_after", "goes_on_in", "goes_on_in_at_the_earliest", "clears_after", "clears_in", "counts_until"}
@@ -27,7 +27,7 @@ BY_ITSELF = {"goes_on_after", "goes_on_in", "goes_on_in_at_the_earliest", "clear
 
 @dataclass(frozen=True)
 class Case:
-    """One row, how far it is, and the state of its bay."""
+    """One row, its phase, and the state of its bay."""
 
     row: FaultRow
     stage: str
@@ -144,7 +144,7 @@ def test_another_fault_in_the_way_is_named_instead_of_a_command() -> None:
 
 
 def doubted() -> World:
-    """Its SOC has jumped, and its figures do not fit for long enough."""
+    """Its SOC has jumped, and its figures have disagreed for long enough."""
     world = charging()
     world.amps = 0.5
     world.values |= {"remaining_ah": 10.0, "available_wh": 100.0}
@@ -186,7 +186,7 @@ def test_where_one_of_the_doubts_is_gone_it_ends_sooner() -> None:
     assert reason_of(world.decision).endswith(": orchestrator start bay-1")
 
 
-# --- which one is told first ------------------------------------------------------------------------------------------
+# --- which one is shown first -----------------------------------------------------------------------------------------
 
 
 def test_the_most_dangerous_is_told_first_however_old_the_others_are() -> None:

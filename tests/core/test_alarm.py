@@ -66,7 +66,7 @@ def test_a_reset_ends_the_attention_and_leaves_the_start_to_a_person() -> None:
 
 @pytest.mark.parametrize("advice", ADVICE)
 def test_what_waits_for_a_start_ends_its_advice_with_it(advice: str) -> None:
-    """The command follows it, and says it once."""
+    """The command follows, and is named once."""
     assert advice.endswith(" start")
 
 

@@ -1,4 +1,4 @@
-"""The contactor: every state, and the courses of events in which it closes and opens."""
+"""The contactor: every state, and the sequences of events in which it closes and opens."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -41,7 +41,7 @@ def test_every_state(state: State) -> None:
 
 @dataclass
 class Wired:
-    """A world whose battery hangs behind a contactor: it follows the decision within a tick."""
+    """A world with a contactor in front of the battery; the contactor follows the decision within a tick."""
 
     world: World
 
@@ -82,7 +82,7 @@ def test_it_closes_on_verified_standby_long_before_a_charge() -> None:
 
 
 def test_a_bay_without_a_battery_comes_to_rest() -> None:
-    """At the start the contactor is open: whether a battery is there, shows when it is closed."""
+    """At the start the contactor is open: only closing it shows whether a battery is there."""
     world = World()
     world.leave()
     wired = Wired(world)
@@ -164,7 +164,7 @@ def test_a_battery_whose_bmu_falls_silent_does_not_look_like_one_that_left() -> 
 
 
 def test_what_was_measured_behind_an_open_contactor_qualifies_nothing() -> None:
-    """The charger's volts must be those of the battery, and that shows only when the contactor is closed."""
+    """The charger's volts must be those of the battery, which shows only while the contactor is closed."""
     world = World()
     world.connected = False
     for _ in range(round(20 / TICK_S)):

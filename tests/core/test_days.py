@@ -1,4 +1,4 @@
-"""Hours of a whole bay on lines that lose frames: it charges, it says nothing wrong, and it never runs by mistake."""
+"""Hours of a whole bay on lines that lose frames: it charges, reports nothing false, and never runs by mistake."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ from tests.core.world import bay
 
 
 class Watched(Site):
-    """Looks after every tick whether current flows only where it may, and as gently as was said."""
+    """Checks after every tick that current flows only where it may, and within the commanded step."""
 
     def tick(self, request: Request | None = None) -> None:
         super().tick(request)
@@ -60,7 +60,7 @@ def test_automatic_or_manual_a_charge_ends_full(control: ControlMode) -> None:
 
 
 def test_a_bad_line_costs_time_and_nothing_else() -> None:
-    """One frame in ten is lost: the charge is stopped now and then, and goes on by itself."""
+    """One frame in ten is lost: the charge is stopped now and then, and continues by itself."""
     site = Watched(half_full(), loss=0.1, can_loss=0.01, seed=3)
     site.run(1200)
     assert set(site.raised) <= {"charger_silent"}
@@ -116,7 +116,7 @@ def test_a_charge_survives(event: Callable[[Site], None]) -> None:
 
 
 def test_a_deaf_charger_is_said_to_be_deaf_though_stops_are_repeated() -> None:
-    """Each stop is newer than the last reading for a moment; that must not make the charger innocent."""
+    """For a moment each stop is newer than the last reading; that must not make the charger look innocent."""
     site = Site(half_full(), loss=0.01)
     site.until(State.CHARGING, 20)
     site.run(10)

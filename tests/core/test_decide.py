@@ -1,4 +1,4 @@
-"""`step()` with all that can be handed to it: it never raises, never changes its arguments, never runs blindly."""
+"""`decide()` with any possible input: it never raises, never changes its arguments, never runs blindly."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -45,9 +45,9 @@ from tests.core.world import World, bay
 
 NEEDED = ("voltage_v", "current_a", "status", "temperature_c", "soc_pct", "soh_pct")
 
-# --- what can be handed to it -----------------------------------------------------------------------------------------
+# --- possible inputs --------------------------------------------------------------------------------------------------
 
-#: How long ago something was asked for: mostly fresh, some stale, some in the future.
+#: How long ago a value was requested: mostly fresh, some stale, some in the future.
 ages = st.sampled_from([0.0, 0.0, 0.0, 0.1, 1.0, 1.5, 1.6, 3.1, 1e6, -0.01, -5.0])
 numbers = st.one_of(
     st.sampled_from([0.0, 48.0, 20.0, 50.0, 100.0, -1.0, 2.0, 14.0, 26.0, 33.0, 55.2, 58.4, 1e308, -1e308]),
@@ -134,7 +134,7 @@ def mixed(draw: st.DrawFn, good: Any, wild: Any) -> Any:
 
 @st.composite
 def nearly_good(draw: st.DrawFn, now_s: float, world: World) -> Snapshot:
-    """What that world says, some of it replaced by anything."""
+    """The world's values, some of them replaced by anything."""
     good, wild = world.snapshot(None, ""), draw(snapshots(now_s))
     assert good.charger is not None
     shown = {
@@ -156,10 +156,10 @@ def nearly_good(draw: st.DrawFn, now_s: float, world: World) -> Snapshot:
     )
 
 
-#: Those in which something may go wrong more often than the others.
+#: The states in which something may go wrong come up more often.
 states = st.sampled_from([*State, *sorted(ENERGISED) * 3, *[State.QUALIFYING] * 3])
 
-# --- what must hold after every step ----------------------------------------------------------------------------------
+# --- what must hold after every decision ------------------------------------------------------------------------------
 
 RULES = {control: Rules.of(bay(control=control, current_a=12.0)) for control in ControlMode}
 
@@ -168,7 +168,7 @@ beginning = cache(lambda state: IN[state]())  # a world in that state
 
 
 def fresh(snapshot: Snapshot, now_s: float) -> bool:
-    """Whether all that a charge is decided by is a number of now."""
+    """Whether everything that a charge is decided by is a fresh number."""
     reading, battery = snapshot.charger, snapshot.battery
     values = [getattr(battery, name) for name in NEEDED]
     if reading is None or any(value is None for value in values):
@@ -225,14 +225,14 @@ def test_whatever_comes_it_decides_soberly(data: st.DataObject, control: Control
 
 # --- whatever happens, there is a way back ----------------------------------------------------------------------------
 
-#: A mischief: what is done to the world, by its number; the time that it lasts.
+#: A mischief: what is done to the world, by its number, and how long it lasts.
 mischief = st.lists(
     st.tuples(st.integers(0, len(SCENES) * 2 + 8), st.sampled_from([1, 3, 8, 40])), min_size=1, max_size=12
 )
 
 
 def do(world: World, number: int) -> None:
-    """A scene's beginning or end, an operator's word, a battery that comes or goes."""
+    """The beginning or end of a scene, an operator's request, a battery that comes or goes."""
     others: tuple[Callable[[], object], ...] = (
         *(partial(world.ask, request) for request in Request),
         world.leave,
@@ -264,16 +264,16 @@ def all_well(world: World) -> None:
 @settings(max_examples=80)
 @given(mischief=mischief)
 def test_whatever_happened_a_person_gets_it_charging_again(mischief: list[tuple[int, int]]) -> None:
-    """No dead end, no livelock: all causes gone, a reset and a start later it charges."""
+    """No dead end, no livelock: once all causes are gone, a reset and a start make it charge."""
     world = charging()
     for number, ticks in mischief:
         do(world, number)
         for _ in range(ticks):
             world.tick()
     all_well(world)
-    world.run(400, dt_s=1.0)  # whatever may still be counted out
+    world.run(400, dt_s=1.0)  # until every remaining time has run out
     said = world.ask(Request.RESET)
-    assert not said or said.startswith("nothing to reset")  # it has gone on by itself
+    assert not said or said.startswith("nothing to reset")  # it has continued by itself
     world.tick()
     assert world.ask(Request.START) == ""
     world.until(State.CHARGING, 10)
@@ -285,7 +285,7 @@ def test_whatever_happened_a_person_gets_it_charging_again(mischief: list[tuple[
 
 @pytest.mark.parametrize("state", State)
 def test_a_step_at_the_same_time_changes_nothing_but_itself(state: State) -> None:
-    """Two readings may come at once: a second step at the same moment is harmless."""
+    """Two readings may arrive at once: a second decision at the same moment is harmless."""
     world = IN[state]()
     first = world.tick()
     decision, _ = decide(world.now_s, world.snapshot(None, ""), world.memory, world.rules)

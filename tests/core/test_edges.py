@@ -1,6 +1,6 @@
 """Every rule at its edge: the last value that is no fault, the first one that is, and the whole sentence.
 
-The scenes of `test_faults.py` show what a fault leads to; here the rules are asked alone, with facts made by hand.
+The scenes of `test_faults.py` show what a fault leads to; here the rules are applied alone, to facts made by hand.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Exceptions of our own: one in a rule, one in a step, one in every step. None of them may keep a charger running."""
+"""Our own exceptions: in one rule, in one decision, in every decision. None of them may keep a charger running."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -43,11 +43,11 @@ from tests.core.world import TICK_S, World
 every_state = pytest.mark.parametrize("state", State)
 BROKEN = "ZeroDivisionError() in step, line 1"
 
-# --- the step itself --------------------------------------------------------------------------------------------------
+# --- the decision itself ----------------------------------------------------------------------------------------------
 
 
 class Switch:
-    """While it is on, every step raises, and the bay is carried on."""
+    """While it is on, every decision raises, and the bay is carried on."""
 
     on = False
 
@@ -169,7 +169,7 @@ JUDGED = [row for row in FAULTS if row.id != "internal"]
 def test_a_rule_that_raises_trips_its_bay_and_takes_no_other_with_it(
     monkeypatch: pytest.MonkeyPatch, row: FaultRow
 ) -> None:
-    for state in sorted(row.where - UNVERIFIED - {State.TRIPPED}):  # that one has tripped by it already
+    for state in sorted(row.where - UNVERIFIED - {State.TRIPPED}):  # TRIPPED has already tripped by it
         world = IN[state]()
         world.tick()
         if not world.is_in(state):

@@ -1,4 +1,4 @@
-"""Every row of the fault table: raised in time and not before, stopped in the same step, ended as the row says."""
+"""Every row of the fault table: raised in time and not before, stopped in the same decision, ended as the row says."""
 
 import inspect
 import re
@@ -21,7 +21,7 @@ from tests.core.world import TICK_S, World, bay
 
 # --- the table itself -------------------------------------------------------------------------------------------------
 
-#: How a fault may end, by what it does.
+#: How a fault may end, by its effect.
 ENDS = {
     Effect.WARN: {Clear.AUTO},
     Effect.LIMIT: {Clear.AUTO},
@@ -157,7 +157,7 @@ def test_a_tick_less_is_none(scene: Scene) -> None:
 
 
 def healed(scene: Scene) -> World:
-    """After the fault, at the tick at which its cause is gone for the first time."""
+    """After the fault, at the first tick at which its cause is gone."""
     world = raised(scene)
     world.until(scene.then, 5.0)
     scene.heal(world)
@@ -237,7 +237,7 @@ LASTING = [scene for scene in SCENES if ROW[scene.fault].clear is Clear.RESET an
 def test_a_reset_is_refused_while_the_cause_is_there(scene: Scene) -> None:
     world = raised(scene)
     if world.memory.faults[scene.fault].clean_s is not None:
-        return  # it is not a lasting one: the stop has ended it
+        return  # it does not last: the stop has ended it
     assert world.ask(Request.RESET) != ""
     assert scene.fault in world.raised
 
@@ -259,7 +259,7 @@ def test_it_stops_whatever_is_going_on(scene: Scene, state: State) -> None:
 
 
 def test_only_a_stop_that_is_due_stops() -> None:
-    """Nothing is wrong for an hour of charging: nothing is said."""
+    """With nothing wrong for an hour of charging, nothing is reported."""
     world = IN[State.CHARGING]()
     world.amps = 5.0
     world.run(3600, dt_s=1.0)

@@ -26,7 +26,7 @@ def tapering(world: World, amps: float = 0.9) -> None:
 
 
 def test_a_soc_that_is_not_trusted_ends_nothing() -> None:
-    """A BMU that reads 8 % high left the pack at 92 %."""
+    """A BMU that reads 8 % too high left the pack at 92 %."""
     world = World(bay(with_full(soc_pct=None))).charging()
     for soc_pct in range(55, 101, 5):
         world.values["soc_pct"] = float(soc_pct)
@@ -39,7 +39,7 @@ def test_a_soc_that_is_not_trusted_ends_nothing() -> None:
 
 
 def test_a_low_step_is_no_taper() -> None:
-    """On a step that is itself as low as a taper a cold pack was called full at 15 %."""
+    """On a step that is itself as low as a taper, a cold pack was called full at 15 %."""
     taper = Taper(below_a=5.0, above_v=53.6, for_s=10)
     world = World(bay(with_full(soc_pct=None, taper=taper)), temperature_c=5.0).charging()
     world.values.update(voltage_v=54.0, soc_pct=90.0)
@@ -51,7 +51,7 @@ def test_a_low_step_is_no_taper() -> None:
 
 
 def test_a_taper_is_one_of_one_step() -> None:
-    """Less current because less was set is no taper."""
+    """Less current because of a lower step is no taper."""
     taper = Taper(below_a=5.0, above_v=53.6, for_s=30)
     world = World(bay(with_full(soc_pct=None, taper=taper)), soc_pct=85.0, temperature_c=17.0).charging()
     world.values.update(voltage_v=54.0)
@@ -111,7 +111,7 @@ def test_a_full_pack_stays_on_to_balance() -> None:
     assert reason_of(world.decision).endswith(
         f"held at the top for another 30 min ({POLICY.source.at('finish.hold_min')})"
     )
-    world.amps = 1.5  # a balancer takes more for a while: it stays full
+    world.amps = 1.5  # a balancer takes more for a while: the pack stays full
     world.run(30 * 60 - 10)
     assert world.is_in(S.CHARGING)
     world.until(S.FULL, 10)
@@ -139,7 +139,7 @@ def test_a_charger_that_ends_by_itself_ends_the_hold() -> None:
     assert set(world.raised) <= {"soc_jump"}
 
 
-# --- all the way, once in so many days --------------------------------------------------------------------------------
+# --- all the way, every so many days ----------------------------------------------------------------------------------
 
 
 def long_life() -> Policy:
@@ -182,7 +182,7 @@ def test_once_in_so_many_days_it_goes_all_the_way() -> None:
 
 
 def interrupted_at(world: World, soc_pct: float) -> None:
-    """A person pauses the charge; the BMU corrects its SOC meanwhile."""
+    """A person pauses the charge, and the BMU corrects its SOC meanwhile."""
     world.ask(Request.PAUSE)
     world.until(S.SUSPENDED)
     world.values["soc_pct"] = soc_pct
@@ -204,7 +204,7 @@ def test_a_pause_does_not_end_a_charge_that_is_due_to_go_all_the_way() -> None:
 
 @pytest.mark.parametrize(("soc_pct", "state"), [(79.0, S.CHARGING), (80.0, S.IDLE)])
 def test_a_charge_that_was_interrupted_goes_on_to_its_target(soc_pct: float, state: State) -> None:
-    """Neither does the threshold for a new charge (75 %) end it, nor does it pass the target to see the pack full."""
+    """Neither the threshold for a new charge (75 %) ends it, nor does it pass the target to find the pack full."""
     policy, full = long_life(), replace(POLICY.finish.full, soc_pct=None)
     world = World(bay(replace(policy, finish=replace(policy.finish, full=full)))).charging()
     world.values["soc_pct"] = 78.0
@@ -235,7 +235,7 @@ def test_a_battery_that_was_never_charged_here_is_not_due() -> None:
     world.until(S.FULL, 5)
 
 
-# --- what is worked out -----------------------------------------------------------------------------------------------
+# --- derived limits ---------------------------------------------------------------------------------------------------
 
 
 def test_hours_and_ah_follow_from_the_capacity() -> None:
@@ -245,7 +245,7 @@ def test_hours_and_ah_follow_from_the_capacity() -> None:
 
 
 def test_a_pack_that_has_lost_some_is_not_full_any_more() -> None:
-    """A pause that another reason made longer does not end the next charge as it begins."""
+    """A pause that another reason prolonged does not end the next charge as it begins."""
     world = held()
     world.ask(Request.PAUSE)
     world.until(S.SUSPENDED)
@@ -276,7 +276,7 @@ def test_a_hold_that_was_interrupted_goes_on_at_100_percent() -> None:
 
 
 def test_a_charge_that_was_interrupted_is_not_over_by_a_soc_that_is_not_trusted() -> None:
-    """Else a BMU that reads too much would end it after all, by a pause."""
+    """Otherwise a pause would let a BMU that reads too high end it after all."""
     world = World(bay(with_full(soc_pct=None)), soc_pct=97.0).charging()
     interrupted(world)
     world.charging()

@@ -1,4 +1,4 @@
-"""Honest devices as they are: a BMU that is late and coarse, a charger that pulses and tapers, a poor line."""
+"""Honest devices with their flaws: a late and coarse BMU, a charger that pulses and tapers, a poor line."""
 
 from collections import deque
 from collections.abc import Callable
@@ -14,13 +14,13 @@ from orchestrator.sim.pack import Pack, Readout
 from tests.core.site import BMU_SILENT_S, FAST, SLOW, TICK_S, Site
 from tests.core.world import bay
 
-#: What a coarse BMU's values are multiples of.
+#: The resolution of a coarse BMU's values.
 COARSE = {"voltage_v": 0.1, "current_a": 0.1, "soc_pct": 1.0, "temperature_c": 1.0}
 LATE = ("voltage_v", "current_a")
 
 
 class LateSite(Site):
-    """Its BMU says what was `late_s` ago, in coarse figures."""
+    """Its BMU reports what was true `late_s` ago, in coarse figures."""
 
     def __init__(self, pack: Pack, the_bay: BayConfig, late_s: float, loss: float = 0.0) -> None:
         super().__init__(pack, the_bay, loss=loss)
@@ -47,7 +47,7 @@ class LateSite(Site):
 
 
 def small(**changes: float) -> Pack:
-    """A pack that is full within minutes, and does not get warm by that."""
+    """A pack that is full within minutes without getting warm."""
     return replace(Pack(capacity_ah=1.0, deep_ah=0.05, heat_j_per_k=60000.0), **changes)  # type: ignore[arg-type]  # its fields by name
 
 
@@ -87,7 +87,7 @@ def test_a_whole_charge_without_a_fault(begin: Callable[[], LateSite], late_s: f
 @pytest.mark.parametrize("pulse_a", [1.0, 2.0])
 @pytest.mark.parametrize("late_s", [0.1, 0.3, 0.5, 0.7, 1.0])
 def test_pulses_that_the_bmu_tells_late_are_no_disagreement(late_s: float, pulse_a: float) -> None:
-    """At half a second late the two disagree for half of the time."""
+    """Half a second late, the two disagree half of the time."""
     site = LateSite(small(deep_ah=0.2), bay(), late_s)
     site.charger.precharge_a = pulse_a
     site.pack.set_soc(-100)

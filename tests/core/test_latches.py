@@ -16,12 +16,12 @@ from tests.core.world import TICK_S, World, remembering
 
 
 def implausible(world: World, *, seen: bool = True) -> None:
-    """A fault with a backoff, that can come in every state and at once."""
+    """A fault with a backoff that can occur in every state and at once."""
     world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")} if seen else {})
 
 
 def strike(world: World) -> float:
-    """One bad sample in mid-charge; when it was gone again."""
+    """One bad sample in mid-charge; returns when it was gone again."""
     implausible(world)
     world.tick()
     assert "implausible" in world.raised
@@ -69,9 +69,9 @@ def test_one_poll_seen_in_many_steps_is_one_poll() -> None:
 
 
 def test_a_time_drains_in_a_break_and_is_not_reset() -> None:
-    """2.75 s of every 3 s were never found by a time that a clean sample resets: here the second time is one too many.
+    """A timer reset by each clean sample would never find 2.75 s of every 3 s; here the second time is enough.
 
-    From one look to the next the condition is known for 2.5 of the 2.75 s, and 0.25 s away take off 0.0625 s.
+    From one look to the next the condition is known for 2.5 of the 2.75 s, and 0.25 s without it take off 0.0625 s.
     """
     world = charging()
     world.volts = 50.0
@@ -104,7 +104,7 @@ def test_backoffs_grow_and_the_fourth_strike_within_an_hour_latches() -> None:
     for backoff_s in (10, 60, 300):
         gone_s = strike(world)
         world.until(State.CHARGING, 400)
-        # 10 s clean, the backoff, one step to qualify, then two seconds of everything
+        # 10 s clean, the backoff, one decision to qualify, then two seconds with everything in order
         assert world.now_s - gone_s == 10 + backoff_s + TICK_S + 2
         world.charging()
     strike(world)
@@ -118,7 +118,7 @@ def test_backoffs_grow_and_the_fourth_strike_within_an_hour_latches() -> None:
     assert world.ask(Request.RESET) == ""
     assert world.ask(Request.START) == ""
     world.charging()
-    gone_s = strike(world)  # and it counts from one again
+    gone_s = strike(world)  # counting starts at one again
     world.until(State.CHARGING, 400)
     assert world.now_s - gone_s == 10 + 10 + TICK_S + 2
 
@@ -259,7 +259,7 @@ def test_a_charger_that_stops_when_the_battery_leaves_needs_no_person() -> None:
 
 def test_a_bmu_that_leaves_alone_is_a_strike() -> None:
     world = charging()
-    world.battery_answers = False  # but there are volts at the terminals
+    world.battery_answers = False  # but the terminals show volts
     world.until(State.OFFLINE, 10)
     assert len(world.memory.faults["bmu_silent"].strikes) == 1
 
@@ -285,13 +285,13 @@ def test_a_latch_does_not_leave_with_the_battery() -> None:
     world.run(30)
     assert world.is_in(State.TRIPPED)
     assert "bmu_silent" in world.raised
-    assert world.ask(Request.RESET) == ""  # with no battery there, its cause is gone
+    assert world.ask(Request.RESET) == ""  # without a battery, its cause is gone
     world.run(1)
     assert world.is_in(State.HELD)
 
 
 def test_strikes_do_not_leave_with_the_battery() -> None:
-    """Its leaving is no strike, but those from before count on."""
+    """The removal is no strike, but earlier ones still count."""
     world = charging()
 
     def falls_silent() -> None:
@@ -319,7 +319,7 @@ def test_strikes_do_not_leave_with_the_battery() -> None:
 
 
 def test_a_refused_request_changes_nothing() -> None:
-    """One latch is clean, the other's cause is still there: neither is cleared."""
+    """One latch is clean, the other's cause is still present: neither is cleared."""
     world = charging()
     world.internal = "ValueError()"
     world.battery_link = replace(world.battery_link, abort=cause("0x6004: no such object"), abort_code=0x06020000)
@@ -519,7 +519,7 @@ def test_a_fault_is_followed_in_states_in_which_it_is_not_looked_for(again: Stat
     world = stopping()
     world.charger_answers = False
     world.until(State.UNCONTROLLABLE)
-    assert "charger_silent" not in world.raised  # at rest or stopping nobody minds, but for the stop
+    assert "charger_silent" not in world.raised  # it is not looked for while stopping
     world = charging()
     world.charger_answers = False
     world.until(again)
@@ -531,7 +531,7 @@ def test_a_fault_is_followed_in_states_in_which_it_is_not_looked_for(again: Stat
 
 
 def trip_and_reset(world: World, **trips: float) -> str:
-    """By a broken sensor, if by nothing else."""
+    """By a broken sensor, for example."""
     world.values.update(trips)
     world.battery_link = replace(world.battery_link, implausible={} if trips else {"temperature_c": cause("3276.7 °C")})
     world.run(2)

@@ -28,7 +28,7 @@ LINES = {"current.voltage_v": 170, "current.voltage_v.rows[0]": 171, "current.vo
 
 
 def policy() -> Policy:
-    """The tests' own with a table for every quantity."""
+    """The tests' own policy with a table for every quantity."""
     source = Source(POLICY.source.file, {**POLICY.source.lines, **LINES})
     return replace(POLICY, current=replace(POLICY.current, voltage_v=VOLTAGE), source=source)
 
@@ -37,7 +37,7 @@ def with_current(**changes: Any) -> Policy:
     return replace(POLICY, current=replace(POLICY.current, **changes))
 
 
-#: (what the BMU says, the step, the rule that bound it: key and text)
+#: (what the BMU reports, the step, the rule that bound it: key and text)
 EDGES = (
     ({"temperature_c": 0.0}, 0, "temperature_c.rows[0]", "temperature 0.0 °C in 0 … 10 allows 2.0 A"),
     ({"temperature_c": 9.99}, 0, "temperature_c.rows[0]", "temperature 10.0 °C in 0 … 10 allows 2.0 A"),
@@ -82,7 +82,7 @@ def test_the_lowest_wins_and_has_a_name(values: dict[str, float], index: int, ke
 
 
 def test_amperes_are_what_flows_into_the_pack() -> None:
-    """Never more: the step's worst case counts, and what C comes to is not lost to the last digit of a product."""
+    """Never more: the step's worst case counts, and a C value does not lose a step to the last digit of a product."""
     pack = replace(POLICY.pack, capacity_ah=20.0)
     rows = (Band(from_=0, to=45, max_c=0.7),)
     seven_tenths = replace(with_current(temperature_c=Table(rows=rows)), pack=pack)
@@ -116,7 +116,7 @@ def test_the_first_of_two_equal_limits_is_named() -> None:
 
 
 def test_two_tables_on_one_line_are_told_apart() -> None:
-    """What binds is known by its key, not by where it stands: else the sentence of the one stays for the other."""
+    """What binds is identified by its key, not its place; otherwise one rule's sentence would stay for the other."""
     line = {f"current.{name}.rows[0]": 7 for name in ("temperature_c", "soc_pct")}
     table, other = Table(rows=(Band(from_=0, to=45, max_a=8.0),)), Table(rows=(Band(from_=0, to=100, max_a=9.0),))
     one_line = replace(with_current(temperature_c=table, soc_pct=other), source=Source("p.yaml", line))
@@ -153,7 +153,7 @@ def test_what_no_row_covers_gets_the_lowest_step() -> None:
         at = wide.source.at("current.temperature_c")
         assert (step.index, say(step.rule)) == (0, f"temperature {celsius:.1f} °C outside of its table, {at}")
     world = World(the_bay, temperature_c=45.0).charging()
-    assert index(world) == 4  # the last row's end is included
+    assert index(world) == 4  # the last row includes its end
 
 
 # --- down at once, up after a hold ------------------------------------------------------------------------------------
@@ -263,7 +263,7 @@ def test_a_rule_on_two_quantities_holds_on_likewise() -> None:
     assert index(world) == 4
 
 
-# --- a pause, and a charger whose lowest step is too much -------------------------------------------------------------
+# --- a pause, and a charger whose lowest step is too high -------------------------------------------------------------
 
 
 def paused_when_hot() -> Policy:
@@ -319,7 +319,7 @@ def test_precharge_is_refused_where_the_lowest_step_is_too_much() -> None:
 
 
 def test_the_sentence_stays_while_its_line_binds() -> None:
-    """Else status and journal would say something new with every tenth of a degree."""
+    """Otherwise status and journal would change with every tenth of a degree."""
     world = World(temperature_c=5.0).charging()
     step = world.decision.step
     world.values["temperature_c"] = 5.7
@@ -349,7 +349,7 @@ def test_a_new_charge_needs_no_hold() -> None:
 
 
 def test_what_is_not_known_is_the_lowest_step() -> None:
-    """The fault table ends such a charge in the same step; the limit does not rely on that."""
+    """The fault table ends such a charge in the same decision; the limit does not rely on that."""
     world = charging()
     step, raise_s = choose(Facts.of(world.now_s, Snapshot(), world.memory, world.rules), None)
     at = POLICY.source.at("current.temperature_c")
@@ -357,7 +357,7 @@ def test_what_is_not_known_is_the_lowest_step() -> None:
 
 
 def test_a_rule_about_what_is_not_known_holds_and_says_so() -> None:
-    """Nobody knows whether the pack is in there, so it is taken to be."""
+    """It is unknown whether the pack is inside, so it counts as inside."""
     rule = Where(voltage_v=Range(53, 55.2), temperature_c=Range(0, 45), max_a=0.0)
     world = World(bay(with_current(where=(rule,)))).charging()
     assert index(world) == 4, "at 48 V the rule says nothing"
@@ -404,7 +404,7 @@ def test_precharge_is_always_on_the_lowest_step() -> None:
         assert world.decision.step == CurrentStep(0, STEPS_A[0], PRECHARGE)
 
 
-# --- what comes back all the same -------------------------------------------------------------------------------------
+# --- rows that keep coming back ---------------------------------------------------------------------------------------
 
 
 def there_and_back(world: World) -> list[int]:
@@ -431,7 +431,7 @@ def test_a_row_that_comes_back_again_and_again_stays_for_the_rest_of_the_charge(
 
 
 def test_a_row_that_stays_says_that_it_came_back_too_often() -> None:
-    """The value that people see is far from the row, so the sentence says why the row counts all the same."""
+    """The value that people see is far from the row, so the sentence says why the row still counts."""
     world = World(bay(policy()), soc_pct=85.0, voltage_v=53.0).charging()
     there_and_back(world)
     world.ask(Request.PAUSE)

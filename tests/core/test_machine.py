@@ -1,4 +1,4 @@
-"""Every state × every trigger, and what must be true of the table whatever else becomes of it."""
+"""Every state × every trigger, and what must hold for the table whatever else changes."""
 
 import ast
 from itertools import product
@@ -12,7 +12,7 @@ from orchestrator.core.states import ENERGISED
 from orchestrator.errors import RefusedError
 from orchestrator.model import State
 
-#: What each trigger does in each state: where it leads, `=` it stays, `·` it is refused and the state is kept.
+#: What each trigger does in each state: where it leads; `=`: it stays; `·`: refused, and the state is unchanged.
 MATRIX = """
                       stop      give_up         lose     rest  hold  suspend    fill  trip     reset  qualify     pulse            continue              charge
 STARTING              =         UNCONTROLLABLE  OFFLINE  IDLE  HELD  SUSPENDED  FULL  TRIPPED  ·      ·           ·                ·                     ·
@@ -59,7 +59,7 @@ def test_every_pair_has_its_outcome(state: State, trigger: Trigger) -> None:
 
 
 def leads(state: State) -> dict[Trigger, State]:
-    """Where a state can go."""
+    """The states that can follow."""
     return {trigger: target or state for trigger, sources, target in TABLE if state in sources and target is not state}
 
 
@@ -107,7 +107,7 @@ def test_a_stop_is_possible_everywhere_and_never_lets_current_flow() -> None:
 
 @pytest.mark.parametrize("state", State)
 def test_every_state_has_a_way_to_verified_standby(state: State) -> None:
-    """… of two triggers at most: a stop, and what it is followed by."""
+    """… by two triggers at most: a stop, and the one that follows it."""
     nearby = {state, *leads(state).values()}
     nearby |= {target for near in nearby for target in leads(near).values()}
     assert State.IDLE in nearby
@@ -139,12 +139,12 @@ def test_triggers_of_rest_lead_where_the_course_believes() -> None:
 
 
 def test_the_engine_knows_no_triggers_but_ours() -> None:
-    """`transitions` adds to_STATE for every state unless it is told not to."""
+    """`transitions` adds to_STATE for every state unless told not to."""
     assert set(MACHINE.events) == {trigger.value for trigger in Trigger}
 
 
 def test_fire_keeps_nothing() -> None:
-    """The machine has no model and no state of its own: the same question always has the same answer."""
+    """The machine has no model and no state of its own: the same question always gives the same answer."""
     for _ in range(2):
         with pytest.raises(RefusedError):
             fire(State.CHARGING, Trigger.REST)

@@ -1,4 +1,4 @@
-"""Whole stories of a bay: how it gets from state to state, and what it says on the way."""
+"""Whole stories of a bay: how it gets from state to state, and the reasons it gives on the way."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,7 +31,7 @@ START_AT, FULL_AT = POLICY.source.at("start.soc_below_pct"), POLICY.source.at("f
 
 
 def sessions(world: World) -> list[Session]:
-    """Those that have ended."""
+    """The sessions that have ended."""
     return [decision.session for decision in world.decisions if decision.session and decision.session.result]
 
 
@@ -151,7 +151,7 @@ def tapering(world: World) -> None:
 def test_full_by_taper() -> None:
     world = charging()
     tapering(world)
-    world.tick()  # another step, of which the taper is
+    world.tick()  # one more decision, which sees the taper
     world.run(120)
     assert world.is_in(S.CHARGING)
     reason = reason_of(world.tick())
@@ -186,7 +186,7 @@ def charger_says_full(world: World) -> None:
 
 
 def tapers_off(world: World) -> None:
-    """The current falls as it does before a charger ends, but not to where the policy ends a charge."""
+    """The current falls as before a charger's end, but not to where the policy ends a charge."""
     world.amps = 3.5
     world.run(5.5)
 
@@ -205,7 +205,7 @@ def test_full_when_the_charger_says_so(soc_pct: float) -> None:
 
 
 def test_full_too_early_is_no_full() -> None:
-    """Else a battery of 30 % would be called full, and never be charged again before it has lost some more."""
+    """Otherwise a battery at 30 % would be called full, and not be charged again before it lost some more."""
     world = charging()
     world.values["soc_pct"] = 79.9
     tapers_off(world)
@@ -217,7 +217,7 @@ def test_full_too_early_is_no_full() -> None:
 
 
 def test_a_standby_that_somebody_orders_is_not_named_full() -> None:
-    """Its mode 5 is standby: nothing has tapered off, so nobody has to look at the BMU's SOC."""
+    """Its mode 5 is standby: nothing has tapered off, so nobody has to check the BMU's SOC."""
     world = charging()
     charger_says_full(world)
     world.run(2)
@@ -334,7 +334,7 @@ def test_a_swap_while_the_stop_is_verified() -> None:
     world.until(S.CHARGING, 60)
 
 
-# --- suspended, and on by itself --------------------------------------------------------------------------------------
+# --- suspended, and continuing by itself ------------------------------------------------------------------------------
 
 
 def test_heat_pauses_and_cooling_goes_on_in_the_same_session() -> None:
@@ -385,7 +385,7 @@ def test_the_stricter_of_policy_and_station_counts() -> None:
 
 # --- operators --------------------------------------------------------------------------------------------------------
 
-#: What becomes of each request in each state: the answer's beginning, and where the bay is ten seconds later.
+#: The result of each request in each state: how the answer begins, and where the bay is ten seconds later.
 VERBS: dict[Request, dict[State, tuple[str, State]]] = {
     Request.STOP: {
         S.STARTING: ("", S.HELD),
@@ -455,12 +455,12 @@ VERBS: dict[Request, dict[State, tuple[str, State]]] = {
 def test_every_verb_in_every_state(request_: Request, state: State) -> None:
     world = IN[state]()
     if state is S.UNCONTROLLABLE:
-        world.run(1)  # until it is said, too
+        world.run(1)  # until it is reported, too
     answer, then = VERBS[request_][state]
     said = world.ask(request_)
     assert said.startswith(answer) if answer else said == ""
     if request_ in (Request.STOP, Request.PAUSE) and state in ENERGISED:
-        assert world.decision.command == STOP  # in the same step
+        assert world.decision.command == STOP  # in the same decision
     world.run(10)
     assert world.is_in(then)
 
@@ -550,13 +550,13 @@ def test_a_line_that_dies_in_mid_charge_and_comes_back() -> None:
         "CUT THE MAINS of this charger (/dev/ttyX) now: nothing has proved for 3 s that it obeyed the stop: /dev/ttyX: "
         "no answer; 14.00 A, last heard 4 s ago; the BMU sees 0.0 A"
     )
-    assert not sessions(world)  # its limits go on, too
+    assert not sessions(world)  # its limits continue, too
     world.charger_answers = True
     world.until(S.SUSPENDED, 11)
     assert world.decision.alarm is Alarm.NONE
     world.until(S.CHARGING, 30)
     assert world.decision.session is not None
-    assert world.decision.session.charged_ah > 0  # that of before
+    assert world.decision.session.charged_ah > 0  # the earlier session's
 
 
 def test_a_port_that_says_what_is_wrong_is_quoted() -> None:
@@ -573,7 +573,7 @@ def test_a_bmu_that_boots_in_mid_charge_is_qualified_anew() -> None:
     world.boot()
     reason = reason_of(world.tick())
     assert world.is_in(S.STOPPING)
-    assert reason.startswith("the BMU booted while charging")  # not that it is silent, though it says nothing yet
+    assert reason.startswith("the BMU booted while charging")  # not that it is silent, though it reports nothing yet
     assert set(world.raised) == {"bmu_rebooted"}
     world.until(S.CHARGING, 30)
     assert len(world.memory.faults["bmu_rebooted"].strikes) == 1
@@ -663,7 +663,7 @@ def test_a_reading_counts_once() -> None:
 
 
 def test_nothing_is_counted_in_standby() -> None:
-    """An offset of the measurement over days would be taken for charge, and latch the bay."""
+    """Over days, a measurement offset would be taken for charge and latch the bay."""
     world = suspended()
     before = world.memory.session
     world.leak_a = 0.4
@@ -721,7 +721,7 @@ def test_automatic_mode_ends_when_the_charger_is_full() -> None:
 
 
 def test_a_node_that_falls_silent_is_not_said_to_withhold_a_temperature() -> None:
-    """Where heartbeat and values go stale in the same step, the one that says more is the reason."""
+    """If heartbeat and values go stale in the same decision, the more specific one is the reason."""
     world = charging()
     world.battery_link = replace(world.battery_link, heartbeat_s=0.5, heartbeat_t_s=world.now_s - 0.75)
     world.frozen.update(("temperature_c", "status"))

@@ -1,4 +1,4 @@
-"""A bay among others: it waits for its turn and for the disk, and current that it has not ordered is stopped."""
+"""A bay among others: it waits for its turn and for the disk, and current it did not order is stopped."""
 
 import pytest
 
@@ -12,7 +12,7 @@ S = State
 
 
 def test_a_bay_that_is_ready_waits_for_its_turn_and_says_for_whom() -> None:
-    """Packs on one station begin one after the other; until then nothing but the stop is ordered."""
+    """Packs on one station begin one after the other; until then only the stop is commanded."""
     world = World()
     turn = world.ours["waits"] = Cause.of("waits_for_turn", other="bay-2")
     world.until(S.QUALIFYING)
@@ -40,7 +40,7 @@ def test_nothing_runs_before_it_is_on_disk_that_it_may() -> None:
 def test_current_that_nobody_ordered_is_stopped_even_without_a_fault_for_it(
     state: State, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The table has two rows for that. Should both be lost, the bay does not go on as if it stood by."""
+    """The table has two rows for that. Even without both, the bay does not continue as if in standby."""
     others = tuple(row for row in faults.FAULTS if row.id not in ("rogue_run", "current_without_order"))
     monkeypatch.setattr(latches, "FAULTS", others)
     world = IN[state]()
@@ -51,7 +51,7 @@ def test_current_that_nobody_ordered_is_stopped_even_without_a_fault_for_it(
 
 
 def test_a_glimpse_of_current_stops_nothing() -> None:
-    """A BMU averages: it may go on to show for a moment what was."""
+    """A BMU averages: it may briefly go on showing an earlier current."""
     world = idle()
     world.pack_amps = 5.0
     world.run(1.5)

@@ -1,4 +1,4 @@
-"""One step from facts made by hand: where a bay goes and what it says there, what is remembered and what is ordered."""
+"""One decision from facts made by hand: where a bay goes, its reason, what is remembered and what is commanded."""
 
 import math
 from collections.abc import Callable
@@ -170,11 +170,11 @@ def test_a_pack_that_rose_is_looked_at_from_then_on(minutes: float, rise_s: floa
     assert (session.rise_s, session.rise_v) == (rise_s, rise_v)
 
 
-# --- what is followed from step to step -------------------------------------------------------------------------------
+# --- state carried between decisions ----------------------------------------------------------------------------------
 
 
 def followed(name: str) -> Callable[[Facts], object]:
-    """What the memory says under this name, once it was brought up to these facts."""
+    """The memory's value of this name after these facts."""
 
     def rule(f: Facts) -> object:
         return value_of(update_history(f, 0.25).memory, name)
@@ -300,7 +300,7 @@ def test_a_rise_counts_from_the_first_precharge_of_a_charge(state: State, before
 boots = followed("boots")
 BOOTED: dict[str, Any] = {"bmu_link": {"boots": 3}}
 
-# --- what becomes of the faults ---------------------------------------------------------------------------------------
+# --- the fault memory -------------------------------------------------------------------------------------------------
 
 
 def faults_after(name: str) -> Callable[[Facts], object]:
@@ -344,7 +344,7 @@ LATCHES = (
     Edge(bmu_silent, None, BOTH, IDLE, **DEPARTED),
 )  # fmt: skip
 
-# --- what is ordered --------------------------------------------------------------------------------------------------
+# --- commands ---------------------------------------------------------------------------------------------------------
 
 
 def commands(f: Facts) -> Command | None:
@@ -383,7 +383,7 @@ def test_a_new_order_has_not_been_tried() -> None:
     assert (sequence.command, sequence.command_s, sequence.tries) == (RUN, NOW_S, 0)
 
 
-# --- the whole step ---------------------------------------------------------------------------------------------------
+# --- the whole decision -----------------------------------------------------------------------------------------------
 
 
 def whole(edge: Edge) -> tuple[Decision, Memory]:

@@ -1,4 +1,4 @@
-"""The memory's parts: frozen, each made by one module, each field with what it is."""
+"""The memory's parts: frozen, each made by one module, each field with its kind."""
 
 import ast
 import pickle
@@ -35,7 +35,7 @@ from tests.core.bays import IN
 from tests.core.world import World
 
 CORE = Path(orchestrator.core.__file__).parent
-#: The module that makes the next one of each part. A restart begins anew from what was persisted, by the same names.
+#: The module that makes the next one of each part. A restart starts from the persisted state, by the same names.
 MADE_BY: dict[str, set[str]] = {
     "Operator": {"operator", "persisted"},
     "Stop": {"safestop"},
@@ -52,12 +52,12 @@ MADE_BY: dict[str, set[str]] = {
 CLASSES: dict[str, type[Any]] = {
     **{kind.__name__: kind for kind in PARTS.values()}, "Session": Session, "FaultMemory": FaultMemory, "Memory": Memory
 }  # fmt: skip
-#: Where the parts stand with their defaults, and how any record is changed.
+#: The modules that define the parts with their defaults, and change records of any kind.
 APART = ("memory", "parts")
 
 
 def calls(source: str) -> Iterator[tuple[str, list[str]]]:
-    """What is called, and with which keywords."""
+    """Each call, with its keywords."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Call):
             called = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
@@ -65,7 +65,7 @@ def calls(source: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def makes(source: str) -> set[str]:
-    """The classes that this source makes records of: by name, or by changing what only they have."""
+    """The classes that this source makes records of: by name, or by changing a field that only they have."""
     found = set()
     for called, keywords in calls(source):
         if called in MADE_BY:

@@ -1,4 +1,4 @@
-"""What looks like a fault and is none: rows that have to wait, or to look twice, and what they may not wait for."""
+"""What looks like a fault and is none: rows that must wait or look twice, and what they must not wait for."""
 
 import pytest
 
@@ -15,9 +15,9 @@ def fault_ids(world: World, begin: int) -> set[str]:
 
 
 def test_steady_values_of_a_steady_battery_are_not_frozen() -> None:
-    """Cells on their flat part, and a supply that regulates well: the same digits for an hour."""
+    """Cells on the flat part of their curve, and a supply that regulates well: the same digits for an hour."""
     world = charging()
-    world.values["voltage_v"] = 48.19  # a bad contact more or less
+    world.values["voltage_v"] = 48.19  # a slightly bad contact
     world.run(3600, dt_s=1.0)
     assert world.is_in(State.CHARGING)
     assert not world.raised
@@ -40,7 +40,7 @@ def until_limit(world: World, step: int, **battery: float) -> None:
 
 
 def step_down(late_s: float) -> World:
-    """From 14 A to 8 A, with a current that follows so much later."""
+    """From 14 A to 8 A, with a current that follows this much later."""
     world = charging()
     world.amps = 14.0
     until_limit(world, 2, soc_pct=90.0)

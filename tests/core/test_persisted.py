@@ -1,4 +1,4 @@
-"""What survives a restart: nothing latched, held or counted is lost, and nothing begins to charge that may not."""
+"""What survives a restart: nothing latched, held or counted is lost, and no forbidden charge begins."""
 
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -26,8 +26,10 @@ every_state = pytest.mark.parametrize("state", State)
 
 
 def restarted(world: World, gap_s: float = 5.0, clock_s: float = 50.0, written: Persisted | None = None) -> World:
-    """The service is killed now; another one begins after `gap_s`, on a clock that reads `clock_s`. Nothing is stopped
-    meanwhile but by whoever stops it."""
+    """The service is killed now; another one begins after `gap_s`, on a clock that reads `clock_s`.
+
+    Nothing stops the charger in between, unless the test does (`stopped_meanwhile`).
+    """
     kept = written or Persisted.of(world.memory, world.now_s)
     world.now_s = clock_s
     world.memory = kept.aged(gap_s).memory(clock_s)
@@ -104,7 +106,7 @@ def test_a_persons_word_outlives_the_service(request_: Request) -> None:
     world.until(State.CHARGING, 10)
 
 
-# --- what is counted --------------------------------------------------------------------------------------------------
+# --- counters ---------------------------------------------------------------------------------------------------------
 
 
 def with_finish(max_hours: float = 12.0, max_ah: float = 44.0) -> Policy:
@@ -112,7 +114,7 @@ def with_finish(max_hours: float = 12.0, max_ah: float = 44.0) -> Policy:
 
 
 def in_order(world: World) -> None:
-    """The service ends: it stops the charge, verifies that, and begins anew."""
+    """The service ends: it stops the charge, verifies that, and starts again."""
     world.ours = {"ending": cause("the service ends: SIGTERM")}
     world.run(3)
     assert world.state not in ENERGISED
@@ -135,7 +137,7 @@ def out_of_reach(world: World) -> None:
     world.battery_answers = False
     world.run(400)
     world.battery_answers = True
-    world.forget("bmu_silent")  # not what is asked here
+    world.forget("bmu_silent")  # not tested here
 
 
 def cut_off(world: World) -> None:
@@ -170,7 +172,7 @@ def test_no_number_of_breaks_lets_more_in_than_the_policy_allows(breaks: Callabl
 
 @pytest.mark.parametrize("gap_s", [30.0, 40.0, 86400.0])
 def test_what_a_kill_left_uncounted_counts_as_charged(gap_s: float) -> None:
-    """Counters are written each 30 s. What flowed after the last time is in no file."""
+    """Counters are written every 30 s. What flowed after the last time is in no file."""
     world = World(bay(with_finish(max_ah=0.3)), soc_pct=0.0)
     flowed_as = 0.0
     for _ in range(12):
@@ -252,7 +254,7 @@ def test_no_number_of_breaks_lets_a_precharge_last_longer(breaks: Callable[[Worl
             assert world.now_s < end_s, (world.decision, seconds)
         for _ in range(32):
             world.tick()
-            world.values["voltage_v"] = 33.0 + 0.022 * sum(seconds.values())  # it rises enough, and not to the end
+            world.values["voltage_v"] = 33.0 + 0.022 * sum(seconds.values())  # it rises enough, but not to the end
             if world.state in seconds:
                 seconds[world.state] += 0.25
         if world.state in ENERGISED:
@@ -288,7 +290,7 @@ def test_another_soc_after_the_restart_is_another_battery() -> None:
 
 
 def test_a_start_ends_no_charge_that_a_restart_has_left_open() -> None:
-    """HELD and IDLE are alike in that: its limits would begin anew with each start."""
+    """HELD and IDLE are alike here: otherwise the limits would start again with each start."""
     world = charging()
     world.run(60)
     restarted(world)
@@ -314,7 +316,7 @@ def test_strikes_count_on_over_restarts() -> None:
         restarted(world, clock_s=1e6 * number)
         assert len(world.memory.faults["implausible"].strikes) == number
         world.tick()
-        assert "implausible" in world.raised  # the backoff goes on, too
+        assert "implausible" in world.raised  # the backoff continues, too
         world.until(State.CHARGING, 400)
     world.battery_link = replace(world.battery_link, implausible={"soc_pct": cause("SOC 140 %")})
     world.tick()
@@ -410,7 +412,7 @@ def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, 
         aged = after_s - after.session.started_s
         assert aged == pytest.approx(before_s - before.session.started_s + gap_s)
         old, new = asdict(before.session), asdict(after.session)
-        counts = ("unseen_s", "pulse_s", "continuous_s", "rise_s")  # more may have come to these
+        counts = ("unseen_s", "pulse_s", "continuous_s", "rise_s")  # these may have grown
         assert all(new.pop(name) >= old.pop(name) for name in counts)
         assert {**new, "started_s": 0.0} == {**old, "started_s": 0.0}
 

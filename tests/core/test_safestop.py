@@ -11,7 +11,7 @@ from tests.core.bays import IN, charging, full, idle, qualifying, running_at_the
 from tests.core.said import cause, reason_of
 from tests.core.world import TICK_S, World
 
-#: Where a bay may rest with a charger that was verified.
+#: Where a bay may rest with a verified charger.
 VERIFIED = {State.IDLE, State.HELD, State.FULL, State.SUSPENDED, State.TRIPPED, State.OFFLINE}
 every_state = pytest.mark.parametrize("state", State)
 
@@ -32,7 +32,7 @@ def test_a_silent_charger_is_stopped_blindly_until_it_answers(state: State) -> N
     assert all(decision.command == STOP for decision in world.decisions[before:])
     world.charger_answers = True
     world.deaf.clear()
-    if flowing:  # ten seconds of standby are one
+    if flowing:  # ten seconds of standby prove it
         world.run(9.75)
         assert world.is_in(State.UNCONTROLLABLE)
     world.run(1.25)
@@ -165,7 +165,7 @@ def test_at_rest_nothing_is_ordered_as_long_as_standby_is_shown(begin: Callable[
     world = begin()
     world.run(5)
     assert {decision.command for decision in world.decisions[-20:]} == {None}
-    world.shows["operation"] = None  # one reading that says nothing
+    world.shows["operation"] = None  # one reading without an operation state
     assert world.tick().command == STOP
     world.shows.clear()
     assert world.tick().command is None
@@ -191,7 +191,7 @@ def test_nothing_begins_before_the_line_is_back_and_a_stop_is_verified_on_it() -
     world.charger_answers = world.writes = False
     world.until(State.OFFLINE)
     assert "/dev/ttyX: no answer" in reason_of(world.decision)
-    world.values["temperature_c"] = 60.0  # a latch, meanwhile, does not leave OFFLINE: nothing is verified
+    world.values["temperature_c"] = 60.0  # a latch meanwhile does not leave OFFLINE: nothing is verified
     world.run(10)
     assert world.is_in(State.OFFLINE)
     world.charger_answers = True
@@ -268,7 +268,7 @@ def test_a_charger_whose_status_never_becomes_valid_is_given_up() -> None:
 
 
 def test_a_charger_that_answers_now_and_then_stays_at_the_start() -> None:
-    """Neither lost nor given up: whoever is online, but without a fresh status, is stopped on."""
+    """Neither lost nor given up: a charger online without a fresh status is still being stopped."""
     world = starting()
     world.port_hangs = True
     world.run(20)
@@ -277,7 +277,7 @@ def test_a_charger_that_answers_now_and_then_stays_at_the_start() -> None:
 
 
 def test_a_stop_is_never_given_up_for_long() -> None:
-    """The order stands from the first step on, and the machine stays where it is."""
+    """The command stands from the first decision on, and the machine stays where it is."""
     world = stopping()
     world.run(20, dt_s=TICK_S)
     assert world.states() == [

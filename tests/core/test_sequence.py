@@ -54,7 +54,7 @@ def orders_since(world: World, first: int) -> list[Command | None]:
 
 
 def new_charge(voltage_v: float = 48.0) -> tuple[World, int]:
-    """A world at the step that energises, and that step's number."""
+    """A world at the decision that energises, and that decision's number."""
     world = World(voltage_v=voltage_v)
     world.until(State.QUALIFYING)
     while world.state not in ENERGISED:
@@ -67,7 +67,7 @@ def new_charge(voltage_v: float = 48.0) -> tuple[World, int]:
 
 def test_a_charge_begins_in_order() -> None:
     world, first = new_charge()
-    world.charger.precharge = Precharge.PULSE  # from the time before
+    world.charger.precharge = Precharge.PULSE  # left from before
     world.run(5)
     assert orders_since(world, first) == [RESUME, limit(4), CHARGE, precharge(Precharge.OFF), RUN, None]
     assert world.charger.running
@@ -142,7 +142,7 @@ def test_nothing_goes_on_before_the_read_back(lost: Action, still: Callable[[Wor
 
 
 def test_the_order_stands_until_its_read_back() -> None:
-    """A frame that is lost costs one slot and nothing else."""
+    """A lost frame costs one slot and nothing else."""
     world, _ = new_charge()
     world.tick()
     world.deaf.add(Action.SET_LIMIT)
@@ -159,7 +159,7 @@ def test_a_resume_counts_when_a_reply_was_asked_for_after_it() -> None:
     world, _ = new_charge()
     world.port_hangs = True
     for _ in range(3):
-        assert world.tick(dt_s=0.1).command == RESUME  # sent, but the newest reading is from before
+        assert world.tick(dt_s=0.1).command == RESUME  # sent, but the newest reading is older
     world.port_hangs = False
     assert world.tick().command == limit(4)
 
@@ -177,7 +177,7 @@ def test_a_resume_that_was_sent_for_the_last_charge_counts_for_nothing() -> None
 
 
 def test_a_lost_resume_is_sent_again() -> None:
-    """Without it the charger stays in standby, whatever it is set to."""
+    """Without it the charger stays in standby, whatever its settings."""
     world, first = new_charge()
     world.deaf.add(Action.RESUME)
     world.run(1.75)
@@ -227,7 +227,7 @@ def test_a_charger_that_was_stopped_by_somebody_is_not_started_again() -> None:
 
 
 def test_without_a_reading_the_order_stays() -> None:
-    """The fault table ends the charge in the same step; whoever asks meanwhile gets nothing new."""
+    """The fault table ends the charge in the same decision; meanwhile there is no new command."""
     world, _ = new_charge()
     memory = world.memory
     facts = Facts.of(world.now_s + 10, Snapshot(), memory, world.rules)
@@ -317,7 +317,7 @@ def test_any_order_may_be_lost(count: int, at: int) -> None:
 
 
 def test_a_lost_half_of_a_stop_lets_no_charger_run_on_its_old_values() -> None:
-    """Standby hides whether operation 0 was heard; a resume would show it, too late."""
+    """Standby hides whether operation 0 was received; a resume would show it, too late."""
     site = Lossy(Turn.OPERATION_STOP, count=0, at=0)
     site.until(State.CHARGING, 10)
     site.run(10)

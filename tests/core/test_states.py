@@ -1,4 +1,4 @@
-"""Every state has its row, and every class of states somebody who uses it."""
+"""Every state has its row, and every kind of state is used somewhere."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Unknown means no: what is missing, old, not a number or not documented never lets a charge begin, and stops one."""
+"""Unknown means no: a missing, old, non-numeric or undocumented value never lets a charge begin, and stops one."""
 
 from dataclasses import replace
 from math import inf, nan
@@ -30,7 +30,7 @@ class Skewed(World):
 
 
 def tells(world: World, name: str, unknown: float | None) -> None:
-    """The BMU says this instead of the truth."""
+    """The BMU reports this instead of the truth."""
     if name == "current_a" and unknown is not None:
         world.pack_amps = unknown
     else:
@@ -92,7 +92,7 @@ def test_with_such_a_status_no_charge_begins(name: str, unknown: float | None) -
     world = World()
     world.shows[name] = unknown
     if unknown is None:
-        world.shows["illegal"] = (f"{name} 77",)  # as the decoder says it
+        world.shows["illegal"] = (f"{name} 77",)  # as the decoder reports it
     never_starts(world)
 
 
@@ -118,7 +118,7 @@ def test_an_old_or_a_future_status_starts_nothing() -> None:
 
 @every_value
 def test_one_sample_is_not_enough(name: str) -> None:
-    """It takes a second one that was asked for after the first was there."""
+    """It takes a second reading, requested after the first was there."""
     world = idle()
     world.values["soc_pct"] = 50.0
     world.until(State.QUALIFYING)
@@ -163,7 +163,7 @@ def test_the_soc_is_waited_for(unknown: float | None) -> None:
 
 
 def arrival(world: World, **said: float) -> None:
-    """The BMU boots and says for 0.75 s what its memory held; then what it measures."""
+    """For 0.75 s after its boot the BMU reports what its memory held; then what it measures."""
     true = {name: world.values[name] for name in said}
     world.boot()
     world.values.update(said)
@@ -221,7 +221,7 @@ def test_measurements_are_compared_within_one_battery_only() -> None:
 
 
 def test_a_value_of_this_very_moment_is_fresh() -> None:
-    """A TPDO may come while the step is being taken."""
+    """A TPDO may arrive while the decision is being made."""
     world = Skewed("temperature_c", -0.001)
     world.until(State.CHARGING, 10)
     assert world.measured["temperature_c"] == Measurement(20.0, world.now_s)

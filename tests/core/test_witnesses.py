@@ -1,4 +1,4 @@
-"""Charger and BMU held against each other: what proves standby, who is believed, whose battery it is."""
+"""Charger and BMU compared: what proves standby, which one is believed, whose battery it is."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -45,11 +45,11 @@ def test_a_charger_that_says_now_this_and_now_that_is_out_of_control(pattern: st
     assert world.is_in(State.UNCONTROLLABLE), world.decision
     assert world.decision.alarm is Alarm.DANGER
     assert world.decision.command == STOP
-    # A single reply among others may be a stray measurement; the second of its kind is none.
+    # A single reply among others may be a stray measurement; a second one is not.
     most_s = 4.0 if "11" in pattern + pattern[0] or len(pattern) < 3 else 4.0 + 2 * len(pattern) * TICK_S
     assert 3.0 <= world.now_s - stopped_s <= most_s
     assert reason_of(world.decision).startswith("CUT THE MAINS of this charger (/dev/ttyX)")
-    for shown in cycle(pattern):  # and it stays so, as long as the charger does
+    for shown in cycle(pattern):  # and it stays so as long as the charger does
         world.shows["operation"] = Operation(int(shown))
         world.tick()
         assert world.is_in(State.UNCONTROLLABLE)
@@ -105,7 +105,7 @@ def test_out_of_control_is_left_only_by_a_standby_of_ten_seconds_without_a_break
     assert world.decision.alarm is not Alarm.DANGER
 
 
-# --- the BMU's word ---------------------------------------------------------------------------------------------------
+# --- the BMU's report -------------------------------------------------------------------------------------------------
 
 
 def delivers_and_denies_it(world: World) -> None:
@@ -144,7 +144,7 @@ def test_a_charger_that_denies_what_the_bmu_sees_is_out_of_control(state: State)
 
 @every_state
 def test_no_stop_is_verified_while_the_bmu_sees_current(state: State) -> None:
-    """Not for a moment: neither at rest with nothing ordered, nor qualified for a charge."""
+    """Not even briefly: neither at rest with nothing commanded, nor qualified for a charge."""
     world = IN[state]()
     delivers_and_denies_it(world)
     world.run(2.5)
@@ -179,7 +179,7 @@ def test_a_value_from_before_the_stop_proves_nothing() -> None:
 
 @pytest.mark.parametrize("late_s", [0.25, 0.5, 1.0, 1.5])
 def test_a_bmu_that_averages_is_waited_for(late_s: float) -> None:
-    """Its current goes on for a while after the charger's: an honest pair is verified within the time of a stop."""
+    """Its current outlasts the charger's for a while: an honest pair is verified within the time of a stop."""
     world = charging()
     world.pack_amps = 14.0
     world.ask(Request.STOP)
@@ -202,7 +202,7 @@ def test_a_blip_of_the_bmu_at_rest_is_no_current() -> None:
 
 
 def test_a_current_that_comes_and_goes_at_rest_is_found() -> None:
-    """A second of every two."""
+    """One second in every two."""
     world = idle()
     for _ in range(6):
         world.pack_amps = 14.0
@@ -310,7 +310,7 @@ def lto() -> Policy:
     return replace(POLICY, pack=pack)
 
 
-#: Cells of text books, which are not those of the product's own table.
+#: Cells from text books, which differ from the product's own table.
 LTO_CELL = chemistry.Chemistry(
     ocv=((0.0, 1.9), (0.1, 2.12), (0.5, 2.27), (0.9, 2.42), (1.0, 2.65)), deep=((-1.0, 1.5), (0.0, 1.9)),
     high_cell_v=2.8, low_cell_v=1.6,
@@ -364,7 +364,7 @@ def test_a_soc_that_is_corrected_in_mid_charge_ends_it_without_a_latch() -> None
     world.until(State.CHARGING, 10)
 
 
-# --- a pack that gives way --------------------------------------------------------------------------------------------
+# --- a pack that fails ------------------------------------------------------------------------------------------------
 
 
 def test_a_pack_that_collapses_is_stopped_at_once_and_for_good() -> None:
@@ -379,7 +379,7 @@ def test_a_pack_that_collapses_is_stopped_at_once_and_for_good() -> None:
 def test_the_fall_at_the_end_of_a_current_is_no_collapse() -> None:
     world = World(voltage_v=50.0, soc_pct=60.0).charging()
     world.run(15)
-    world.values["voltage_v"] = 47.4  # a pack with much resistance
+    world.values["voltage_v"] = 47.4  # a pack with high resistance
     world.amps = 2.0
     world.run(20)
     assert world.is_in(State.CHARGING)
@@ -397,7 +397,7 @@ def test_a_fall_that_only_the_bmu_sees_is_not_the_packs() -> None:
 
 
 def goes_back(world: World, after: int) -> Callable[[], None]:
-    """The charger shows each new limit for so many replies, and then the highest again."""
+    """The charger shows each new limit for this many replies, and then the highest again."""
     shown = {"told": -1, "replies": 0}
 
     def tick() -> None:
@@ -413,7 +413,7 @@ def goes_back(world: World, after: int) -> Callable[[], None]:
 
 @pytest.mark.parametrize("after", [1, 2, 4, 8])
 def test_a_limit_that_goes_back_is_found_out(after: int) -> None:
-    """9 A on average where 2 A are allowed, and the status is right for most of the time."""
+    """9 A on average where 2 A are allowed, while the status is right most of the time."""
     world = World(temperature_c=5.0)
     world.until(State.CHARGING)
     begun_s, charged_as, tick = world.now_s, 0.0, goes_back(world, after)
@@ -450,7 +450,7 @@ def test_a_step_that_is_told_anew_is_not_one_that_went_back() -> None:
 
 @pytest.mark.parametrize("soc_pct", [80.0, 85.0, 99.0])
 def test_a_charger_that_somebody_stopped_is_not_full(soc_pct: float) -> None:
-    """Mode 5 and operation 0 are also what its own stop key leaves behind."""
+    """Its own stop key also leaves mode 5 and operation 0 behind."""
     world = charging()
     world.values["soc_pct"] = soc_pct
     world.run(20)
@@ -463,11 +463,11 @@ def test_a_charger_that_somebody_stopped_is_not_full(soc_pct: float) -> None:
     assert world.is_in(State.HELD)  # it does not charge again by itself
 
 
-# --- what stands still ------------------------------------------------------------------------------------------------
+# --- frozen values ----------------------------------------------------------------------------------------------------
 
 
 def test_a_bmu_that_stands_still_is_found_by_what_goes_in() -> None:
-    """Volts of a flat part: only the ampere hours tell."""
+    """Volts on a flat part of the curve: only the ampere hours tell."""
     world = charging()
     world.counts = False
     world.until(State.STOPPING, 300.0)
@@ -513,7 +513,7 @@ def test_both_that_change_one_after_the_other_are_not_frozen() -> None:
 
 
 def test_facts_without_a_reading_have_no_witness() -> None:
-    """A BMU's value from the future, or not a number, is as good as none."""
+    """A BMU value from the future, or one that is not a number, counts as none."""
     for value in (Measurement(14.0, 1e9), Measurement(float("nan"), 0.0)):
         world = idle()
         snapshot = world.snapshot(None, "")
@@ -524,7 +524,7 @@ def test_facts_without_a_reading_have_no_witness() -> None:
 
 
 def test_the_voltages_of_the_tests_fit() -> None:
-    """What the other tests lean on."""
+    """What the other tests rely on."""
     rules = bay().policy.pack
     for soc_pct in range(101):
         assert said(POLICY, fitting_v(rules, soc_pct, 48.0), soc_pct) is None

@@ -1,7 +1,7 @@
 """A bay whose time jumps: an obedient charger and a healthy battery, which a test then spoils.
 
-Each tick the charger hears the last standing command, both devices are read, and one step is taken. Nothing is late and
-nothing gets lost unless a test says so; for that there is `site.py`.
+Each tick the charger receives the last standing command, both devices are read, and one decision is made. Nothing is
+late or lost unless a test says so; for that there is `site.py`.
 """
 
 from dataclasses import dataclass, replace
@@ -41,12 +41,12 @@ from tests.core.said import cause, say
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 #: A binary fraction, so that a limit can be hit exactly.
 TICK_S = 0.25
-#: What the devices' layer calls silence.
+#: What the device layer calls silence.
 MISSES_UNTIL_SILENT = 5
 BMU_SILENT_S = 1.5
 
 
-#: li-ion-48v in amperes alone; its charge is ended by the SOC, too, so that a test can end one by a word.
+#: li-ion-48v in amperes alone; its charge also ends by SOC, so that a test can end one by setting a value.
 TABLE = "current.temperature_c.rows"
 POLICY = load_policy("li-ion-48v", changes={
     f"{TABLE}[0].max_c": "null", f"{TABLE}[0].max_a": "2.0", f"{TABLE}[1].max_c": "null", f"{TABLE}[1].max_a": "6.0",
@@ -74,7 +74,7 @@ def bay(policy: Policy | None = None, control: ControlMode = ControlMode.MANUAL,
 
 @dataclass
 class Charger:
-    """As the document has it; like the one in `sim` it remembers its run command over a standby."""
+    """As documented; like the one in `sim` it remembers its run command over a standby."""
 
     manual: bool
     resting: bool = True
@@ -108,12 +108,12 @@ class Charger:
                 self.run = self.run or not self.resting
 
 
-#: A pack that fits its SOC is this far inside of what belongs to it.
+#: A pack that fits its SOC is this far inside the bounds for it.
 WELL_INSIDE_V = 0.005
 
 
 def fitting_soc_pct(pack_v: float, cells: int = 13) -> float:
-    """What a healthy pack has at this voltage: nothing when it is deeply discharged, else half of it."""
+    """The SOC of a healthy pack at this voltage: almost empty if it is deeply discharged, else half full."""
     return 2.0 if pack_v < 3.23 * cells else 50.0
 
 
@@ -125,7 +125,7 @@ def fitting_v(pack: Pack, soc_pct: float, pack_v: float) -> float:
 
 
 def remembering(memory: Memory | None = None, **values: Any) -> Memory:
-    """A memory, or this one, with some values set by their names, in whatever part they are."""
+    """A memory, or this one, with some values set by name, in whichever part they are."""
     return with_values(memory or Memory(), **values)
 
 
@@ -137,15 +137,15 @@ class World:
         self.memory = Memory()
         self.now_s = 1000.0
         self.charger = Charger(self.rules.manual)
-        self.deaf: set[Action] = set()  #: orders that the charger does not hear
-        self.writes = True  #: the port hands orders over
+        self.deaf: set[Action] = set()  #: commands that the charger does not receive
+        self.writes = True  #: the port hands commands over
         self.charger_answers = True
         self.battery_answers = True
         self.port_hangs = False  #: nobody polls the charger any more, so nobody counts misses
-        self.shows: dict[str, Any] = {}  #: what the charger's status says instead of the truth
-        self.amps: float | None = None  #: what flows while it runs, whatever was set
-        self.leak_a = 0.0  #: what flows while it does not
-        self.volts: float | None = None  #: at the charger, if not those of the pack
+        self.shows: dict[str, Any] = {}  #: what the charger's status reports instead of the truth
+        self.amps: float | None = None  #: the current while it runs, whatever was set
+        self.leak_a = 0.0  #: the current while it does not
+        self.volts: float | None = None  #: at the charger, if different from the pack's
         self.charger_link = ChargerLink(online=True)
         self.battery_link = BatteryLink(online=True)
         self.values: dict[str, float | None] = {
@@ -159,18 +159,18 @@ class World:
         }
         self._fitted_pct = self.values["soc_pct"] if "voltage_v" in battery else None
         self._fitted_v = self.values["voltage_v"]
-        self.counted_min = 60.0  #: what a BMU counts goes on moving, whatever stands still
+        self.counted_min = 60.0  #: what a BMU counts keeps moving, whatever stands still
         self.counts = True
-        self.frozen: set[str] = set()  #: values that are not read any more
-        self.pack_amps: float | None = None  #: what the BMU measures, if not what flows
-        self.shunt = 1.0  #: what share of it the BMU measures
+        self.frozen: set[str] = set()  #: values that are no longer read
+        self.pack_amps: float | None = None  #: what the BMU measures, if different from what flows
+        self.shunt = 1.0  #: the share of it that the BMU measures
         self.reading: ChargerReading | None = None
         self.measured: dict[str, Measurement] = {}
         self.heard_s = self.now_s  #: when the BMU last answered
         self.connected = True  #: the contactor, if there is one, is closed
         self.contactor_problem: Cause | None = None
         self.internal = ""  #: an exception of our own, for one tick
-        self.ours: dict[str, Any] = {}  #: what else the service says of itself
+        self.ours: dict[str, Any] = {}  #: what else the service reports of itself
         self.decisions: list[Decision] = []
 
     @property
@@ -186,7 +186,7 @@ class World:
 
     @property
     def raised(self) -> dict[str, str]:
-        """The faults in force: id and text."""
+        """The active faults: id and text."""
         return {fault.id: say(fault.cause) for fault in self.decision.faults}
 
     @property
@@ -201,7 +201,7 @@ class World:
         return [now for before, now in zip([None, *commands], commands, strict=False) if now != before]
 
     def states(self, since_s: float = 0.0) -> list[State]:
-        """The states that were gone through in the last `since_s` seconds (0: ever), each once."""
+        """The states passed through in the last `since_s` seconds (0: ever), each once."""
         ticks = round(since_s / TICK_S)
         states = [decision.state for decision in self.decisions[-ticks:]]
         return [now for before, now in zip([None, *states], states, strict=False) if now is not before]
@@ -216,7 +216,7 @@ class World:
         return decision
 
     def forget(self, fault: str) -> None:
-        """A fault that is not what a test asks."""
+        """Forget a fault that the test is not about."""
         faults = {name: kept for name, kept in self.memory.faults.items() if name != fault}
         self.memory = remembering(self.memory, faults=faults)
 
@@ -233,18 +233,18 @@ class World:
         raise AssertionError(f"{state} not reached in {at_most_s} s, but {self.decision}")
 
     def ask(self, request: Request) -> str:
-        """What becomes of the request; "" is yes."""
+        """The answer to the request; "" is yes."""
         return say(self.tick(request=request).answer)
 
     def charging(self, state: State = State.CHARGING) -> "World":
-        """Until the charger does all that it was told in `state`."""
+        """Run until the charger does everything commanded in `state`."""
         self.until(state, 4000.0)
         while self.decision.command is not None:
             self.tick()
         return self
 
     def boot(self) -> None:
-        """The BMU boots: nothing of what it said holds any more."""
+        """The BMU boots: none of its earlier values hold any more."""
         link = self.battery_link
         self.battery_link = replace(link, boots=link.boots + 1, boot_t_s=self.now_s, heartbeat_s=None)
         self.measured = {}
@@ -314,7 +314,7 @@ class World:
         return STEPS_A[self.charger.limit] if self.amps is None else self.amps
 
     def _obey(self, dt_s: float) -> None:
-        """What a port and a charger make of the last decision within one tick."""
+        """What a port and a charger do with the last decision within one tick."""
         command = self.decisions[-1].command if self.decisions else None
         if command is not None and self.writes:
             sent_s = self.now_s - dt_s / 2
@@ -327,7 +327,7 @@ class World:
         self.counted_min += self._amps() * dt_s / 60 if self.counts else 0.0
 
     def _fit(self) -> None:
-        """Where a test has set the SOC alone, the voltage follows it."""
+        """If a test has set only the SOC, the voltage follows it."""
         soc_pct, pack_v = self.values["soc_pct"], self.values["voltage_v"]
         if soc_pct != self._fitted_pct and soc_pct is not None and pack_v is not None and pack_v == self._fitted_v:
             self.values["voltage_v"] = fitting_v(self.rules.policy.pack, soc_pct, pack_v)

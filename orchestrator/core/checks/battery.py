@@ -1,4 +1,4 @@
-"""Faults of the battery and of its BMU."""
+"""Faults of the battery and its BMU."""
 
 from orchestrator.core.facts import Facts
 from orchestrator.core.witnesses.pack import another_pack
@@ -8,20 +8,20 @@ from orchestrator.model.cause import together
 #: Hysteresis of the pauses for heat and for cold.
 HEAT_HYSTERESIS_K = 5.0
 COLD_HYSTERESIS_K = 3.0
-#: No pack warms or cools this fast within a second; a sensor that says so is broken.
+#: No pack warms or cools this fast within a second; a sensor that reports it is broken.
 JUMP_K = 5.0
-#: The rate of warming is judged over this long.
+#: The rate of warming is measured over this long.
 WARMING_S = 180.0
-#: Heartbeats are missed after so many of their periods: of a node that answers nothing else, and of one that does.
+#: Heartbeats are lost after this many periods: of a node that answers nothing else, and of one that does.
 SILENT_PERIODS, ANSWERING_PERIODS = 2.5, 4.5
-#: SDO abort codes (upper half) that say: the object is not there, or not like this. The others may pass.
+#: SDO abort codes (upper half) that mean: the object does not exist, or not in this form. The others may pass.
 REFUSALS = frozenset({0x0601, 0x0602, 0x0604, 0x0606, 0x0607, 0x0609})
-#: What somebody else did on the bus is news for this long.
+#: What another node did on the bus is news for this long.
 NEWS_S = 10.0
-#: NMT states as a heartbeat tells them (CiA 301).
+#: NMT states as reported in a heartbeat (CiA 301).
 OPERATIONAL = 0x05
 NMT_NAMES = {0x00: "boot_up", 0x04: "stopped", 0x7F: "pre_operational"}
-#: Bits that end a charge, and bits that make it gentle. Low voltage is what a deeply discharged pack reports.
+#: Bits that end a charge, and bits that limit it. A deeply discharged pack reports low voltage.
 STATUS_TRIPS = (
     BatteryStatus.OVER_VOLTAGE,
     BatteryStatus.CHARGE_OVER_CURRENT,
@@ -32,7 +32,7 @@ STATUS_LIMITS = (BatteryStatus.LOW_TEMPERATURE, BatteryStatus.DISCHARGE_OVER_CUR
 
 
 def bmu_silent(f: Facts) -> Cause | None:
-    """FAULTS B1, B5, B19, B21: no values, or a line or a node of which the values cannot be trusted."""
+    """FAULTS B1, B5, B19, B21: no values, or a line or node whose values cannot be trusted."""
     if (f.battery.online and not f.silent) or f.just_booted:
         return None
     if f.battery.problem:
@@ -41,14 +41,14 @@ def bmu_silent(f: Facts) -> Cause | None:
 
 
 def stale_reading(f: Facts) -> Cause | None:
-    """FAULTS B2: it answers, but not about everything that a charge needs."""
+    """FAULTS B2: it answers, but not with everything that a charge needs."""
     if f.silent or f.present:
         return None
     return Cause.of("stale_reading", missing=f.missing)
 
 
 def sdo_refused(f: Facts) -> Cause | None:
-    """FAULTS B3: the object is not there, or not like this."""
+    """FAULTS B3: the object does not exist, or not in this form."""
     link = f.battery
     return link.abort if link.abort_code >> 16 in REFUSALS else None
 
@@ -72,7 +72,7 @@ def heartbeat_lost(f: Facts) -> Cause | None:
 
 
 def not_operational(f: Facts) -> Cause | None:
-    """FAULTS B8: only heartbeats tell the state, and only TPDOs need it; SDO reads go on meanwhile."""
+    """FAULTS B8: only heartbeats report the state, and only TPDOs need it; SDO reads continue meanwhile."""
     link = f.battery
     if f.rules.bay.battery.tpdo_s is None or link.heartbeat_s is None or link.nmt_state in (None, OPERATIONAL):
         return None
@@ -118,7 +118,7 @@ def over_temperature(f: Facts) -> Cause | None:
 
 
 def hot_trip(f: Facts) -> Cause | None:
-    """FAULTS B10, where cooling down is not enough."""
+    """FAULTS B10, when cooling down is not enough."""
     policy = f.rules.policy
     limit = policy.faults.temperature_trip_c
     if f.temperature_c is None or f.temperature_c < limit:
@@ -169,7 +169,7 @@ def temperature_invalid(f: Facts) -> Cause | None:
 
 
 def implausible(f: Facts) -> Cause | None:
-    """FAULTS B14, B17: a value that cannot be."""
+    """FAULTS B14, B17: an impossible value."""
     if not f.battery.implausible or f.just_booted:
         return None
     wrong = [cause for name, cause in f.battery.implausible.items() if name != "temperature_c"]
@@ -177,7 +177,7 @@ def implausible(f: Facts) -> Cause | None:
 
 
 def under_voltage(f: Facts) -> Cause | None:
-    """FAULTS B14: below what may be woken."""
+    """FAULTS B14: too low to be woken."""
     pack = f.rules.policy.pack
     if f.pack_v is None or f.pack_v >= pack.voltage_v.low or another_pack(f) is not None:
         return None
@@ -201,7 +201,7 @@ def soh_low(f: Facts) -> Cause | None:
 
 
 def other_master(f: Facts) -> Cause | None:
-    """FAULTS B27: only said; what it does to the BMU shows elsewhere."""
+    """FAULTS B27: only reported; its effect on the BMU shows elsewhere."""
     seen_s = f.battery.other_master_t_s
     if seen_s is None or f.now_s - seen_s >= NEWS_S:
         return None

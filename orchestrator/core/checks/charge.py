@@ -1,11 +1,11 @@
-"""Faults of the charge itself: it takes too long, too much, or leads nowhere."""
+"""Faults of the charge itself: it takes too long or too much, or gets nowhere."""
 
 from orchestrator.core import limits
 from orchestrator.core.facts import Facts
 from orchestrator.core.states import PRECHARGING
 from orchestrator.model import Cause, State
 
-#: A charge that begins at this SOC or less may take all that the policy allows; from a higher one it needs less.
+#: A charge that begins at this SOC or below may take all that the policy allows; from a higher one it needs less.
 SOC_ERROR_PCT = 20.0
 
 
@@ -36,12 +36,12 @@ def precharge_too_long(f: Facts) -> Cause | None:
 
 
 def no_step_allowed(f: Facts) -> Cause | None:
-    """FAULTS P12: `max_a: 0`, or a charger whose lowest step is too much."""
+    """FAULTS P12: `max_a: 0`, or a charger whose lowest step is too high."""
     return limits.none_allowed(f)
 
 
 def precharge_too_strong(f: Facts) -> Cause | None:
-    """FAULTS P12: precharge is always on the charger's lowest step."""
+    """FAULTS P12: precharge always uses the charger's lowest step."""
     rule, lowest_a = f.rules.policy.precharge, f.rules.worst_a[0]
     if not f.rules.manual or rule is None or f.pack_v is None or f.pack_v >= rule.below_v or lowest_a <= rule.max_a:
         return None

@@ -1,4 +1,4 @@
-"""Faults of a charger that does not do as it is told, or does not answer."""
+"""Faults of a charger that does not obey, or does not answer."""
 
 from orchestrator.core.facts import CHARGER_STALE_S, Facts
 from orchestrator.core.finish import early_below_pct, ends_full
@@ -9,22 +9,23 @@ from orchestrator.model import Action, Cause, Operation, State
 OBEY_S = 5.0
 #: A charger's current measurement may be off by this, whatever the step.
 OVER_CURRENT_OFFSET_A = 0.3
-#: After a step down the current may be the old step's for this long. More would delay the stop beyond its budget (2 s).
+#: After a step down the current may stay at the old step for this long. More would delay the stop beyond its budget (2
+#: s).
 FOLLOWS_S = 1.0
 #: The charger's own modes before current flows (search) and while it wakes a pack (recovery, precharge).
 SEARCH_MAX_S = 60.0
 WAKE_MAX_S = 1800.0
-#: Charging with less than this is no charging.
+#: Charging with less than this is not charging.
 NO_CURRENT_A = 0.1
 #: A running charger that delivers nothing for this long is connected to nothing.
 IDLE_MAX_S = 10.0
 #: Nearly full packs may take no current.
 NEARLY_FULL_PCT = 95.0
-#: So many settings that go back within this time are no accident.
+#: This many settings that revert within this time are no accident.
 MAX_REVERTS, REVERTS_S = 3, 60.0
-#: How a stop that was verified in the end is told afterwards: by one that both deny, and by one that only the BMU does.
+#: The later wording for a stop verified in the end: one that the charger's own report denied, or only the BMU's.
 PAST = {"will_not_stop": "did_not_stop", "stop_contradicted": "stop_was_contradicted"}
-#: What somebody else did to the line is news for this long.
+#: A change to the line by somebody else is news for this long.
 NEWS_S = 5.0
 
 
@@ -41,7 +42,7 @@ def charger_silent(f: Facts) -> Cause | None:
 
 
 def found_running(f: Facts) -> Cause | None:
-    """FAULTS G10: the last run of this service died, or it was started by somebody else while we could not see it."""
+    """FAULTS G10: the previous run of this service died, or somebody else started the charger unseen."""
     return Cause("found_running") if f.runs else None
 
 
@@ -53,8 +54,10 @@ def rogue_run(f: Facts) -> Cause | None:
 
 
 def will_not_stop(f: Facts) -> Cause | None:
-    """FAULTS C6: it answers, and its answer or the BMU says that it goes on. (A line that is cut is no disobedience: it
-    is given up, too, but goes on by itself once it is mended.)"""
+    """FAULTS C6: the charger answers, and it or the BMU reports that it goes on.
+
+    A cut line is not disobedience: that is given up, too, but recovers by itself once repaired.
+    """
     if f.reading is None:
         return None
     if f.runs:
@@ -65,7 +68,7 @@ def will_not_stop(f: Facts) -> Cause | None:
 
 
 def did_not_stop(cause: Cause, lasted_s: float) -> Cause:
-    """What is said of `will_not_stop` once its charger stands by; `cause` is what was said before, this or that."""
+    """The cause of `will_not_stop` once its charger is in standby, from the cause shown before."""
     return Cause.of(PAST[cause.id], lasted_s=lasted_s) if cause.id in PAST else cause
 
 
@@ -78,7 +81,7 @@ def will_not_start(f: Facts) -> Cause | None:
 
 
 def stopped_by_itself(f: Facts) -> Cause | None:
-    """FAULTS C4: an emergency stop past this service looks like this, too; it is not for us to start again."""
+    """FAULTS C4: an emergency stop that bypasses this service looks like this, too; restarting is not up to us."""
     if f.reading is None or not f.energised or not f.memory.stage.ran:
         return None
     if f.reading.operation is not Operation.STOPPED:
@@ -91,7 +94,7 @@ def stopped_by_itself(f: Facts) -> Cause | None:
 
 
 def limit_reverted(f: Facts) -> Cause | None:
-    """FAULTS C28: settings that it confirms and then drops."""
+    """FAULTS C28: settings that the charger confirms and then drops."""
     step, reverts = f.memory.stage.step, f.memory.charger.reverts
     recent = [t_s for t_s in reverts if f.now_s - t_s < REVERTS_S]
     if step is None or len(recent) < MAX_REVERTS:
@@ -100,7 +103,7 @@ def limit_reverted(f: Facts) -> Cause | None:
 
 
 def above_step(f: Facts) -> Cause | None:
-    """FAULTS C28: what flows is held against what was commanded, whatever the charger shows as its setting."""
+    """FAULTS C28: the current is compared with the commanded step, whatever setting the charger shows."""
     step = f.memory.stage.step
     if f.memory.state is not State.CHARGING or step is None or f.amps is None or not f.rules.manual:
         return None
@@ -126,7 +129,7 @@ def line_taken_over(f: Facts) -> Cause | None:
 
 
 def loose_plug(f: Facts) -> Cause | None:
-    """FAULTS C13: it left in mid-charge and was back within a minute."""
+    """FAULTS C13: the battery was removed in mid-charge and back within a minute."""
     return Cause("loose_plug") if f.memory.battery.returned_s == f.now_s else None
 
 
@@ -135,13 +138,13 @@ def setting_not_obeyed(f: Facts) -> Cause | None:
     command = f.memory.sequence.command
     if command is None or command.action in (Action.RUN, Action.RESUME, Action.STOP) or not f.energised:
         return None
-    if command.action is Action.SET_LIMIT:  # said as people count steps
+    if command.action is Action.SET_LIMIT:  # people count steps from 1
         return _unconfirmed("setting_not_obeyed", f, "step", command.value + 1)
     return _unconfirmed("setting_not_obeyed", f, command.action.value.removeprefix("set_"), command.value)
 
 
 def contactor_lost(f: Facts) -> Cause | None:
-    """FAULTS C6: without it, nothing is left for a charger that does not obey."""
+    """FAULTS C6: without the contactor, nothing is left to stop a charger that does not obey."""
     return f.snapshot.contactor_problem
 
 
@@ -168,7 +171,7 @@ def over_current(f: Facts) -> Cause | None:
 
 
 def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
-    """The step that the charger shows, and for a moment the one before: its current follows later than its status."""
+    """The step that the charger shows, and briefly the one before: its current changes later than its status."""
     before = f.memory.charger.limit_before
     return (shown,) if before is None or f.now_s - f.memory.charger.limit_s > FOLLOWS_S else (shown, before)
 
@@ -176,7 +179,7 @@ def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
 def early_full(f: Facts) -> Cause | None:
     """FAULTS C18."""
     if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f) or not ends_full(f):
-        return None  # what did not end like a full charge was stopped by somebody: `stopped_by_itself`
+        return None  # an end that did not look like a full charge was a stop by somebody: `stopped_by_itself`
     return Cause.of("early_full", soc_pct=f.soc)
 
 

@@ -1,12 +1,12 @@
-"""Faults of this service, and of the machine that it runs on."""
+"""Faults of this service and of the machine that it runs on."""
 
 from orchestrator.core.facts import Facts
 from orchestrator.model import Cause
 
-#: A bay is looked at every 0.2 s: two ticks late is said, five stop the charge. (A controller that hangs is killed by
-#: its guardian before; that much late is a machine that stood still with both.)
+#: A bay is looked at every 0.2 s: two ticks late is reported, five stop the charge. (A controller that hangs is killed
+#: earlier by its guardian; being that late means the machine stood still with both.)
 LATE_S, OVERRUN_S = 0.4, 1.0
-#: While a machine is suspended the clock of all ages stands still: they are too young by that.
+#: While a machine is suspended the clock behind all ages stands still: they come out too young by that much.
 SUSPENDED_S = 2.0
 
 
@@ -39,5 +39,5 @@ def suspended(f: Facts) -> Cause | None:
 
 
 def not_persisted(f: Facts) -> Cause | None:
-    """FAULTS G8: a charge goes on, but none begins of which a latched fault would be forgotten by a restart."""
+    """FAULTS G8: a charge continues, but none begins while a restart would forget its latched faults."""
     return f.snapshot.not_persisted

@@ -5,9 +5,9 @@ from orchestrator.model import Cause, ChargeMode, Connection, ErrorBit
 
 #: An error frame is news for this long.
 ERROR_FRAME_S = 5.0
-#: A line on which more of the exchanges go wrong is not in order, though it still works.
+#: If a larger share of the exchanges fails, the line is not in order, though it still works.
 NOISY_PCT = 5.0
-#: It does not know what we say, or it did not hear it well. (Here, since joining flags takes long.)
+#: It does not know the command, or did not receive it well. (Constants, since joining flags takes long.)
 NOT_KNOWN = ErrorBit.COMMAND | ErrorBit.ORDER
 NOT_HEARD = ErrorBit.LENGTH | ErrorBit.CHECKSUM
 
@@ -24,7 +24,7 @@ def reverse_polarity(f: Facts) -> Cause | None:
 
 
 def polarity_contradicts(f: Facts) -> Cause | None:
-    """FAULTS C2: it stops as for a battery that is reversed; whether one is, only a look at the bay can say."""
+    """FAULTS C2: stops as for a reversed battery; whether it is one, only a look at the bay can tell."""
     reading = f.reading
     if reading is None or reading.charge_mode is not ChargeMode.REVERSED or reading.connection is not Connection.NORMAL:
         return None
@@ -57,7 +57,7 @@ def mode_taken_over(f: Facts) -> Cause | None:
 
 
 def rejected_frame(f: Facts) -> Cause | None:
-    """FAULTS C22: heard well and not known. Noise can change a command, too, but then the checksum is wrong as well."""
+    """FAULTS C22: received well but not known. Noise can change a command, too, but then the checksum is also wrong."""
     link = f.charger
     if link.error_t_s is None or f.now_s - link.error_t_s > ERROR_FRAME_S:
         return None
@@ -68,7 +68,7 @@ def rejected_frame(f: Facts) -> Cause | None:
 
 
 def noisy_line(f: Facts) -> Cause | None:
-    """FAULTS C21: what was not heard well is asked or ordered again; only where that is usual is it worth a word."""
+    """FAULTS C21: what was not received well is repeated; only frequent failures are worth reporting."""
     bad_pct = f.charger.bad_pct
     if bad_pct <= NOISY_PCT:
         return None

@@ -1,26 +1,26 @@
-"""Faults of what the BMU works out, not measures: SOC, remaining capacity and energy, times to full and to empty.
+"""Faults of what the BMU computes rather than measures: SOC, remaining capacity and energy, times to full and to empty.
 
-Each of them alone may be a BMU that has corrected itself, so it only warns; two together are believed.
+Each alone may be a BMU that has corrected itself, so it only warns; two together are believed.
 """
 
 from orchestrator.core.facts import TERMINAL_V, Facts
 from orchestrator.core.memory import Memory
 from orchestrator.model import Cause
 
-#: From one reading to the next the SOC may take a step of this much, and what a tiny pack takes in each second.
+#: From one reading to the next the SOC may take a step of this much, plus what a tiny pack takes in each second.
 SOC_STEP_PCT, SOC_RATE_PCT_PER_S = 5.0, 1.0
-#: After a gap too long to be watched it may have been corrected by this much, and have gone on by 2 % a minute.
+#: Across a gap too long to be watched it may have been corrected by this much, and have moved by 2 % a minute.
 SOC_OTHER_PCT, SOC_DRIFT_PCT_PER_S = 10.0, 2.0 / 60
 #: A step is news for as long as a second doubt may take to show; an exchange until it can be answered.
 STEP_NEWS_S, EXCHANGE_NEWS_S = 900.0, 5.0
-#: Under charge a SOC that has been so much below its highest value for so long is falling.
+#: A SOC that has stayed this far below its highest value for this long under charge is falling.
 FALLING_S, FALLING_PCT = 900.0, 2.0
-#: Energy is capacity times voltage, and what is missing is current times time to full, up to these factors. The BMU
+#: Energy is capacity times voltage, and the missing charge is current times time to full, up to these factors. The BMU
 #: smooths its current over minutes and knows what the last cells take.
 ENERGY_FACTOR, CAPACITY_FACTOR = 1.5, 3.0
-#: Below this nothing is compared: the figures are too coarse.
+#: Below these nothing is compared: the figures are too coarse.
 LEAST_AH, LEAST_SOC_PCT, LEAST_A = 1.0, 10.0, 1.0
-#: What is doubtful alone.
+#: Faults that are only doubts when alone.
 DOUBTS = ("soc_jump", "soc_falls", "figures_disagree")
 
 
@@ -31,7 +31,7 @@ def soc_jump(f: Facts) -> Cause | None:
 
 
 def jump_ends_s(memory: Memory) -> float | None:
-    """When a jump is no news any more."""
+    """When a jump stops being news."""
     step = memory.battery.charge_step
     return step[0] + STEP_NEWS_S if step is not None else None
 
@@ -45,7 +45,7 @@ def soc_falls(f: Facts) -> Cause | None:
 
 
 def figures_disagree(f: Facts) -> Cause | None:
-    """FAULTS B17: remaining capacity, available energy, SOC and time to full of one pack, which hang together."""
+    """FAULTS B17: remaining capacity, available energy, SOC and time to full of one pack, which must be consistent."""
     battery = f.snapshot.battery
     if battery.remaining_ah is None or f.soc is None or f.pack_v is None or f.pack_a is None:
         return None
@@ -77,13 +77,13 @@ def soc_not_believed(f: Facts) -> Cause | None:
 
 
 def exchange_ends_s(memory: Memory) -> float | None:
-    """When another battery is no news any more."""
+    """When an exchange stops being news."""
     exchange = memory.battery.exchange
     return exchange[0] + EXCHANGE_NEWS_S if exchange is not None else None
 
 
 def battery_exchanged(f: Facts) -> Cause | None:
-    """FAULTS B18: the charger never saw the battery leave, and the BMU that answers again tells of another one."""
+    """FAULTS B18: the charger never saw the battery leave, and the BMU that answers again reports another one."""
     exchange = f.memory.battery.exchange
     if exchange is None or f.now_s - exchange[0] >= EXCHANGE_NEWS_S:
         return None

@@ -1,4 +1,4 @@
-"""What has to be followed from one decision to the next, each part of the memory by its own module."""
+"""State carried between decisions, each part of the memory by its own module."""
 
 from orchestrator.core import rows, safestop, sequence
 from orchestrator.core.facts import Facts
@@ -11,7 +11,7 @@ from orchestrator.model import Cause, State
 
 
 def update_history(f: Facts, passed_s: float) -> Facts:
-    """The facts with a memory that is brought up to them; `passed_s` is the time since the decision before."""
+    """The facts with an updated memory; `passed_s` is the time since the previous decision."""
     before = f.memory
     after = f.with_memory(
         changed(
@@ -30,7 +30,7 @@ def update_history(f: Facts, passed_s: float) -> Facts:
 
 
 def entered(f: Facts, state: State, cause: Cause) -> Memory:
-    """The memory when `state` has just been entered, for this cause: what it counts from."""
+    """The memory when `state` has just been entered, for this cause: everything that counts from there."""
     memory, before = f.memory, f.memory.state
     begun = changed(
         memory,

@@ -1,4 +1,4 @@
-"""What the bay's battery has told until now: makes the next `BatteryHistory`."""
+"""What the bay's battery has reported until now: makes the next `BatteryHistory`."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,11 +16,11 @@ from orchestrator.core.parts import changed
 from orchestrator.core.witnesses.measured import STILL_ABOVE_A
 from orchestrator.model import Cause, State
 
-#: How far apart the kept temperatures are.
+#: The interval between the stored temperatures.
 WARMTH_EVERY_S = 10.0
-#: A battery that leaves in mid-charge and is back within this was not taken away: its plug is loose.
+#: A battery that is removed in mid-charge and back within this was not taken away: its plug is loose.
 LOOSE_PLUG_S = 60.0
-#: … unless its volts are so much other ones: several times what a pack loses when its charge is cut off.
+#: … unless its volts differ by this share: several times what a pack loses when its charge is cut off.
 OTHER_V_SHARE = 0.05
 
 Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
@@ -47,7 +47,7 @@ def update(f: Facts) -> BatteryHistory:
 
 
 def _departure(f: Facts, known: BatteryHistory) -> BatteryHistory:
-    """A battery that leaves in mid-charge and is back at once: its plug is loose."""
+    """Detect a loose plug: the battery is removed in mid-charge and back within `LOOSE_PLUG_S`."""
     if known.returned_s is not None:
         known = changed(known, returned_s=None)
     if f.battery_removed:
@@ -62,7 +62,7 @@ def _departure(f: Facts, known: BatteryHistory) -> BatteryHistory:
 
 
 def _is_another(f: Facts) -> bool:
-    """What has come is not the battery that left, by its SOC or its volts; those of a loose plug go on."""
+    """Whether SOC or volts show another battery than the one removed; with a loose plug they continue."""
     left_pct, left_v = f.memory.battery.left_as
     by_soc = left_pct is not None and f.soc is not None and abs(f.soc - left_pct) > SOC_OTHER_PCT
     by_volts = left_v is not None and f.pack_v is not None and abs(f.pack_v - left_v) > OTHER_V_SHARE * left_v
@@ -70,9 +70,9 @@ def _is_another(f: Facts) -> bool:
 
 
 def _charge(f: Facts, known: BatteryHistory) -> tuple[tuple[float, float | None], Steps]:
-    """The newest SOC, and the step that it took since the one before, where no charge explains that.
+    """The newest SOC, and its step since the previous one if no charge explains that.
 
-    A battery that was seen to leave, or whose BMU boots, is forgotten: what comes is qualified as another one.
+    A battery that was seen to leave, or whose BMU boots, is forgotten: the next one is qualified as another.
     """
     newest, charge = f.snapshot.battery.soc_pct, known.charge
     if f.battery_removed or known.boots != f.battery.boots:
@@ -108,7 +108,7 @@ def thinned(warmth: Warmth, sample: tuple[float, float]) -> Warmth:
 
 
 def _known(f: Facts, known: BatteryHistory) -> BatteryHistory:
-    """A battery that left, or whose BMU booted, comes back as one that is not known."""
+    """A battery that was removed, or whose BMU booted, returns as an unknown one."""
     if f.energised:
         return known
     if known.full_s is None and f.soc is not None:
@@ -121,11 +121,11 @@ def _known(f: Facts, known: BatteryHistory) -> BatteryHistory:
 
 
 def charged_full(f: Facts, *, all_the_way: bool) -> BatteryHistory:
-    """A charge has ended as it should."""
+    """The history after a charge that ended as it should."""
     known = f.memory.battery
     return changed(known, full_pct=f.soc, full_s=f.now_s if all_the_way else known.full_s)
 
 
 def begins(known: BatteryHistory) -> BatteryHistory:
-    """A charge of it begins."""
+    """The history when a charge of this battery begins."""
     return changed(known, full_pct=None) if known.full_pct is not None else known

@@ -9,7 +9,7 @@ from orchestrator.core.parts import changed
 from orchestrator.core.witnesses.measured import STILL_ABOVE_A
 from orchestrator.model import ChargeMode, ChargerReading, Operation
 
-#: What a running charger does before it charges, by its own choice.
+#: What a running charger does by its own choice before it charges.
 WAKING = (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)
 
 
@@ -36,7 +36,7 @@ def update(f: Facts, passed_s: float) -> ChargerHistory:
 
 
 def _settings(f: Facts, known: ChargerHistory, reading: ChargerReading) -> ChargerHistory:
-    """The step that the charger shows, and how often it went back from one that it had confirmed."""
+    """The step that the charger shows, and how often it reverted from one that it had confirmed."""
     step = f.memory.stage.step
     if reading.current_step != known.limit:
         known = changed(known, limit_before=known.limit, limit=reading.current_step, limit_s=f.now_s)
@@ -49,7 +49,7 @@ def _settings(f: Facts, known: ChargerHistory, reading: ChargerReading) -> Charg
 
 
 def _still(f: Facts) -> Still | None:
-    """Since when the charger's volts and amps are the same to the last digit."""
+    """Since when the charger's volts and amps have been the same to the last digit."""
     reading, pack_v, pack_a, still = f.reading, f.pack_v, f.pack_a, f.memory.charger.still
     if reading is None or pack_v is None or pack_a is None or (f.energised and reading.current_a <= STILL_ABOVE_A):
         return None
@@ -59,12 +59,12 @@ def _still(f: Facts) -> Still | None:
 
 
 def told_anew(known: ChargerHistory) -> ChargerHistory:
-    """It is told another step than the one that it has confirmed."""
+    """The history when the charger is told another step than the one it has confirmed."""
     return changed(known, confirmed=False) if known.confirmed else known
 
 
 def begins(f: Facts, known: ChargerHistory) -> ChargerHistory:
-    """Current is to flow, after a rest in which it did not: the charger looks for the battery anew."""
+    """The history when current is to flow after a rest: the charger searches for the battery again."""
     known = changed(known, search_s=0.0, idle_s=0.0)
     if f.memory.session is not None:
         return known

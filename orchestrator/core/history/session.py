@@ -1,4 +1,4 @@
-"""The open charge with all that it has counted: makes the next `Session`."""
+"""The open charge with all its counters: makes the next `Session`."""
 
 from orchestrator.core.facts import CHARGER_STALE_S, Facts
 from orchestrator.core.finish import FALLEN_PCT, known_full
@@ -10,8 +10,8 @@ from orchestrator.model import Cause, Session, State
 def update(f: Facts, passed_s: float, counted_t_s: float | None) -> Session | None:
     """Count time and charge; `counted_t_s` is the reading up to which the charge is counted.
 
-    A gap in the charger's readings counts as nothing beyond their age limit. In standby nothing is counted: a suspended
-    charge may last for days, and the offset of a measurement is no charge.
+    A gap in the charger's readings counts only up to their age limit. Nothing is counted in standby: a suspended charge
+    may last for days, and the offset of a measurement is no charge.
     """
     reading, session, state = f.reading, f.memory.session, f.memory.state
     if session is None:
@@ -37,7 +37,7 @@ def update(f: Facts, passed_s: float, counted_t_s: float | None) -> Session | No
 
 
 def _full(f: Facts, session: Session, passed_s: float) -> Session:
-    """Once found full a pack stays so, over a pause too, until it is seen to have lost some of it."""
+    """A pack found full stays so, even over a pause, until it is seen to have lost some of its charge."""
     if session.full and f.soc is not None and f.soc < (session.full_pct or 0.0) - FALLEN_PCT:
         return changed(session, full=None, full_pct=None, held_s=0.0)
     if f.memory.state is not State.CHARGING:
@@ -49,7 +49,7 @@ def _full(f: Facts, session: Session, passed_s: float) -> Session:
 
 
 def begins(f: Facts, state: State, before: State) -> Session | None:
-    """The open charge, or a new one, when `state`, in which current is to flow, begins after `before`."""
+    """The open charge, or a new one, when the energised `state` begins after `before`."""
     session = f.memory.session
     if session is None and before not in ENERGISED:
         session = Session(started_s=f.now_s, soc_start_pct=f.soc, soc_pct=f.soc)
@@ -59,15 +59,15 @@ def begins(f: Facts, state: State, before: State) -> Session | None:
 
 
 def rise_counts(f: Facts, session: Session) -> Session:
-    """The pack's rise in precharge is counted from now on."""
+    """Count the pack's rise in precharge from now on."""
     return changed(session, rise_s=0.0, rise_v=f.pack_v)
 
 
 def step_changed(session: Session | None) -> Session | None:
-    """The current step has changed once more."""
+    """Count one more change of the current step."""
     return changed(session, step_changes=session.step_changes + 1) if session is not None else None
 
 
 def ended(session: Session, result: Cause) -> Session:
-    """The charge is over, and why."""
+    """The finished charge, with its result."""
     return changed(session, result=result)

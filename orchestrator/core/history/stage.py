@@ -1,4 +1,4 @@
-"""What the present state has come to: makes the next `Stage`. Every state begins with an empty one."""
+"""Progress within the present state: makes the next `Stage`. Every state begins with an empty one."""
 
 from orchestrator.core.facts import Facts
 from orchestrator.core.finish import tapers
@@ -10,12 +10,12 @@ from orchestrator.core.witnesses.standby import sees_current
 from orchestrator.model import Action, ChargeMode, CurrentStep, Operation, State
 
 EMPTY = Stage()
-#: The modes that a charger may be told.
+#: The modes that a charger may be commanded into.
 TOLD = (ChargeMode.CHARGE, ChargeMode.PRECHARGE)
 
 
 def update(f: Facts) -> Stage:
-    """What the state has come to by these facts."""
+    """The stage after these facts."""
     stage = f.memory.stage
     taper_s = since(f.memory.state is State.CHARGING and tapers(f), stage.taper_s, f.now_s)
     if taper_s != stage.taper_s:
@@ -24,11 +24,10 @@ def update(f: Facts) -> Stage:
 
 
 def _began(f: Facts, stage: Stage) -> Stage:
-    """Whether the charge has begun, though no status reply may have shown it: a run that is ordered again would undo a
-    stop.
+    """Whether the charge has begun, even if no status reply showed it: commanding a run again would undo a stop.
 
-    The charger says that it runs; or the BMU has seen its current; or the charger, which had left standby and shown the
-    mode that it was told, is in standby again.
+    It has begun if the charger reports that it runs; if the BMU has seen its current; or if the charger, having left
+    standby and shown the commanded mode, is in standby again.
     """
     reading, command = f.reading, f.memory.sequence.command
     if reading is not None and reading.operation is Operation.RUNNING:
@@ -48,7 +47,7 @@ def _began(f: Facts, stage: Stage) -> Stage:
 
 
 def not_qualified(stage: Stage) -> Stage:
-    """Something is missing: the time begins anew."""
+    """Something is missing: the time starts again."""
     return changed(stage, qualified_s=None, ready=False, intends=False)
 
 
@@ -58,12 +57,12 @@ def not_ready(stage: Stage) -> Stage:
 
 
 def qualifies(f: Facts, stage: Stage) -> Stage:
-    """Everything speaks for a charge, now or since some time."""
+    """Every condition for a charge holds, now or since some time ago."""
     return changed(stage, qualified_s=f.now_s) if stage.qualified_s is None else stage
 
 
 def is_ready(stage: Stage, *, intends: bool) -> Stage:
-    """It has for long enough; whether it is also its turn."""
+    """Every condition has held for long enough; `intends` says whether its turn has come, too."""
     return changed(stage, ready=True, intends=intends)
 
 
@@ -71,13 +70,16 @@ def is_ready(stage: Stage, *, intends: bool) -> Stage:
 
 
 def reaches(f: Facts, stage: Stage, *, holds: bool) -> Stage:
-    """Whether the pack is above the stage's voltage."""
+    """Since when the pack has been at the stage's voltage."""
     reached_s = since(holds, stage.reached_s, f.now_s)
     return stage if reached_s == stage.reached_s else changed(stage, reached_s=reached_s)
 
 
 def chosen(stage: Stage, step: CurrentStep, raise_s: float | None, *, anew: bool) -> Stage:
-    """The step for now. `anew`: the charge goes on with another one; another current follows, a taper counts anew."""
+    """The step for now.
+
+    `anew`: it differs from the previous one, so the current changes and the taper time starts again.
+    """
     if step is stage.step and raise_s == stage.raise_s:
         return stage
     return changed(stage, step=step, raise_s=raise_s, taper_s=None if anew else stage.taper_s)

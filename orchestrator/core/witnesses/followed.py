@@ -1,4 +1,4 @@
-"""What is followed of both witnesses from step to step."""
+"""The state of both witnesses carried between decisions."""
 
 from dataclasses import dataclass
 from operator import attrgetter
@@ -13,7 +13,7 @@ from orchestrator.model import BatteryReading
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
 
-#: How far back the trail goes, and how far apart its samples are.
+#: How far back the trail goes, and the interval between its samples.
 TRAIL_S, TRAIL_EVERY_S = 10.0, 0.5
 #: Less of the charger's current proves nothing about whose pack it flows into.
 FIRST_A = 0.5
@@ -21,7 +21,7 @@ FIRST_A = 0.5
 OWN_SHARE = 0.5
 
 
-#: All that a BMU says.
+#: Everything that a BMU reports.
 WORDS = attrgetter(*BatteryReading.__slots__)
 
 
@@ -38,7 +38,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Frozen:
-    """What the BMU has said since `t_s` without any change, and where the charger was then."""
+    """The BMU's report, unchanged since `t_s`, and the charger's volts and the session's Ah at that time."""
 
     t_s: float
     words: tuple[float | None, ...]
@@ -51,9 +51,9 @@ class Witnessed:
     """What both have shown until now."""
 
     stop_s: float | None = event(None)  #: when the first whole stop of the present state was handed to the port
-    proof: tuple[float, ...] = measured(())  #: when the first and the newest of the status replies since then were
-    #: asked for that showed standby, without a break
-    sees: bool = measured(default=False, tells=RESTING)  #: the BMU sees a charging current that nobody ordered …
+    proof: tuple[float, ...] = measured(())  #: request times of the first and the newest status reply of an
+    #: unbroken run of standby replies since then
+    sees: bool = measured(default=False, tells=RESTING)  #: the BMU sees a charging current without a command …
     unordered_s: float = measured(0.0)  #: … and for how long it has; drains
     trail: tuple[Sample, ...] = measured(())  #: of the last seconds under current, oldest first
     frozen: Frozen | None = measured(None)
@@ -63,7 +63,7 @@ class Witnessed:
 
 
 def update(f: "Facts", passed_s: float) -> Witnessed:
-    """What is known after this step's facts; `passed_s` since the step before."""
+    """What is known after this decision's facts; `passed_s` since the previous decision."""
     before = f.memory.witnessed
     stop_s, known = _stop_s(f), _first_amperes(f, before, passed_s)
     proof = _proof(f, stop_s, before.proof if stop_s == before.stop_s else ())
@@ -77,14 +77,14 @@ def update(f: "Facts", passed_s: float) -> Witnessed:
 
 
 def _unordered_s(known: Witnessed, passed_s: float, *, sees: bool) -> float:
-    """The time before it was first seen is nobody's: it may have begun just now."""
+    """Time before it was first seen does not count: it may have begun just now."""
     if sees and not known.sees:
         return known.unordered_s
     return min(UNORDERED_MOST_S, drained(known.unordered_s, passed_s, holds=sees))
 
 
 def _stop_s(f: "Facts") -> float | None:
-    """The first whole stop of this state; the later ones repeat it."""
+    """The first whole stop of this state; later ones repeat it."""
     since_s, sent_s, known_s = f.memory.since_s, f.charger.stop_sent_s, f.memory.witnessed.stop_s
     if since_s is None or sent_s is None or sent_s < since_s:
         return None
@@ -110,7 +110,7 @@ def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
 
 
 def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
-    """Watched while a charge goes in; what was found frozen stays so, at rest too, until a word changes."""
+    """Tracked during a charge; a report found frozen stays so, at rest too, until a value changes."""
     session, battery = f.memory.session, f.snapshot.battery
     words = tuple([word.value if word is not None else None for word in WORDS(battery)])
     if frozen is not None and frozen.words == words:

@@ -8,15 +8,15 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.witnesses.standby import FROZEN
 from orchestrator.model import Cause, ChargeMode
 
-#: A pack under charge may lose this to the vehicle that it sits in before it counts as back-feed.
+#: A pack under charge may lose this to the vehicle it sits in before it counts as back-feed.
 BACK_FEED_A = 0.5
-#: Values that are the same for this long, while the other one's have moved by twenty times the resolution or more, are
-#: not measured any more. The charger's are judged above this current; at rest by its volts alone.
+#: Values that stay the same for this long, while the other device's move by twenty times the resolution or more, are no
+#: longer measured. The charger's are judged above this current; at rest, by its volts alone.
 STILL_S, STILL_ABOVE_A = 60.0, 1.0
 MOVED_V, MOVED_A = 0.2, 0.5
-#: In these a charger may switch its current on and off by itself.
+#: In these modes a charger may switch its current on and off by itself.
 PULSES = (ChargeMode.BATTERY_RECOVERY, ChargeMode.PRECHARGE)
-#: A BMU that counts must have moved a figure when this share of a whole charge has flowed.
+#: A counting BMU must have changed a figure once this share of a whole charge has flowed.
 MOVED_SHARE = 0.02
 
 
@@ -57,8 +57,10 @@ def amps_disagree(f: Facts) -> Cause | None:
 
 
 def _steady(f: Facts, name: str, now: float) -> float:
-    """The value; of a charger that wakes a pack with pulses its mean of the last seconds: a BMU that is late by half a
-    pulse would else contradict it all the time."""
+    """The value; while a charger wakes a pack with pulses, its mean over the last seconds.
+
+    Otherwise a BMU that lags by half a pulse would contradict the charger all the time.
+    """
     if f.reading is None or f.reading.charge_mode not in PULSES:
         return now
     return fmean([getattr(sample, name) for sample in f.memory.witnessed.trail] or [now])
@@ -78,8 +80,10 @@ def _likelier_wrong(charger_fits: bool, bmu_fits: bool, by: Cause) -> Cause | No
 
 
 def charger_frozen(f: Facts) -> Cause | None:
-    """FAULTS C20: its values stand still, and the battery's do not. Alone the one proves nothing: a good supply on a
-    flat cell may show the same digits for minutes."""
+    """FAULTS C20: its values stand still while the battery's move.
+
+    Standing still alone proves nothing: a good supply on a flat cell may show the same digits for minutes.
+    """
     still = f.memory.charger.still
     if still is None or f.now_s - still.t_s < STILL_S or f.pack_v is None or f.pack_a is None:
         return None
@@ -105,7 +109,7 @@ def charger_frozen_at_rest(f: Facts) -> Cause | None:
 
 
 def bmu_frozen(f: Facts) -> Cause | None:
-    """FAULTS B23, the mirror of `charger_frozen`: every word of the BMU stands still, though a charge goes in."""
+    """FAULTS B23, the mirror of `charger_frozen`: the BMU's whole report stands still, though a charge goes in."""
     frozen, session = f.memory.witnessed.frozen, f.memory.session
     if frozen is not None and FROZEN in f.raised:
         return Cause.of("bmu_still_frozen", lasted_s=f.now_s - frozen.t_s)

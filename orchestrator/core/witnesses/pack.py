@@ -1,24 +1,24 @@
-"""Whether the pack is the one that the policy is for, and whether it still holds its voltage."""
+"""Whether the pack is the one the policy is for, and whether it still holds its voltage."""
 
 from orchestrator.core.cells import chemistry
 from orchestrator.core.facts import Facts
 from orchestrator.model import Cause, State
 
-#: A pack that is charged may sink below its precharge voltage by this share, for the moment.
+#: A pack under charge may briefly sink below its precharge voltage by this share.
 MARGIN = 0.02
-#: A fall by this share within the trail's seconds, while no less current flows, is a cell or a contact that gives way.
+#: A fall by this share within the trail's seconds, while no less current flows, is a failing cell or contact.
 FALL = 0.05
-#: A fall that the charger sees less than this share of is a mistake of the BMU's.
+#: If the charger sees less than this share of a fall, it is a mistake of the BMU.
 SEEN_BY_BOTH = 0.5
-#: … no less than this share of what flowed.
+#: … no less than this share of the earlier current.
 SAME_CURRENT = 0.8
 
 
 def another_pack(f: Facts) -> Cause | None:
-    """FAULTS B25, P3: volts a cell, SOC and chemistry contradict each other.
+    """FAULTS B25, P3: volts per cell, SOC and chemistry contradict each other.
 
-    While it is charged, a voltage that is high for the SOC is the SOC's mistake: the voltage's own limit and the taper
-    end that charge. One that is low is another pack, or one with a dead cell, and would be overcharged.
+    During a charge, a voltage that is high for the SOC means that the SOC is wrong: the voltage limit and the taper end
+    that charge. A low one means another pack, or one with a dead cell, which would be overcharged.
     """
     pack = f.rules.policy.pack
     if f.pack_v is None or f.soc is None:
@@ -35,7 +35,7 @@ def another_pack(f: Facts) -> Cause | None:
 
 
 def collapsed(f: Facts) -> Cause | None:
-    """FAULTS B24: a cell that gives way under current takes its share of the voltage with it, and both see it."""
+    """FAULTS B24: a cell that fails under current takes its share of the voltage with it, and both witnesses see it."""
     if f.memory.state is not State.CHARGING or f.pack_v is None or f.pack_a is None or f.volts is None:
         return None
     rule, pack = f.rules.policy.precharge, f.rules.policy.pack

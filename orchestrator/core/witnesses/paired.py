@@ -3,7 +3,7 @@
 from orchestrator.core.facts import Facts
 from orchestrator.model import Cause
 
-#: Charger and BMU are read at different moments; this is far longer than both take to show a current that has begun.
+#: Charger and BMU are read at different moments; both take far less than this to show a current that has begun.
 PAIR_S = 3.0
 
 

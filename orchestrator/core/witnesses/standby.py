@@ -1,7 +1,7 @@
-"""Standby by both witnesses: no charger stands by while the BMU sees current flow into its pack.
+"""Standby by both witnesses: no charger is in standby while the BMU sees current flow into its pack.
 
-Proved is standby by two status replies, each asked for after the whole stop was handed to the port, with nothing else
-between them; and by the BMU, where it can be heard, with a value from after the stop.
+The proof is two status replies that show standby, each asked for after the whole stop was handed to the port, with
+nothing else between them; and, if the BMU can be heard, one of its values from after the stop.
 """
 
 from typing import TYPE_CHECKING
@@ -11,23 +11,23 @@ from orchestrator.model import Cause
 if TYPE_CHECKING:
     from orchestrator.core.facts import Facts
 
-#: Current into the pack of more than this is no offset of a measurement (FAULTS C29).
+#: More current than this into the pack is no offset of a measurement (FAULTS C29).
 CHARGING_A = 1.0
-#: For so long a BMU may still say what was: its own averaging. What lasts for longer counts as this much, so that it is
-#: forgotten again within half a minute.
+#: A BMU may report an earlier current for this long, because it averages. Anything longer counts as at most the second
+#: figure, so that it is forgotten within half a minute.
 UNORDERED_S, UNORDERED_MOST_S = 2.0, 6.0
 
-#: The fault of a BMU that has been found frozen.
+#: The fault of a BMU that was found frozen.
 FROZEN = "bmu_frozen"
 
 
 def sees_current(f: "Facts") -> bool:
-    """The BMU says, freshly, that current flows into its pack. One that is known to be frozen is no witness."""
+    """The BMU freshly reports that current flows into its pack. One known to be frozen is no witness."""
     return f.pack_a is not None and f.pack_a > CHARGING_A and FROZEN not in f.raised
 
 
 def proved(f: "Facts") -> bool:
-    """The only proof of standby that is taken."""
+    """The only proof of standby that is accepted."""
     known = f.memory.witnessed
     if len(known.proof) < 2 or known.stop_s is None or not f.standby:
         return False

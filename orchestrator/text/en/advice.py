@@ -85,7 +85,7 @@ ADVICE: Mapping[str, str] = {
     "suspended": "a gateway must not be suspended: switch that off in its operating system",
     "not_persisted": "make space, or mend the disk of the journal's directory",
     "internal": "this is a defect of the software: report it with the journal, then reset",
-    # once the charger stands by
+    # once the charger is in standby
     "stands_by_now": "the charger stands by now: have the cause repaired, then reset",
     # what a person does next
     "start": "start to go on",

@@ -1,4 +1,4 @@
-"""Why a bay is where it is, and what becomes of requests."""
+"""Why a bay is in its state, and the answers to requests."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ TEXTS: Mapping[str, str] = {
     "not_done": "not done: {problem}",
     "not_taken": "the disk has not taken it",
     "overtaken": "a stop came meanwhile: ask again if it is still wanted",
-    # where a bay without a charge is
+    # states of a bay without a charge
     "charger_offline": "the charger on {port} does not answer",
     "stopped_first": "the charger is being stopped before anything else",
     "runs_uncommanded": "the charger runs though it was not commanded to",
@@ -41,7 +41,7 @@ TEXTS: Mapping[str, str] = {
     "no_lasting_standby": "its status does not show a standby that lasts",
     "bmu_sees": "the BMU sees {pack_a:.1f} A",
     "bmu_not_heard": "the BMU is not heard",
-    # what the table of the status adds
+    # additions in the status table
     "cut_mains_of": "CUT THE MAINS of {bay}'s charger ({port}): {state}: {reason}",
     "cut_mains_of_stray": "CUT THE MAINS of the charger on {port}, which was {bay}'s: it may be running, nobody has seen "
     "that it stands by: {why}",
@@ -89,7 +89,7 @@ TEXTS: Mapping[str, str] = {
     "nothing_to_start": "nothing to start: {state}: {what}",
     "nothing_to_reset": "nothing to reset: {state}: {what}",
     "refused": "{fault}: {why}: {what}",
-    # what ends a fault, or stands in the way
+    # what ends a fault, or prevents that
     "needs_reset": "{request:word} is refused before a reset",
     "refused_while": "{request:word} is refused while it lasts",
     "refused_until": "{request:word} is refused until {until_at}, as long as what was seen counts",
@@ -108,7 +108,7 @@ TEXTS: Mapping[str, str] = {
     "clears_after": "clears by itself {wait_s:g} s after it is gone{strike}",
     "clears_in": "{gone}, clears by itself in {left_s} s{strike}",
     "strike": " ({number:nth} of {of} within an hour)",
-    # figures by themselves
+    # single figures
     "up_to": "up to {figure}",
     "down_to": "down to {figure}",
     "figure_c": "{value:.1f} °C",
@@ -116,13 +116,13 @@ TEXTS: Mapping[str, str] = {
     "figure_a": "{value:.2f} A",
     "figure_pct": "{value:.0f} %",
     "figure_k_per_min": "{value:.2f} K/min",
-    # a defect of our own
+    # our own defects
     "failed": "internal: {error}",
     "failed_stopping": "stopping: internal: {error}",
     "failed_uncontrollable": "CUT THE MAINS of this charger: this software has failed to judge the bay for "
     "{tried_s:.0f} s, and cannot verify the stop that it repeats ({error})",
     "failed_request": "internal error: {error}; this is a defect of the software; the charger is being stopped",
-    # what the last run has left
+    # left by the previous run
     "unfinished": "the last run of this service ended in mid-charge; its charger was stopped first when it began again",
     "fault_of_another_version": "{fault}",
     "ended_in_charge": "the last run ended in mid-charge: {why}",

@@ -1,4 +1,4 @@
-"""What codes mean: of the operating system, of SDO aborts and EMCY frames, of a line's settings."""
+"""The meaning of codes: operating system errors, SDO aborts, EMCY frames, line settings."""
 
 from collections.abc import Mapping
 
@@ -73,7 +73,7 @@ CODES: Mapping[str, str] = {
     "emcy_functions": "additional functions",
     "emcy_specific": "device-specific",
     "emcy_undocumented": "undocumented",
-    # how a serial line was set
+    # settings of a serial line
     "5 data bits": "5 data bits",
     "6 data bits": "6 data bits",
     "7 data bits": "7 data bits",
@@ -97,11 +97,11 @@ CODES: Mapping[str, str] = {
     "current_step": "current limit",
     "charge_mode": "charge mode",
     "connection": "battery connection",
-    # orders to it
+    # commands to it
     "set_limit": "set_limit",
     "set_mode": "set_mode",
     "set_precharge": "set_precharge",
-    # whom an NMT command was for
+    # the target of an NMT command
     "this_node": "this node",
     "all_nodes": "all nodes",
 }

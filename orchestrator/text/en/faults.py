@@ -1,4 +1,4 @@
-"""What is seen when a fault is raised: the evidence, with value, limit and place."""
+"""The evidence of each fault, with value, limit and place."""
 
 from collections.abc import Mapping
 
@@ -109,7 +109,7 @@ TEXTS: Mapping[str, str] = {
     "below_lowest_step": "{rule}; the lowest step of this charger is {lowest_a:g} A",
     "precharge_too_strong": "the pack {has|had} {pack_v:.2f} V and {needs|needed} precharge with at most {max_a:g} A{at}; the lowest step "
     "of this charger is {lowest_a:g} A",
-    # who else is on the bus
+    # others on the bus
     # the charge
     "precharge_no_rise": "the pack rose by {rise_v:.2f} V in {lasted_min:.1f} min, {expected_v:g} V were expected{at}",
     "precharge_too_long": "continuous precharge {has|had} taken {lasted_min:.1f} min and the pack {is|was} below {below_v:g} V{at}",

@@ -1,4 +1,4 @@
-"""What is wrong with a port, a bus, a device that answers badly, or who else is there."""
+"""Problems of ports and buses, devices that answer badly, and others on the line."""
 
 from collections.abc import Mapping
 
@@ -23,7 +23,7 @@ TEXTS: Mapping[str, str] = {
     "port_not_rs485": "{port}: its driver cannot switch the direction of an RS-485 line (rs485: kernel); use an adapter "
     "that switches by itself, with rs485: off",
     "port_failed": "{port}: cannot be opened ({error:word})",
-    # a charger that answers badly, or not at all
+    # a charger that answers badly or not at all
     "charger_no_reply": "{port}: no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + "
     "and −)",
     "charger_noise": "{port}: only broken frames come in: check shield, ground and termination of the cable, and 19200 "
@@ -38,7 +38,7 @@ TEXTS: Mapping[str, str] = {
     "line_discipline": "line discipline {number}",
     "program": "{name} (pid {pid})",
     "program_unknown": "an unknown program",
-    # what the interlock has held back
+    # frames that the interlock held back
     "no_command": "{command:word} {value} is not a command for a charger in {control:word} mode",
     "no_grant": "{command:word}: no fresh reading of charger, pack voltage and pack temperature",
     "not_on_disk": "{command:word}: it is not on disk that this charger may be running",
@@ -84,7 +84,7 @@ TEXTS: Mapping[str, str] = {
     "{command}",
     "can_passive": "the controller is error-passive: check cable, terminators and bit rate",
     "can_no_ack": "nobody acknowledges our frames: check the BMU's power, cable and bit rate",
-    # a BMU that does not answer, or that cannot be relied upon
+    # a BMU that does not answer or is unreliable
     "bmu_not_asked": "BMU 0x{node_id:02X} on {bus}: not asked yet",
     "bmu_stopped": "BMU 0x{node_id:02X} on {bus} does not answer: an NMT command has stopped it; NMT start wakes it",
     "bmu_cut_off": "BMU 0x{node_id:02X} on {bus} does not answer: {why}",
@@ -109,7 +109,7 @@ TEXTS: Mapping[str, str] = {
     "two_answers_elsewhere": "{field}: two answers to one request, which differ in {other}",
     "not_available": "not available",
     "a_refusal": "a refusal",
-    # what another CANopen master does
+    # actions of another CANopen master
     "master_reads": "another CANopen master reads 0x{index:04X}:{sub:02X}",
     "master_writes": "another CANopen master writes 0x{index:04X}:{sub:02X}",
     "master_started": "another CANopen master has started {whom:word} (NMT)",

@@ -1,4 +1,4 @@
-"""What the service says of itself: its disk, its guardian, its end, and what becomes of requests."""
+"""What the service reports about itself: its disk, its guardian, its end, and its answers to requests."""
 
 from collections.abc import Mapping
 
@@ -27,7 +27,7 @@ TEXTS: Mapping[str, str] = {
     "journal_hangs": "the journal has not been written for {lasted_s:.0f} s: its disk hangs",
     "journal_failed": "the journal cannot be written: {error:word}: {file}",
     "journal_again": "the journal is being written again",
-    # what it says on standard error
+    # its output on standard error
     "service_begins": "{station}: {bays} bays, control socket {socket}",
     "lines_left_out": "({lines} lines are left out here: nobody has read them in time)",
     "bay_begins": "{bay}: {state}: {reason}",
@@ -43,7 +43,7 @@ TEXTS: Mapping[str, str] = {
     "socket_failed": "the control socket {socket} cannot be opened: {error:word}",
     "files_limited": "at most {limit} files may be open at once, and this station needs {needed}: raise LimitNOFILE= of "
     "the unit, or ulimit -n",
-    # chargers that no bay has any more
+    # chargers that no longer belong to a bay
     "stray": "{bay} on {port}",
     "stray_found": "{bay} on {port}: the station file has no bay on this port, but its charger may be running: stopping it",
     "stray_verified": "{bay} on {port}: standby verified; see why the station file has no bay there",

@@ -1,4 +1,4 @@
-"""Single words that stand in parameters, how an advice goes with its evidence, and how lists are joined."""
+"""Single words used as parameters, how advice and evidence are combined, and how lists are joined."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ WORDS: Mapping[str, str] = {
     "boot_up": "boot-up",
     "stopped": "stopped",
     "pre_operational": "pre-operational",
-    # what a charge needs to know
+    # the values a charge needs
     "voltage": "voltage",
     "current": "current",
     "status": "status",
@@ -28,7 +28,7 @@ WORDS: Mapping[str, str] = {
     "nth_1": "1st",
     "nth_2": "2nd",
     "nth_3": "3rd",
-    # the charger's modes, orders and complaints
+    # the charger's modes, commands and error bits
     "manual": "manual",
     "automatic": "automatic",
     "run": "run",
@@ -54,7 +54,7 @@ FRAMES: Mapping[str, str] = {
     "list": ", ",
     "and": " and ",
     "then": "; ",
-    # when it is, or was, and the figures then and now
+    # present and past times, and the figures then and now
     "at": "at {raised_at}, {what}",
     "since": "since {since_at}",
     "was": "{was:and} at {since_at}",

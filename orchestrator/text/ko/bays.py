@@ -1,4 +1,4 @@
-"""Why a bay is where it is, and what becomes of requests."""
+"""Why a bay is in its state, and the answers to requests."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ TEXTS: Mapping[str, str] = {
     "not_done": "수행하지 않았습니다: {problem}",
     "not_taken": "디스크가 아직 받아들이지 않았습니다",
     "overtaken": "그 사이에 정지 요청이 있었습니다: 여전히 필요하면 다시 요청하십시오",
-    # where a bay without a charge is
+    # states of a bay without a charge
     "charger_offline": "{port}의 충전기가 응답하지 않습니다",
     "stopped_first": "다른 무엇보다 먼저 충전기를 정지하고 있습니다",
     "runs_uncommanded": "기동 명령이 없었는데 충전기가 동작합니다",
@@ -41,7 +41,7 @@ TEXTS: Mapping[str, str] = {
     "no_lasting_standby": "충전기의 상태가 지속되는 대기를 보이지 않습니다",
     "bmu_sees": "BMU에는 {pack_a:.1f} A가 보입니다",
     "bmu_not_heard": "BMU가 응답하지 않습니다",
-    # what the table of the status adds
+    # additions in the status table
     "cut_mains_of": "{bay}의 충전기({port})의 주전원을 차단하십시오: {state}: {reason}",
     "cut_mains_of_stray": "{bay}의 것이었던 {port}의 충전기의 주전원을 차단하십시오: 동작 중일 수 있으며 대기 상태가 확인되지 "
     "않았습니다: {why}",
@@ -89,7 +89,7 @@ TEXTS: Mapping[str, str] = {
     "nothing_to_start": "시작할 것이 없습니다: {state}: {what}",
     "nothing_to_reset": "리셋할 것이 없습니다: {state}: {what}",
     "refused": "{fault} 장애: {why}. {what}",
-    # what ends a fault, or stands in the way
+    # what ends a fault, or prevents that
     "needs_reset": "먼저 리셋하지 않으면 {request:word}할 수 없습니다",
     "refused_while": "이 상태가 계속되는 동안 {request:word}할 수 없습니다",
     "refused_until": "{until_at}까지 {request:word}할 수 없습니다. 확인된 내용이 그때까지 유효합니다",
@@ -108,7 +108,7 @@ TEXTS: Mapping[str, str] = {
     "clears_after": "해소되고 {wait_s:g} s 후에 스스로 해제됩니다{strike}",
     "clears_in": "{gone}, {left_s} s 후에 스스로 해제됩니다{strike}",
     "strike": "(1시간 내 {of}회 중 {number:nth}회째)",
-    # figures by themselves
+    # single figures
     "up_to": "최고 {figure}",
     "down_to": "최저 {figure}",
     "figure_c": "{value:.1f} °C",
@@ -116,13 +116,13 @@ TEXTS: Mapping[str, str] = {
     "figure_a": "{value:.2f} A",
     "figure_pct": "{value:.0f} %",
     "figure_k_per_min": "{value:.2f} K/min",
-    # a defect of our own
+    # our own defects
     "failed": "내부 에러: {error}",
     "failed_stopping": "정지하고 있습니다: 내부 에러: {error}",
     "failed_uncontrollable": "이 충전기의 주전원을 차단하십시오: 소프트웨어가 {tried_s:.0f} s 동안 이 베이를 판정하지 "
     "못했고, 반복하는 정지를 확인할 수 없습니다({error})",
     "failed_request": "내부 에러: {error}. 소프트웨어 결함입니다. 충전기를 정지하고 있습니다",
-    # what the last run has left
+    # left by the previous run
     "unfinished": "이 서비스의 지난 실행이 충전 중에 끝났습니다. 다시 시작할 때 먼저 충전기를 정지시켰습니다",
     "fault_of_another_version": "{fault}",
     "ended_in_charge": "지난 실행이 충전 중에 끝났습니다: {why}",

@@ -1,4 +1,4 @@
-"""What codes mean: of the operating system, of SDO aborts and EMCY frames, of a line's settings."""
+"""The meaning of codes: operating system errors, SDO aborts, EMCY frames, line settings."""
 
 from collections.abc import Mapping
 
@@ -73,7 +73,7 @@ CODES: Mapping[str, str] = {
     "emcy_functions": "추가 기능",
     "emcy_specific": "장치 고유",
     "emcy_undocumented": "규격에 없음",
-    # how a serial line was set
+    # settings of a serial line
     "5 data bits": "데이터 비트 5",
     "6 data bits": "데이터 비트 6",
     "7 data bits": "데이터 비트 7",
@@ -97,11 +97,11 @@ CODES: Mapping[str, str] = {
     "current_step": "전류 제한",
     "charge_mode": "충전 모드",
     "connection": "연결 상태",
-    # orders to it
+    # commands to it
     "set_limit": "전류 제한 설정",
     "set_mode": "충전 모드 설정",
     "set_precharge": "프리차지 설정",
-    # whom an NMT command was for
+    # the target of an NMT command
     "this_node": "이 노드",
     "all_nodes": "모든 노드",
 }

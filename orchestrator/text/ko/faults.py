@@ -1,4 +1,4 @@
-"""What is seen when a fault is raised: the evidence, with value, limit and place."""
+"""The evidence of each fault, with value, limit and place."""
 
 from collections.abc import Mapping
 
@@ -103,7 +103,7 @@ TEXTS: Mapping[str, str] = {
     "below_lowest_step": "{rule}. 이 충전기의 가장 낮은 단계는 {lowest_a:g} A입니다",
     "precharge_too_strong": "팩 전압이 {pack_v:.2f} V이므로 {max_a:g} A 이하의 프리차지가 {필요합니다|필요했습니다}{at}. 이 충전기의 가장 "
     "낮은 단계는 {lowest_a:g} A입니다",
-    # who else is on the bus
+    # others on the bus
     # the charge
     "precharge_no_rise": "팩 전압이 {lasted_min:.1f}분 동안 {rise_v:.2f} V 올랐습니다. {expected_v:g} V가 올라야 합니다{at}",
     "precharge_too_long": "연속 프리차지가 {lasted_min:.1f}분 걸렸는데 팩 전압이 아직 {below_v:g} V {아래입니다|아래였습니다}{at}",

@@ -1,4 +1,4 @@
-"""What limits the current, with its evidence and the line that says so."""
+"""What limits the current, with its evidence and the line that sets it."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ TEXTS: Mapping[str, str] = {
     "limit_unknown": "{quantity:word} 값을 알 수 없습니다, {place}",
     "limit_outside": "{value}: 정책의 표에 없는 값입니다, {place}",
     "limit_row": "{spans:and}: {allows}, {place}",
-    # a quantity with its value, and the row that it is in
+    # a quantity with its value, and the row it is in
     "value_temperature_c": "온도 {pack_c:.1f} °C",
     "value_soc_pct": "SOC {soc_pct:.0f} %",
     "value_soh_pct": "SOH {soh_pct:.0f} %",

@@ -1,4 +1,4 @@
-"""What is wrong with a port, a bus, a device that answers badly, or who else is there."""
+"""Problems of ports and buses, devices that answer badly, and others on the line."""
 
 from collections.abc import Mapping
 
@@ -21,7 +21,7 @@ TEXTS: Mapping[str, str] = {
     "port_not_rs485": "{port}: 드라이버가 RS-485 회선의 방향을 전환하지 못합니다(rs485: kernel). 스스로 전환하는 어댑터를 "
     "rs485: off로 사용하십시오",
     "port_failed": "{port}: 열 수 없습니다({error:word})",
-    # a charger that answers badly, or not at all
+    # a charger that answers badly or not at all
     "charger_no_reply": "{port}: 응답이 없습니다: 충전기의 전원과 케이블, 뒤바뀐 배선(RX와 TX, 또는 +와 −)을 확인하십시오",
     "charger_noise": "{port}: 깨진 프레임만 수신됩니다: 케이블의 차폐, 접지, 종단 저항과 19200 8N1을 확인하십시오",
     "charger_complains": "{port}: 에러 프레임으로만 응답합니다: 케이블의 차폐, 접지, 종단 저항을 확인하십시오",
@@ -34,7 +34,7 @@ TEXTS: Mapping[str, str] = {
     "line_discipline": "회선 규칙(line discipline) {number}",
     "program": "{name} (pid {pid})",
     "program_unknown": "알 수 없는 프로그램",
-    # what the interlock has held back
+    # frames that the interlock held back
     "no_command": "'{command:word} {value}' 명령은 {control:word} 모드의 충전기에 보낼 수 없습니다",
     "no_grant": "{command:word}: 충전기, 팩 전압, 팩 온도의 최신 값이 없습니다",
     "not_on_disk": "{command:word}: 이 충전기가 동작할 수 있다는 사실이 디스크에 기록되지 않았습니다",
@@ -78,7 +78,7 @@ TEXTS: Mapping[str, str] = {
     "복구합니다: {command}",
     "can_passive": "컨트롤러가 error-passive입니다: 케이블, 종단 저항, 비트 레이트를 확인하십시오",
     "can_no_ack": "프레임에 대한 수신 확인이 없습니다: BMU의 전원, 케이블, 비트 레이트를 확인하십시오",
-    # a BMU that does not answer, or that cannot be relied upon
+    # a BMU that does not answer or is unreliable
     "bmu_not_asked": "{bus}의 BMU 0x{node_id:02X}: 아직 요청하지 않았습니다",
     "bmu_stopped": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 않습니다: NMT 명령으로 정지되었습니다. NMT start로 깨우십시오",
     "bmu_cut_off": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 않습니다: {why}",
@@ -102,7 +102,7 @@ TEXTS: Mapping[str, str] = {
     "two_answers_elsewhere": "{field}: 한 요청에 두 응답이 왔고 {other} 값이 서로 다릅니다",
     "not_available": "값 없음",
     "a_refusal": "거부",
-    # what another CANopen master does
+    # actions of another CANopen master
     "master_reads": "다른 CANopen 마스터가 0x{index:04X}:{sub:02X}을(를) 읽습니다",
     "master_writes": "다른 CANopen 마스터가 0x{index:04X}:{sub:02X}에 씁니다",
     "master_started": "다른 CANopen 마스터가 {whom:word}을(를) 시작시켰습니다(NMT)",

@@ -1,4 +1,4 @@
-"""What the service says of itself: its disk, its guardian, its end, and what becomes of requests."""
+"""What the service reports about itself: its disk, its guardian, its end, and its answers to requests."""
 
 from collections.abc import Mapping
 
@@ -27,7 +27,7 @@ TEXTS: Mapping[str, str] = {
     "journal_hangs": "저널이 {lasted_s:.0f} s 동안 기록되지 않았습니다: 디스크가 멈추어 있습니다",
     "journal_failed": "저널을 기록할 수 없습니다: {error:word}: {file}",
     "journal_again": "저널이 다시 기록되고 있습니다",
-    # what it says on standard error
+    # its output on standard error
     "service_begins": "{station}: 베이 {bays}개, 제어 소켓 {socket}",
     "lines_left_out": "(제때 읽지 않아 {lines}줄을 생략했습니다)",
     "bay_begins": "{bay}: {state}: {reason}",
@@ -45,7 +45,7 @@ TEXTS: Mapping[str, str] = {
     "socket_failed": "제어 소켓 {socket}을(를) 열 수 없습니다: {error:word}",
     "files_limited": "동시에 열 수 있는 파일이 최대 {limit}개인데 이 스테이션에는 {needed}개가 필요합니다: unit의 "
     "LimitNOFILE= 또는 ulimit -n을 올리십시오",
-    # chargers that no bay has any more
+    # chargers that no longer belong to a bay
     "stray": "{port}의 {bay}",
     "stray_found": "{port}의 {bay}: 스테이션 파일에 이 포트의 베이가 없으나 충전기가 동작 중일 수 있어 정지하고 있습니다",
     "stray_verified": "{port}의 {bay}: 대기 상태를 확인했습니다. 스테이션 파일에 베이가 없는 이유를 확인하십시오",

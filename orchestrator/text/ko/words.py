@@ -1,4 +1,4 @@
-"""Single words that stand in parameters, how an advice goes with its evidence, and how lists are joined."""
+"""Single words used as parameters, how advice and evidence are combined, and how lists are joined."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ WORDS: Mapping[str, str] = {
     "boot_up": "boot-up",
     "stopped": "stopped",
     "pre_operational": "pre-operational",
-    # what a charge needs to know
+    # the values a charge needs
     "voltage": "전압",
     "current": "전류",
     "status": "상태",
@@ -28,7 +28,7 @@ WORDS: Mapping[str, str] = {
     "nth_1": "1",
     "nth_2": "2",
     "nth_3": "3",
-    # the charger's modes, orders and complaints
+    # the charger's modes, commands and error bits
     "manual": "수동",
     "automatic": "자동",
     "run": "기동",
@@ -54,7 +54,7 @@ FRAMES: Mapping[str, str] = {
     "list": ", ",
     "and": ", ",
     "then": ". ",
-    # when it is, or was, and the figures then and now
+    # present and past times, and the figures then and now
     "at": "{raised_at}: {what}",
     "since": "{since_at}부터",
     "was": "{since_at}에는 {was:and}",
