@@ -340,7 +340,7 @@ LATCHES = (
                                  poll_t_s=NOW_S), faults(charger_silent=DEBOUNCED), **UNPLUGGED),
     Edge(charger_silent, None, faults(charger_silent=DEBOUNCED), STOPPING, **UNPLUGGED),
     Edge(charger_silent, None, {}, STOPPING, **UNPLUGGED),
-    Edge(emergency, FaultMemory(raised_s=ago(9), clean_s=NOW_S), BOTH, IDLE, **DEPARTED),
+    Edge(emergency, FaultMemory(raised_s=ago(9), clean_s=NOW_S, unheard=True), BOTH, IDLE, **DEPARTED),
     Edge(bmu_silent, None, BOTH, IDLE, **DEPARTED),
 )  # fmt: skip
 

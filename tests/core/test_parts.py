@@ -26,6 +26,7 @@ from orchestrator.core.memory import (
     names,
     paths,
     side_by_side,
+    telling,
     value_of,
     with_values,
 )
@@ -114,6 +115,18 @@ def test_each_field_of_a_record_is_classed_once(record: type[Any]) -> None:
 
 def test_no_two_parts_have_a_field_of_the_same_name() -> None:
     assert max(Counter(names()).values()) == 1
+
+
+@pytest.mark.parametrize(
+    ("state", "told"),
+    [
+        (State.STOPPING, {"battery.full_pct"}),
+        (State.HELD, {"witnessed.sees", "stop.unverified", "battery.full_pct"}),
+        (State.CHARGING, {"witnessed.proved", "stage.ran", "sequence.command", "battery.full_pct"}),
+    ],
+)
+def test_what_tells_two_memories_in_a_state_apart(state: State, told: set[str]) -> None:
+    assert set(telling(state)) == told
 
 
 def test_what_the_policy_alone_keeps() -> None:
