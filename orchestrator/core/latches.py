@@ -10,12 +10,12 @@ which is judged last; all other rows continue.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from orchestrator.core.drain import DRAIN, drained
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import FAULTS, RANK, ROW, Clear, FaultRow
 from orchestrator.core.memory import FaultMemory
+from orchestrator.core.parts import changed
 from orchestrator.core.safestop import verified
 from orchestrator.core.states import UNVERIFIED
 from orchestrator.model import Cause, Effect, State
@@ -46,7 +46,7 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
                 seen = row.check(f)
             except Exception as error:  # noqa: BLE001 - one row must not take the others, nor the machine, with it
                 why = Cause.of("not_judged", fault=row.id, error=repr(error))
-                f = replace(f, broken=(*f.broken, why))
+                f = changed(f, broken=(*f.broken, why))
         if seen is not None:
             after[row.id] = _present(row, fault or FaultMemory(), seen, f, passed_s)
         elif fault is not None:
@@ -88,9 +88,12 @@ def _present(row: FaultRow, fault: FaultMemory, seen: Cause, f: Facts, passed_s:
     polls, poll_t_s = _polls(fault, f, holds=True)
     # Time before the first look does not count: the condition may have begun just now.
     seen_s = drained(fault.seen_s, passed_s, holds=True) if fault.present else fault.seen_s
-    fault = replace(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
     if fault.raised_s is not None:
-        return replace(fault, now=seen, worst=_worst(row, seen, fault.worst, fault.cause or seen))
+        worst = _worst(row, seen, fault.worst, fault.cause or seen)
+        return changed(
+            fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None, now=seen, worst=worst
+        )
+    fault = changed(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
     if seen_s < row.for_s or polls < row.polls:
         return fault
     strikes = fault.strikes
@@ -98,7 +101,7 @@ def _present(row: FaultRow, fault: FaultMemory, seen: Cause, f: Facts, passed_s:
         strikes = (*(t for t in strikes if f.now_s - t < STRIKES_S), f.now_s)
     latched = row.clear is Clear.RESET or len(strikes) > len(BACKOFF_S)
     worst = _worst(row, seen, None, seen)
-    return replace(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes, now=seen, worst=worst)
+    return changed(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes, now=seen, worst=worst)
 
 
 def _worst(row: FaultRow, seen: Cause, worst: float | None, first: Cause) -> float | None:
@@ -128,7 +131,7 @@ def _absent(row: FaultRow, fault: FaultMemory, f: Facts, passed_s: float) -> Fau
     if row.past is not None and cause is not None and f.memory.state in UNVERIFIED and verified(f):
         cause = row.past(cause, row.for_s + clean_s - fault.raised_s)
     unheard = f.silent or f.reading is None
-    return replace(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause, now=None, unheard=unheard)
+    return changed(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause, now=None, unheard=unheard)
 
 
 def clear_after_s(row: FaultRow, fault: FaultMemory) -> float | None:
@@ -148,7 +151,8 @@ def effect(name: str, fault: FaultMemory) -> Effect:
 def raised(faults: Mapping[str, FaultMemory]) -> list[tuple[str, FaultMemory]]:
     """The active faults, the most dangerous first."""
     live = [(name, fault) for name, fault in faults.items() if fault.raised_s is not None]
-    live.sort(key=lambda item: (-effect(*item), RANK[item[0]]))
+    if len(live) > 1:
+        live.sort(key=lambda item: (-effect(*item), RANK[item[0]]))
     return live
 
 

@@ -40,7 +40,10 @@ class Cause:
 
     def param(self, name: str) -> Any:  # noqa: ANN401 - as `params`
         """The parameter with this name; None if there is none."""
-        return next((value for known, value in self.params if known == name), None)
+        for known, value in self.params:  # many are asked for in each decision: no generator
+            if known == name:
+                return value
+        return None
 
     def with_(self, advice: str = "", **params: Any) -> "Cause":  # noqa: ANN401 - as `params`
         """The same cause with more parameters, and with this advice."""
