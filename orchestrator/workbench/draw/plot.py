@@ -174,8 +174,8 @@ def _finish(axes: Sequence[Axes], runs: Sequence[Run]) -> None:
     for ax in curves:
         for from_s, to_s in differences([run.trail.spans for run in runs]):
             ax.axvspan(from_s / 3600, to_s / 3600, color="#000000", alpha=0.05, linewidth=0)
-    curves[-1].set_ylim(-0.3, 4.3)
-    curves[-1].set_yticks(range(5))
+    curves[-1].set_ylim(0.7, 5.3)
+    curves[-1].set_yticks(range(1, 6))
     band.set_ylim(-len(runs), 0)
     band.set_yticks([])
     band.grid(visible=False)
