@@ -64,6 +64,15 @@ def test_an_end_before_anything_has_begun_is_a_good_one(tmp_path: Path) -> None:
         assert guardian.ended() == 0
 
 
+def stops_whatever_its_log_does(tmp_path: Path, log: int) -> None:
+    with running_chargers(tmp_path) as (bench,), watched(tmp_path, stderr=log) as guardian:
+        guardian.hand_over(bench.name, bench.fd)
+        guardian.beat()
+        guardian.link.close()
+        assert guardian.ended() == ACTED
+        assert not bench.runs
+
+
 def test_a_log_that_nobody_reads_does_not_hold_a_stop_up(tmp_path: Path) -> None:
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -71,12 +80,7 @@ def test_a_log_that_nobody_reads_does_not_hold_a_stop_up(tmp_path: Path) -> None
         while True:
             os.write(writer, bytes(4096))
     os.set_blocking(writer, True)
-    with running_chargers(tmp_path) as (bench,), watched(tmp_path, stderr=writer) as guardian:
-        guardian.hand_over(bench.name, bench.fd)
-        guardian.beat()
-        guardian.link.close()
-        assert guardian.ended() == ACTED
-        assert not bench.runs
+    stops_whatever_its_log_does(tmp_path, writer)
     os.close(reader)
     os.close(writer)
 
@@ -84,12 +88,7 @@ def test_a_log_that_nobody_reads_does_not_hold_a_stop_up(tmp_path: Path) -> None
 def test_a_log_that_is_gone_does_not_hold_a_stop_up(tmp_path: Path) -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    with running_chargers(tmp_path) as (bench,), watched(tmp_path, stderr=writer) as guardian:
-        guardian.hand_over(bench.name, bench.fd)
-        guardian.beat()
-        guardian.link.close()
-        assert guardian.ended() == ACTED
-        assert not bench.runs
+    stops_whatever_its_log_does(tmp_path, writer)
     os.close(writer)
 
 
