@@ -6,6 +6,7 @@ countdowns change with every look, and a fault is the same for as long as its id
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from orchestrator.core.acts import act
@@ -13,7 +14,8 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear, FaultRow
 from orchestrator.core.latches import effect, raised
 from orchestrator.core.memory import FaultMemory, Memory
-from orchestrator.model import ActiveFault, Cause, State
+from orchestrator.core.parts import made
+from orchestrator.model import Account, ActiveFault, Cause, State
 
 #: The present value of each quantity used in evidence, by its parameter name.
 LIVE: Mapping[str, Callable[[Facts], float | None]] = {
@@ -35,7 +37,28 @@ def active_faults(
 
     `at_rest`: the charger is in standby, verified.
     """
-    return tuple(_active(memory, now_s, bay, name, f, at_rest=at_rest) for name, _ in raised(memory.faults))
+    return tuple(
+        made(
+            ActiveFault,
+            name,
+            effect(name, fault),
+            fault.raised_s or 0.0,
+            partial(account, memory, now_s, bay, name, f, at_rest=at_rest),
+            fault.clean_s,
+            fault.cause,
+        )
+        for name, fault in raised(memory.faults)
+    )
+
+
+def account(memory: Memory, now_s: float, bay: str, name: str, f: Facts | None, *, at_rest: bool) -> Account:
+    """What people read of this active fault; the parameters are those of `active_faults`."""
+    row, fault = ROW[name], memory.faults[name]
+    return Account(
+        evidence(row, fault, at_rest=at_rest),
+        act(memory, now_s, bay, name, out=memory.state is State.UNCONTROLLABLE and not at_rest),
+        times(row, fault, f),
+    )
 
 
 def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cause:
@@ -84,17 +107,3 @@ def _worse(row: FaultRow, fault: FaultMemory, then: list[tuple[str, float]]) -> 
     if fault.worst is None or len(then) != 1 or fault.worst == then[0][1]:
         return None
     return Cause.of("down_to" if row.lowest else "up_to", figure=_figures([(then[0][0], fault.worst)])[0])
-
-
-def _active(memory: Memory, now_s: float, bay: str, name: str, f: Facts | None, *, at_rest: bool) -> ActiveFault:
-    row, fault = ROW[name], memory.faults[name]
-    return ActiveFault(
-        id=name,
-        effect=effect(name, fault),
-        cause=evidence(row, fault, at_rest=at_rest),
-        since_s=fault.raised_s or 0.0,
-        gone_s=fault.clean_s,
-        next=act(memory, now_s, bay, name, out=memory.state is State.UNCONTROLLABLE and not at_rest),
-        when=times(row, fault, f),
-        raised=fault.cause,
-    )

@@ -156,5 +156,5 @@ def _command(f: Facts, setpoint: Setpoint, faults: tuple[ActiveFault, ...]) -> t
     memory = f.memory
     if memory.state in ENERGISED:
         return next_command(f, setpoint)
-    news = any(fault.since_s == f.now_s and fault.effect >= Effect.STOP for fault in faults)
+    news = [fault for fault in faults if fault.since_s == f.now_s and fault.effect >= Effect.STOP]
     return (STOP if news or must_stop(f, memory.state) else None), memory.sequence

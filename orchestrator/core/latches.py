@@ -25,6 +25,7 @@ CLEAN_S = 10.0
 BACKOFF_S = (10.0, 60.0, 300.0)
 #: Strikes are forgotten after this long; one more strike than there are backoffs latches.
 STRIKES_S = 3600.0
+UNKNOWN = FaultMemory()
 
 
 def update(f: Facts) -> Mapping[str, FaultMemory]:
@@ -48,7 +49,7 @@ def update(f: Facts) -> Mapping[str, FaultMemory]:
                 why = Cause.of("not_judged", fault=row.id, error=repr(error))
                 f = changed(f, broken=(*f.broken, why))
         if seen is not None:
-            after[row.id] = _present(row, fault or FaultMemory(), seen, f, passed_s)
+            after[row.id] = _present(row, fault or UNKNOWN, seen, f, passed_s)
         elif fault is not None:
             kept = _absent(row, fault, f, passed_s)
             if kept is not None:
@@ -62,14 +63,14 @@ def _is_looked_for(row: FaultRow, fault: FaultMemory, state: State, *, battery_r
 
 
 def _looked_for(state: State, known: Mapping[str, FaultMemory]) -> Sequence[FaultRow]:
-    """The rows looked for in this state, and the known ones, in table order."""
+    """The rows looked for in this state, in table order, and before them the other known ones."""
     usual = _USUAL.get(state)
     if usual is None or usual[0] is not FAULTS:
         rows = tuple(row for row in FAULTS if state in row.where)
         usual = _USUAL[state] = FAULTS, rows, frozenset(row.id for row in rows)
     if known.keys() <= usual[2]:
         return usual[1]
-    return [row for row in FAULTS if state in row.where or row.id in known]
+    return [*(ROW[name] for name in known if name not in usual[2]), *usual[1]]
 
 
 #: The rows of each state and their ids, and the table that they come from.
@@ -93,15 +94,16 @@ def _present(row: FaultRow, fault: FaultMemory, seen: Cause, f: Facts, passed_s:
         return changed(
             fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None, now=seen, worst=worst
         )
-    fault = changed(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
     if seen_s < row.for_s or polls < row.polls:
-        return fault
+        return changed(fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None)
     strikes = fault.strikes
     if row.clear is Clear.BACKOFF:
         strikes = (*(t for t in strikes if f.now_s - t < STRIKES_S), f.now_s)
     latched = row.clear is Clear.RESET or len(strikes) > len(BACKOFF_S)
-    worst = _worst(row, seen, None, seen)
-    return changed(fault, raised_s=f.now_s, cause=seen, latched=latched, strikes=strikes, now=seen, worst=worst)
+    return changed(
+        fault, present=True, seen_s=seen_s, polls=polls, poll_t_s=poll_t_s, clean_s=None, raised_s=f.now_s, cause=seen,
+        latched=latched, strikes=strikes, now=seen, worst=_worst(row, seen, None, seen),
+    )  # fmt: skip
 
 
 def _worst(row: FaultRow, seen: Cause, worst: float | None, first: Cause) -> float | None:

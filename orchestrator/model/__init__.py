@@ -22,6 +22,7 @@ from orchestrator.model.charger import (
 )
 from orchestrator.model.decision import (
     STANDBY,
+    Account,
     ActiveFault,
     Alarm,
     CurrentStep,
@@ -37,6 +38,7 @@ from orchestrator.model.decision import (
 __all__ = [
     "STANDBY",
     "STOP",
+    "Account",
     "Action",
     "ActiveFault",
     "Alarm",

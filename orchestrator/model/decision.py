@@ -1,8 +1,9 @@
 """The core's input and output: a snapshot in, a decision out."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 from orchestrator.model.battery import BatteryLink, BatteryReading
 from orchestrator.model.cause import Cause
@@ -80,24 +81,44 @@ class Alarm(IntEnum):
     DANGER = 2  #: its charger is, or may be, out of control
 
 
+class Account(NamedTuple):
+    """What people read of an active fault, in parts."""
+
+    cause: Cause  #: what, with its evidence as it is now, or as it was if it is gone, and what to do
+    next: Cause | None = None  #: what ends it: a command, a time, or what must happen first
+    when: tuple[tuple[str, Any], ...] = ()  #: its times and figures, as parameters of a cause
+
+
 @dataclass(frozen=True, slots=True)
 class ActiveFault:
-    """One active fault as shown in status and journal."""
+    """One active fault, as the decisions use it and as status and journal show it.
+
+    What people read of it is worked out when somebody reads it: decisions are many, and readers few.
+    """
 
     id: str
     effect: Effect
-    cause: Cause  #: what, with its evidence as it is now, or as it was if it is gone, and what to do
     since_s: float
+    account: Callable[[], Account] = field(repr=False, compare=False)
     gone_s: float | None = None  #: since when what raised it is gone; None: it is there
-    next: Cause | None = None  #: what ends it: a command, a time, or what must happen first
     raised: Cause | None = None  #: the evidence alone, as it was when it was raised
-    when: tuple[tuple[str, Any], ...] = ()  #: its times and figures, as parameters of a cause
+
+    @property
+    def cause(self) -> Cause:
+        """As in `Account`."""
+        return self.account().cause
+
+    @property
+    def next(self) -> Cause | None:
+        """As in `Account`."""
+        return self.account().next
 
     @property
     def told(self) -> Cause:
-        """All that a person reads of it: `cause` with its times and figures, and what ends it."""
-        then = {"then": self.next} if self.next is not None else {}
-        return self.cause.with_("", **dict(self.when), **then)
+        """All that a person reads of it: its cause with its times and figures, and what ends it."""
+        account = self.account()
+        then = {"then": account.next} if account.next is not None else {}
+        return account.cause.with_("", **dict(account.when), **then)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, fields, is_dataclass, replace
+from dataclasses import asdict, fields, is_dataclass
 
 from orchestrator.config.station import BayConfig
 from orchestrator.core.memory import Memory, side_by_side
@@ -89,8 +89,8 @@ def _gist(decision: Decision) -> tuple[object, ...]:
     return decision.state, decision.step, decision.setpoint, decision.alarm
 
 
-def _fault_fields(fault: ActiveFault, event: str, language: str) -> dict[str, object]:
-    said = {"text": say(fault.cause, language), "cause": plain(fault.cause)}
+def _fault_fields(fault: ActiveFault, event: str, cause: Cause, language: str) -> dict[str, object]:
+    said = {"text": say(cause, language), "cause": plain(cause)}
     return {"id": fault.id, "event": event, "effect": fault.effect.name, **said}
 
 
@@ -99,11 +99,11 @@ def _fault_lines(before: Decision | None, now: Decision, language: str) -> Itera
     new = {fault.id: fault for fault in now.faults}
     for name, fault in new.items():
         if name not in old or old[name].effect is not fault.effect:
-            yield "fault", _fault_fields(fault, "raised", language)
+            yield "fault", _fault_fields(fault, "raised", fault.cause, language)
     for name, fault in old.items():
         if name not in new:  # what it was; what was seen of it last, nobody may have written down
             was = (fault.raised or fault.cause).with_(past=True)
-            yield "fault", _fault_fields(replace(fault, cause=was), "cleared", language)
+            yield "fault", _fault_fields(fault, "cleared", was, language)
 
 
 def _session_lines(before: Decision | None, now: Decision, language: str, clock: WallClock | None) -> Iterator[Line]:

@@ -5,7 +5,7 @@ import pytest
 from orchestrator.core.alarm import alarm
 from orchestrator.core.faults import FAULTS, Clear, FaultRow
 from orchestrator.core.operator import RESET, STOPPED
-from orchestrator.model import ActiveFault, Alarm, Cause, Request, State
+from orchestrator.model import Account, ActiveFault, Alarm, Cause, Request, State
 from orchestrator.text.catalogue import advise
 from tests.core.bays import IN, held, idle, running_at_the_start, tripped
 from tests.core.said import reason_of
@@ -36,7 +36,8 @@ def test_who_holds_a_bay_knows_of_it(hold: Cause, level: Alarm) -> None:
 
 @pytest.mark.parametrize("row", FAULTS, ids=[row.id for row in FAULTS])
 def test_a_fault_that_waits_for_a_start_wants_attention(row: FaultRow) -> None:
-    level = alarm(remembering(state=State.HELD, hold=STOPPED), (ActiveFault(row.id, row.effect, Cause(row.id), 0.0),))
+    fault = ActiveFault(row.id, row.effect, 0.0, lambda: Account(Cause(row.id)))
+    level = alarm(remembering(state=State.HELD, hold=STOPPED), (fault,))
     waits = Alarm.ATTENTION if row.clear is Clear.OPERATOR else Alarm.NONE
     assert level is (Alarm.DANGER if row.id == "port_locked" else waits)
 

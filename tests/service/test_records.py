@@ -13,6 +13,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.states import QUIET
 from orchestrator.model import (
     STOP,
+    Account,
     Action,
     ActiveFault,
     BatteryLink,
@@ -42,7 +43,7 @@ from tests.service.bench import Bench, the_bay
 BAY = the_bay()
 NO_BATTERY = cause("no battery")
 IDLE = Decision(State.IDLE, NO_BATTERY)
-HOT = ActiveFault("hot_trip", Effect.TRIP, cause("the pack has 56.0 °C"), 3.0)
+HOT = ActiveFault("hot_trip", Effect.TRIP, 3.0, lambda: Account(cause("the pack has 56.0 °C")))
 
 
 def both(text: str, name: str = "reason") -> dict[str, object]:
@@ -91,8 +92,8 @@ def test_a_change_of_state_of_order_and_of_step() -> None:
 
 
 def test_a_fault_comes_gets_worse_and_goes() -> None:
-    warm = replace(HOT, effect=Effect.PAUSE, cause=cause("the pack has 46 °C"))
-    hotter = replace(warm, cause=cause("the pack has 47 °C"))
+    warm = replace(HOT, effect=Effect.PAUSE, account=lambda: Account(cause("the pack has 46 °C")))
+    hotter = replace(warm, account=lambda: Account(cause("the pack has 47 °C")))
     fields = {"id": "hot_trip", "event": "raised", "effect": "PAUSE", **both("the pack has 46 °C", "text")}
     assert kinds(IDLE, replace(IDLE, faults=(warm,))) == {"fault": fields}
     assert kinds(replace(IDLE, faults=(warm,)), replace(IDLE, faults=(hotter,))) == {}

@@ -11,6 +11,7 @@ from orchestrator.config.shipped import shipped_dir
 from orchestrator.core.facts import CHARGER_STALE_S, SLOW_STALE_S
 from orchestrator.core.memory import Memory
 from orchestrator.model import (
+    Account,
     ActiveFault,
     Alarm,
     BatteryLink,
@@ -48,8 +49,8 @@ CHARGING = Decision(
         ActiveFault(
             "noisy_line",
             Effect.WARN,
-            Cause.of("noisy_line", bad_pct=9.4, limit_pct=5.0).with_("noisy_line", effect="WARN"),
-            since_s=90.0,
+            90.0,
+            lambda: Account(Cause.of("noisy_line", bad_pct=9.4, limit_pct=5.0).with_("noisy_line", effect="WARN")),
         ),
     ),
     session=Session(10.0, elapsed_s=90.0, charged_ah=0.5),

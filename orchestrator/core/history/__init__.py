@@ -32,22 +32,23 @@ def update_history(f: Facts, passed_s: float) -> Facts:
 def entered(f: Facts, state: State, cause: Cause) -> Memory:
     """The memory when `state` has just been entered, for this cause: everything that counts from there."""
     memory, before = f.memory, f.memory.state
+    begins, flowed = state in ENERGISED, before in ENERGISED
+    told = charger.told_anew(memory.charger)
     begun = changed(
         memory,
         state=state,
         since_s=f.now_s,
         stage=stage.EMPTY,
         stop=safestop.update(f, state, cause),
-        charger=charger.told_anew(memory.charger),
+        charger=told,
+        sequence=memory.sequence if begins else sequence.ends(memory.sequence),
+        session=session.begins(f, state, before) if begins else memory.session,
     )
-    if state not in ENERGISED:
-        return changed(begun, sequence=sequence.ends(memory.sequence))
-    begun = changed(begun, session=session.begins(f, state, before))
-    if before in ENERGISED:
+    if flowed or not begins:
         return begun
     return changed(
         begun,
-        charger=charger.begins(f, begun.charger),
+        charger=charger.begins(f, told),
         sequence=sequence.begins(memory.sequence, f.now_s),
         battery=battery.begins(memory.battery),
     )

@@ -112,6 +112,8 @@ def _trail(f: "Facts", trail: tuple[Sample, ...]) -> tuple[Sample, ...]:
 def _frozen(f: "Facts", frozen: Frozen | None) -> Frozen | None:
     """Tracked during a charge; a report found frozen stays so, at rest too, until a value changes."""
     session, battery = f.memory.session, f.snapshot.battery
+    if frozen is None and (session is None or not f.energised):
+        return None
     words = tuple([word.value if word is not None else None for word in WORDS(battery)])
     if frozen is not None and frozen.words == words:
         return frozen if f.energised or FROZEN in f.raised else None

@@ -8,6 +8,7 @@ from orchestrator.config.amperes import ranges, row_a, tables
 from orchestrator.config.station import Limits
 from orchestrator.core.cells import chemistry
 from orchestrator.core.memory import Memory
+from orchestrator.core.parts import changed, made
 from orchestrator.core.rules import Rules
 from orchestrator.model import BatteryLink, BatteryReading, BatteryStatus, Measurement
 from orchestrator.model.cause import said
@@ -25,6 +26,8 @@ NEAR_CELL_V = 0.02
 WITHIN_V, WITHIN_A = 0.5, 0.5
 
 Link = Mapping[str, Any]
+
+SILENT, UNKNOWN = BatteryReading(), BatteryLink()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +51,18 @@ class Shown:
     def at(self, now_s: float, memory: Memory, charger_a: float) -> tuple[BatteryReading, BatteryLink]:
         """The reading and the link at this moment."""
         values = {**self.values, "current_a": charger_a + self.differs_a}
-        reading = BatteryReading(
+        reading = changed(
+            SILENT,
             **{
-                name: Measurement(value, now_s - (OLD_S if name in self.old else FRESH_S))
+                name: made(Measurement, value, now_s - (OLD_S if name in self.old else FRESH_S))
                 for name, value in values.items()
-            }
+            },
         )
         link: dict[str, Any] = {
             "online": True, "boots": memory.battery.boots, "heartbeat_s": HEARTBEAT_S, "heartbeat_t_s": now_s - FRESH_S,
             **self.link(now_s, memory),
         }  # fmt: skip
-        return (reading if link.pop("speaks", True) else BatteryReading()), BatteryLink(**link)
+        return (reading if link.pop("speaks", True) else SILENT), changed(UNKNOWN, **link)
 
 
 def _fixed(**link: Any) -> Callable[[float, Memory], Link]:  # noqa: ANN401 - fields of BatteryLink

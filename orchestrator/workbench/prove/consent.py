@@ -47,11 +47,12 @@ def waits_for_a_start(taken: Taken) -> str | None:
     A battery that leaves clears the faults that its leaving explains, and no others.
     """
     before, after, asked = taken.before, taken.after, taken.snapshot.request
-    gone = _waiting(before) - _waiting(after)
-    left = {name for name in gone if ROW[name].departs and not taken.snapshot.battery_link.online}
+    waiting = _waiting(after)
+    gone = _waiting(before) - waiting
+    left = {name for name in gone if ROW[name].departs and not taken.snapshot.battery_link.online} if gone else gone
     if gone > left and asked not in (Request.START, Request.RESET):
         return f"{min(gone - left)} has gone without a person"
-    waits = bool(after.operator.hold or _waiting(after))
+    waits = bool(after.operator.hold or waiting)
     if waits and after.state in READY:
         return f"{after.state}, though a person must start"
     if before.state is State.HELD and after.state in READY and not (asked is Request.START or left):

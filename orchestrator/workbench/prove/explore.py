@@ -11,6 +11,7 @@ from typing import Any, Protocol, TypeVar
 
 from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory
+from orchestrator.core.parts import made
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause, Decision, Snapshot, State
@@ -81,17 +82,13 @@ class Walk:
         except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
             stays = Decision(place.memory.state, Cause.of("failed", error=f"{type(error).__name__}: {error}"))
             return Taken(move, now_s, snapshot, place.memory, stays, place.memory, self.rules, error=repr(error))
-        return Taken(move, now_s, snapshot, place.memory, decision, after, self.rules)
+        return made(Taken, move, now_s, snapshot, place.memory, decision, after, self.rules, "")
 
-    def broken(self, taken: Taken) -> Iterator[tuple[str, str]]:
+    def broken(self, taken: Taken) -> Sequence[tuple[str, str]]:
         """The name of each property that the decision violates, and how."""
         if taken.error:
-            yield "no exception", f"decide() raised {taken.error}"
-            return
-        for rule in self.properties:
-            wrong = rule.check(taken)
-            if wrong is not None:
-                yield rule.name, wrong
+            return [("no exception", f"decide() raised {taken.error}")]
+        return [(rule.name, wrong) for rule in self.properties if (wrong := rule.check(taken)) is not None]
 
     def news(self, taken: Taken) -> Iterator[tuple[str, str]]:
         """Violations that have not been reported before."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.parts import changed, made
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import AT_WORK, ENERGISED
 from orchestrator.model import (
@@ -95,6 +96,10 @@ def _switched(said: Said, _: float) -> None:
 
 _STANDBY = _reading(operation=Operation.STOPPED, charge_mode=ChargeMode.FULL, current_a=0.0)
 
+#: What inputs are made from, because that is much faster than by their constructors.
+READING = ChargerReading(0.0, 0.0, 0.0, None, None, None, None, None, None)
+LINK, SNAPSHOT, RESUME = ChargerLink(), Snapshot(), Command(Action.RESUME)
+
 #: How each class of charger differs from one that has just obeyed.
 CHARGERS: Mapping[str, Charger] = {
     "obeys": _reading(),
@@ -179,10 +184,13 @@ class StationInputs:
         amps = said.reading.pop("current_a")
         said.reading.pop("full_a")
         age_s = said.reading.pop("age_s")
-        reading = None if said.silent else ChargerReading(t_s=now_s - age_s, current_a=amps, **said.reading)
+        reading = None if said.silent else changed(READING, t_s=now_s - age_s, current_a=amps, **said.reading)
         values, link = shown.at(now_s, memory, 0.0 if reading is None else amps)
-        link_of_charger = ChargerLink(**said.link)
-        return Snapshot(reading, link_of_charger, values, link, move.request, move.internal, ending=move.ending)
+        link_of_charger = changed(LINK, **said.link)
+        return changed(
+            SNAPSHOT, charger=reading, charger_link=link_of_charger, battery=values, battery_link=link,
+            request=move.request, internal=move.internal, ending=move.ending,
+        )  # fmt: skip
 
     def _obedient(self, shown: Shown, now_s: float, memory: Memory) -> Said:
         """A charger that has just carried out the last decision's command."""
@@ -197,10 +205,10 @@ class StationInputs:
         limit_a = self.rules.steps_a[int(values["current_step"])] * shown.takes
         charging = values["charge_mode"] is ChargeMode.CHARGE
         flows_a = 0.0 if not values["operation"] else limit_a if charging else min(PRECHARGE_A, limit_a)
-        sent = command if memory.sequence.resumed and command is not None else Command(Action.RESUME)
+        sent = command if memory.sequence.resumed and command is not None else RESUME
         return Said(
             {**values, "current_a": flows_a, "full_a": limit_a, "age_s": READ_AGE_S},
-            {"online": True, "sent": Sent(sent, now_s - SENT_AGE_S), "stop_sent_s": now_s - SENT_AGE_S},
+            {"online": True, "sent": made(Sent, sent, now_s - SENT_AGE_S), "stop_sent_s": now_s - SENT_AGE_S},
         )
 
 
