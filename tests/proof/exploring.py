@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from orchestrator.config.load import load_policy
+from orchestrator.config.shipped import shipped_names
 from orchestrator.core.machine import TABLE
 from orchestrator.core.rules import Rules
 from orchestrator.model import ControlMode, State
@@ -17,8 +18,8 @@ from orchestrator.workbench.prove.properties import PROPERTIES
 from tests.proof.report import say
 from tests.proof.virtual_service import station
 
-#: Shipped policies for the tests' 48 V station; the other two only need other limits.
-POLICIES = ("li-ion-48v", "lfp-48v", "long-life-48v", "li-ion-24v")
+#: All shipped policies.
+POLICIES = shipped_names("policies")
 #: Left out of the quick form: the neighbours of every bound. Its jumps still pass every kind of timer.
 NEIGHBOURS = ("just above", "just below")
 QUICK_JUMPS_S = {ControlMode.MANUAL: (3.1, 70.1, 1200.1, 108000.1), ControlMode.AUTOMATIC: (3.1, 108000.1)}

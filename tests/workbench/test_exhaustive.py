@@ -8,7 +8,9 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.config.load import load_policy
+from orchestrator.config.shipped import shipped_names
 from orchestrator.core.rules import Rules
+from orchestrator.model import State
 from orchestrator.workbench import processes
 from orchestrator.workbench.prove import exhaustive
 from orchestrator.workbench.prove.exhaustive import bay_of, bays_in, here
@@ -49,6 +51,17 @@ def test_a_broken_policy_gets_its_story(policy: str, monkeypatch: pytest.MonkeyP
     assert name in explorer.found
     *_, last = str(explorer.found[name]).splitlines()
     assert last.strip() == ending
+
+
+@pytest.mark.parametrize("policy", shipped_names("policies"))
+def test_a_shipped_policy_ends_every_charge_and_wakes_every_pack(policy: str) -> None:
+    """Whatever its hold at the top, and wherever its stages of precharge meet."""
+    walk = walk_on(small(Rules.of(bay_of(load_policy(f"policies/{policy}.yaml")))))
+    explorer = Explorer(walk, here(walk))
+    explorer.run(most=110)
+    assert State.CHARGING in {node.place.memory.state for node in explorer.nodes}
+    reaches(explorer)
+    assert not explorer.found
 
 
 def test_bays_that_differ_in_wiring_only_are_proved_once() -> None:

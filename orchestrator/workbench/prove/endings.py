@@ -3,19 +3,20 @@
 One row an ending; `lasting.py` follows every memory that was explored there.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
-from orchestrator.core.states import AT_REST, ENERGISED
+from orchestrator.core.rules import Rules
+from orchestrator.core.states import AT_REST, ENERGISED, PRECHARGING
 from orchestrator.model import STOP, Request, State
 from orchestrator.workbench.prove.story import TICK_S, Taken
 
 #: What backoffs, hysteresis and the qualification take together, at most.
 RECOVERY_S = 600.0
-#: A taper and the hold after it take no longer, in what ships.
-HELD_S = 3600.0
+#: A taper takes no longer; the hold after it takes as long as the policy says.
+TAPER_S = 3600.0
 #: In this time a pack comes from any temperature to any other without looking like a broken sensor.
 SLOWLY_S = 30.0
 #: Faults that a charge brings with it have shown by then.
@@ -35,6 +36,11 @@ class Ending:
     request: Request | None = None
     first_s: float = TICK_S  #: after so long the surroundings begin
     asked_of: Callable[[Memory], bool] = lambda _: True
+    holds: bool = False  #: the policy's hold at the top comes on top of `within_s`
+
+    def limit_s(self, rules: Rules) -> float:
+        """It must be reached within this time."""
+        return self.within_s + (rules.policy.finish.hold_min * 60 if self.holds else 0.0)
 
 
 def _stands_by(taken: Taken) -> bool:
@@ -52,17 +58,17 @@ def _called(taken: Taken) -> bool:
 
 
 def _charges(taken: Taken) -> bool:
-    return _runs(taken, State.CHARGING)
+    return _runs(taken, {State.CHARGING})
 
 
 def _wakes(taken: Taken) -> bool:
-    return _runs(taken, State.PRECHARGE_PULSE)
+    return _runs(taken, PRECHARGING)
 
 
-def _runs(taken: Taken, state: State) -> bool:
+def _runs(taken: Taken, states: Container[State]) -> bool:
     """Long enough for any fault to show."""
     since_s = taken.after.since_s or taken.now_s
-    runs = taken.after.state is state and taken.after.stage.ran and taken.now_s - since_s > STEADY_S
+    runs = taken.after.state in states and taken.after.stage.ran and taken.now_s - since_s > STEADY_S
     return runs or _exchanged(taken)
 
 
@@ -112,7 +118,7 @@ ENDINGS: tuple[Ending, ...] = (
     Ending("wakes", "a deeply discharged pack is precharged",
            "obeys", "deeply discharged", RECOVERY_S, _wakes, first_s=SLOWLY_S, asked_of=_free),
     Ending("full", "a charge is over when the pack is full, or at its target",
-           "obeys", "full", HELD_S, _full, asked_of=_charging),
+           "obeys", "full", TAPER_S, _full, asked_of=_charging, holds=True),
     Ending("ends", "a charge that leads nowhere is ended by a limit",
            "obeys", "healthy", 76 * 3600.0, _ended, first_s=SLOWLY_S, asked_of=_energised),
 )  # fmt: skip

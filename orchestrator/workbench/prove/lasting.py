@@ -55,6 +55,7 @@ def _keep(explorer: Explorer, nodes: Sequence[Node], found: Iterable[Sequence[Br
 def _missed(walk: Walk, which: int, places: Sequence[Place]) -> list[Broken]:
     """The first place that does not end so, and what is broken on the way.
 
+    Steps may be longer than what is left of the time: then what counts is the last step at which it had not ended.
     Most ways soon lead to where one from another place has been, and from there on are the same.
     """
     ending = ENDINGS[which]
@@ -66,18 +67,18 @@ def _missed(walk: Walk, which: int, places: Sequence[Place]) -> list[Broken]:
             continue
         moves: list[Move] = []
         passed: dict[object, float] = {}
-        latest_s = place.now_s + ending.first_s + ending.within_s
-        state, end_s = place.memory.state, inf
+        latest_s = place.now_s + ending.first_s + ending.limit_s(walk.rules)
+        state, before_s, end_s = place.memory.state, place.now_s, inf
         for taken in lasting(walk, place, first):
             moves.append(taken.move)
             found += [(name, text, number, [*moves]) for name, text in walk.news(taken)]
             state, key = taken.after.state, details(taken.after)
-            end_s = taken.now_s + (0.0 if ending.reached(taken) else left_s.get(key, inf))
+            end_s = before_s if ending.reached(taken) else taken.now_s + left_s.get(key, inf)
             if end_s <= latest_s or taken.now_s > latest_s:
                 break
-            passed[key] = taken.now_s
+            passed[key] = before_s = taken.now_s
         if end_s > latest_s:
-            text = f"{ending.about}: not within {ending.within_s:g} s, but {state}"
+            text = f"{ending.about}: not within {ending.limit_s(walk.rules):g} s, but {state}"
             return [*found, (ending.name, text, number, moves)]
         left_s |= {key: max(end_s - passed_s, left_s.get(key, 0.0)) for key, passed_s in passed.items()}
     return found
