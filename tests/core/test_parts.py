@@ -4,7 +4,7 @@ import ast
 import pickle
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import FrozenInstanceError, fields, replace
+from dataclasses import FrozenInstanceError, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from orchestrator.core.memory import (
     value_of,
     with_values,
 )
-from orchestrator.core.parts import Kind, changed, event, made, unclassed
+from orchestrator.core.parts import Kind, changed, event, made, measured, total, unclassed
 from orchestrator.model import Session, Snapshot, State
 from tests.core.bays import IN
 from tests.core.world import World
@@ -141,6 +141,32 @@ def test_every_value_has_one_kind() -> None:
 
 
 # --- frozen -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("declared", "kind"), [(event, Kind.EVENT), (total, Kind.TOTAL), (measured, Kind.MEASURED)])
+def test_a_field_declares_its_kind(declared: Any, kind: Kind) -> None:
+    assert declared(3.0).default == 3.0
+    assert declared(3.0).metadata == {"kind": kind, "by_policy": False, "tells": frozenset()}
+    if kind is not Kind.TOTAL:
+        more = {"by_policy": True, "tells": frozenset({State.IDLE})}
+        assert declared(3.0, **more).metadata == {"kind": kind, **more}
+
+
+def test_a_record_of_a_new_class_is_made_and_changed() -> None:
+    @dataclass(frozen=True, slots=True)
+    class Pair:
+        one: int
+        other: str = ""
+
+    pair = made(Pair, 1, "x")
+    assert (pair, type(pair)) == (Pair(1, "x"), Pair)
+    assert changed(pair, one=2) == Pair(2, "x") != pair
+
+    @dataclass(frozen=True, slots=True)
+    class Other(Pair):
+        pass
+
+    assert changed(Other(1), one=2) == Other(2)  # a class whose first record is made by a change
 
 
 def test_nothing_can_be_changed() -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import termios
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any
 import pytest
 
 from orchestrator.lastresort import guardian, lastport
-from orchestrator.lastresort.contactors import Contactors
+from orchestrator.lastresort.contactors import HANGS, Contactors
 from orchestrator.lastresort.descriptors import Turns, room
 from orchestrator.lastresort.guardian import ACTED, BEAT, ENDS, PORT, Guardian
 from orchestrator.lastresort.lastline import ROUND_S, RUNS, SILENT
@@ -74,6 +75,32 @@ def test_without_a_thread_a_contactor_opens_all_the_same(monkeypatch: pytest.Mon
     contactors = Contactors()
     contactors.open("bay-1", lambda: "open")
     assert contactors.became == {"bay-1": "open"}
+
+
+def test_a_contactor_is_opened_once_at_a_time_and_waited_for() -> None:
+    contactors, goes_on, opened = Contactors(), threading.Event(), list[str]()
+
+    def slowly() -> str:
+        opened.append("bay-1")
+        goes_on.wait(10)
+        return "open"
+
+    for _ in range(2):
+        contactors.open("bay-1", slowly)
+    began_s = time.monotonic()
+    contactors.wait(0.05)
+    assert 0.05 <= time.monotonic() - began_s < 5
+    assert (contactors.became, opened) == ({"bay-1": HANGS}, ["bay-1"])
+    goes_on.set()
+    contactors.wait(5)
+    assert contactors.became == {"bay-1": "open"}
+    assert time.monotonic() - began_s < 5  # it ends with the answer, not with the time
+
+    def opens_again() -> bool:
+        contactors.open("bay-1", lambda: "open again")
+        return contactors.became == {"bay-1": "open again"}
+
+    wait_until(opens_again)
 
 
 @pytest.mark.parametrize("error", [PermissionError(errno.EPERM, "no"), ValueError("not allowed to raise it")])

@@ -14,7 +14,7 @@
 import json
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import update_wrapper
 from inspect import isgeneratorfunction
 from math import inf
@@ -46,11 +46,16 @@ def _plain(val: str | bytes, config: pytest.Config | None) -> str:
 
 collecting._ascii_escaped_by_config = _plain
 
-#: Test file → the module its tests start as a process.
-ELSEWHERE: Mapping[str, str] = {
-    f"tests/guardian/test_guardian{part}.py": "orchestrator/lastresort/guardian.py"
-    for part in ("", "_contactors", "_messages", "_signals")
-}
+#: Test file → the modules that run in the process that its tests start.
+ELSEWHERE: Mapping[str, Sequence[str]] = {
+    **{
+        f"tests/guardian/test_guardian{part}.py": ("orchestrator/lastresort/guardian.py",)
+        for part in ("", "_messages", "_signals")
+    },
+    "tests/guardian/test_guardian_contactors.py": (
+        "orchestrator/lastresort/guardian.py", "orchestrator/lastresort/contactors.py"
+    ),
+}  # fmt: skip
 #: A longer test is slow, measured with mutmut's trampolines in the code.
 QUICK_S = 0.3
 #: A longer one waits for something the mutant prevents.
@@ -129,9 +134,9 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_teardown(item: pytest.Item) -> None:
-    module = ELSEWHERE.get(item.nodeid.partition("::")[0])
-    if module and os.environ.get("MUTANT_UNDER_TEST") == "stats":
-        from mutmut.state import state  # only mutmut itself sets that variable
+    for module in ELSEWHERE.get(item.nodeid.partition("::")[0], ()):
+        if os.environ.get("MUTANT_UNDER_TEST") == "stats":
+            from mutmut.state import state  # only mutmut itself sets that variable
 
-        mutants = json.loads(Path(f"{module}.meta").read_text(encoding="utf-8"))["exit_code_by_key"]
-        state()._stats |= {name.rpartition("__mutmut_")[0] for name in mutants}
+            mutants = json.loads(Path(f"{module}.meta").read_text(encoding="utf-8"))["exit_code_by_key"]
+            state()._stats |= {name.rpartition("__mutmut_")[0] for name in mutants}
