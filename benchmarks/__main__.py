@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from benchmarks import decoding, footprint, laststop, latency, reaction, simulating, startup, stepping
+from benchmarks import can_reads, decoding, footprint, laststop, latency, reaction, simulating, startup, stepping
 from benchmarks.effort import Effort
 from benchmarks.report import Result, machine, table, write_json
 
@@ -16,6 +16,7 @@ PARTS: Mapping[str, Callable[[Effort], Iterator[Result]]] = {
     "laststop": laststop.measure,
     "start": startup.measure,
     "footprint": footprint.measure,
+    "can": can_reads.measure,
     "step": stepping.measure,
     "decoder": decoding.measure,
     "simulate": simulating.measure,

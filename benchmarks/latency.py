@@ -16,7 +16,7 @@ from benchmarks.report import Goal, Result, Series
 from benchmarks.stations import Controllers, Station, module, one_station, plant, wait_until_charging
 
 BAYS = 16
-WARM_C, HOT_C = 42.0, 45.0
+WARM_C, HOT_C = 44.0, 45.0
 GAP_S = (0.15, 0.45)
 #: Every stop is handed over long before this.
 AFTER_S = 1.0

@@ -6,6 +6,7 @@ import platform
 import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from math import ceil, inf, isfinite
 from pathlib import Path
 
@@ -64,7 +65,7 @@ class Goal:
         if self.p99 is not None:
             parts.append(f"p99 ≤ {_figure(self.p99)} {unit}")
         if self.share is not None:
-            parts.append(f"≤ 1/{1 / self.share:.0f} of it")
+            parts.append(f"≤ {Fraction(self.share).limit_denominator(10)} of it")
         return ", ".join(parts)
 
 

@@ -20,12 +20,13 @@ ROOT = Path(__file__).resolve().parent.parent
         ("step", "step(), charging"),
         ("decoder", "decoder, clean frames, one a read"),
         ("simulate", "simulate, a charge of 4 h"),
+        ("can", "CAN thread, a read of 960/s, socketcan"),
     ],
 )
 def test_a_quick_part_prints_a_table_and_writes_the_figures(part: str, row: str, tmp_path: Path) -> None:
     figures = tmp_path / "figures.json"
     command = [sys.executable, "-m", "benchmarks", "--quick", "--only", part, "--json", str(figures)]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=True)
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=True)
     assert row in run.stdout
     document = json.loads(figures.read_text(encoding="utf-8"))
     (result,) = (result for result in document["results"] if result["what"] == row)
@@ -53,6 +54,10 @@ def test_runs_without_an_answer_count_as_the_slowest() -> None:
     assert (never.median, never.p99, never.n) == (None, None, 8)
     assert Series("naive", [1.0, 2.0], missing=1).median == 2.0
     assert Series("ours", []).median is None
+
+
+def test_a_goal_may_be_any_share_of_what_is_beside_it() -> None:
+    assert [Goal(share=share).text("µs") for share in (0.5, 0.8)] == ["≤ 1/2 of it", "≤ 4/5 of it"]
 
 
 @pytest.mark.parametrize(

@@ -61,6 +61,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "gpiod": ("link.gpio",),
     "jinja2": ("workbench.draw.page",),
     "matplotlib": ("workbench.draw.plot", "workbench.draw.tradeoff"),
+    "msgpack": ("link.can_socket",),
     "pygraphviz": ("workbench.draw.drawing",),
     "rich": ("demo",),
     "serial": ("link.serial",),
@@ -261,7 +262,7 @@ HELP = frozenset({"add_argument", "add_parser"})
 SAID = frozenset({
     ("core.machine", " is not possible in "),  # an error of the program
     ("devices.bus_load", ""),  # warnings of `check`: about a file
-    ("link.can", "Transmit buffer full"),  # python-can's own words
+    ("link.can_driver", "Transmit buffer full"),  # python-can's own words
     ("link.can_gate", ""),  # why a frame of ours is none: an error of the program
     ("link.can_text", "ip link set "),  # a command
     ("service.sentences", ""),  # what the second format said

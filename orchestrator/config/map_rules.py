@@ -9,9 +9,15 @@ from orchestrator.protocol.objects import READING_FIELDS, ObjectEntry, Sweep, Tp
 
 SIZES = (1, 2, 4)  #: possible bytes in an expedited SDO answer of this BMU (CANopen manual §3.2)
 TPDO_BYTES = 8  #: in one CAN frame
-#: Without these no charge can be supervised. Those in FAST can stop one, so every sweep must read them.
-FAST = ("voltage_v", "current_a", "temperature_c", "status")
-REQUIRED = (*FAST, "soc_pct", "soh_pct")
+#: What can stop a charge, and the sweeps that read it often enough.
+STOPPING = {
+    "voltage_v": (Sweep.FAST,),
+    "current_a": (Sweep.FAST,),
+    "temperature_c": (Sweep.FAST, Sweep.MEDIUM),
+    "status": (Sweep.FAST,),
+}
+#: Without these no charge can be supervised.
+REQUIRED = (*STOPPING, "soc_pct", "soh_pct")
 
 Objects = tuple[ObjectEntry, ...]
 
@@ -83,8 +89,9 @@ def _required(objects: Objects) -> Problems:
     for name in REQUIRED:
         if name not in sweeps:
             yield "objects", f"no object holds {name}; without it no charge can be supervised"
-        elif name in FAST and sweeps[name][1] is not Sweep.FAST:
-            yield f"objects[{sweeps[name][0]}].sweep", f"must be fast, because {name} can stop a charge"
+        elif sweeps[name][1] not in (often := STOPPING.get(name, Sweep)):
+            allowed = " or ".join(often)
+            yield f"objects[{sweeps[name][0]}].sweep", f"must be {allowed}, because {name} can stop a charge"
 
 
 def _tpdos(tpdos: tuple[TpdoEntry, ...], objects: Objects) -> Problems:

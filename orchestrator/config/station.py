@@ -49,7 +49,7 @@ class BatteryConfig:
     node_id: int = key("the BMU's CANopen node id: its board switch + 0x10", ge=1, le=127)
     map: ObjectMap = key("the object map: a shipped name or a path")
     sweep_s: float = key(
-        "how often volts, amps, status and temperature are read", unit="s", ge=0.02, le=0.5, default=0.05
+        "how often volts, amps and status are read during a charge", unit="s", ge=0.02, le=0.5, default=0.05
     )
     sdo_timeout_s: float = key("an SDO answer that takes longer counts as none", unit="s", ge=0.05, le=0.5, default=0.3)
     heartbeat_s: float | None = key(

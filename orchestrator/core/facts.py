@@ -31,6 +31,8 @@ CHARGER_STALE_S = 1.5
 FAST_STALE_S = 1.5
 #: The objects read once a second: three readings.
 SLOW_STALE_S = 3.0
+#: A BMU that answers has reported voltage, current, status or temperature within this time.
+QUIET_S = 0.6
 #: Right after its boot a BMU reports what its memory held, not what it measured.
 SETTLE_S = 1.0
 #: Standby may show this much: the resolution and offset of a charger's current measurement.
@@ -130,6 +132,13 @@ class Facts:
     def silent(self) -> bool:
         """The BMU reports nothing by which a charge is supervised."""
         return self.pack_v is None and self.temperature_c is None and self.status is None
+
+    @property
+    def quiet(self) -> bool:
+        """None of these arrived lately: if one is too old, the BMU is silent, though the others are not too old yet."""
+        battery = self.snapshot.battery
+        often = (battery.voltage_v, battery.current_a, battery.status, battery.temperature_c)
+        return self.now_s - max((one.t_s for one in often if one is not None), default=-inf) > QUIET_S
 
     @property
     def just_booted(self) -> bool:

@@ -1,7 +1,7 @@
 """One BMU on a CAN bus, without I/O: frames and the time go in, requests come out, `view` is the present knowledge.
 
-Fast objects are read every sweep, slow ones once a second; one request in flight (`sdo_client.py` rejects late
-answers), the next as soon as answer and bus budget allow. A silent node is queried twice a second.
+The bus's budget decides how often each object is read. One request is in flight (`sdo_client.py` rejects late
+answers), the next as soon as answer and budget allow. A silent node is queried twice a second.
 """
 
 from collections.abc import Callable
@@ -9,6 +9,7 @@ from functools import partial
 from math import inf
 
 from orchestrator.config.station import BatteryConfig
+from orchestrator.devices.attention import Attention
 from orchestrator.devices.battery_view import BatteryView
 from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup
 from orchestrator.devices.bus_budget import BusBudget
@@ -40,7 +41,7 @@ TOGGLE = 0x80  #: the alternating bit of a node-guarding answer; a heartbeat has
 
 
 class BatteryNode:
-    """A BMU. Everything but `view` belongs to the thread of its bus.
+    """A BMU. Everything but `view` and `attend` belongs to the thread of its bus.
 
     `view` is replaced as a whole; `on_change()` is called after each replacement with news (a heartbeat is not news).
     """
@@ -52,6 +53,7 @@ class BatteryNode:
         self._config = config
         self._bus = bus
         self._plan = ReadPlan(config, budget)
+        self._attention = Attention(self._plan)
         self._client = SdoClient(config.sdo_timeout_s)
         self._setup = BmuSetup(config)
         self._health = NodeHealth()
@@ -70,9 +72,8 @@ class BatteryNode:
             heartbeat_cob_id(self.node_id): self._on_heartbeat,
             emergency_cob_id(self.node_id): self._on_emergency,
         }
-        if self._config.tpdo_s is not None:
-            for tpdo in self._config.map.tpdos:
-                handlers[tpdo_cob_id(tpdo.number, self.node_id)] = partial(self._on_tpdo, tpdo)
+        for tpdo in self._config.map.tpdos if self._config.tpdo_s is not None else ():
+            handlers[tpdo_cob_id(tpdo.number, self.node_id)] = partial(self._on_tpdo, tpdo)
         return handlers
 
     @property
@@ -85,7 +86,10 @@ class BatteryNode:
         """The present reading and link. May be called from any thread."""
         return self._view.current
 
-    # --- what the bus calls -------------------------------------------------------------------------------------------
+    def attend(self, *, closely: bool) -> None:
+        """From the next turn on, watch the node closely, or as one at rest. May be called from any thread."""
+        self._attention.wanted = closely
+        self.next_due_s = -inf
 
     def on_frame(self, cob_id: int, data: bytes, now_s: float) -> None:
         """Handle a frame with one of `cob_ids`, not sent by us."""
@@ -103,10 +107,8 @@ class BatteryNode:
     def turn(self, now_s: float, send: Send) -> None:
         """Do what is due: give up overdue requests, detect silence, send the next request by `send(cob_id, data)`."""
         self._watch(now_s)
-        if self._client.pending is None:
-            self.next_due_s = self._requester.ask(now_s, send, online=self._view.link.online)
-        if self._client.pending is not None:
-            self.next_due_s = self._client.deadline_s
+        self._attention.follow(self._view.amps)
+        self.next_due_s = self._requester.ask(now_s, send, online=self._view.link.online)
         if self._view.link.online:
             self.next_due_s = min(self.next_due_s, self._answer_s + ANSWER_LIMIT_S)
         self._publish()
@@ -116,8 +118,6 @@ class BatteryNode:
         self.next_due_s = self._requester.fail(now_s)
         self._view.set(online=False, problem=problem)
         self._publish()
-
-    # --- silence ------------------------------------------------------------------------------------------------------
 
     def _watch(self, now_s: float) -> None:
         asked = self._client.pending
@@ -140,8 +140,6 @@ class BatteryNode:
         if self.trouble is not None:
             return Cause.of("bmu_cut_off", node_id=self.node_id, bus=self._bus, why=self.trouble)
         return self._health.silence(self.node_id, self._bus, self._config.sdo_timeout_s)
-
-    # --- frames -------------------------------------------------------------------------------------------------------
 
     def _on_request(self, data: bytes, now_s: float) -> None:
         """Handle another master's request to the node."""
@@ -175,21 +173,23 @@ class BatteryNode:
     def _accept(self, reply: SdoValue | SdoWritten | SdoAbort, now_s: float) -> None:
         self._answer_s = now_s
         self._requester.hurry()
-        self._view.set(online=True, problem=None)
+        if not self._view.link.online or self._view.link.problem is not None:
+            self._view.set(online=True, problem=None)
         if self._others.active:
             self._others.ours_answered(self._client.asked_s)
         if self._client.writing:
             self._configured(now_s, written=isinstance(reply, SdoWritten))
             return
-        if (reply.index, reply.sub) == HEARTBEAT:  # its period was read back
+        polled = self._plan.get((reply.index, reply.sub))
+        if polled is None:  # the heartbeat's period was read back
             if isinstance(reply, SdoValue) and (found := self._setup.checked(reply.value)):
                 self._view.set(heartbeat_set=found, heartbeat_set_t_s=now_s)
             return
-        polled = self._plan[reply.index, reply.sub]
         if isinstance(reply, SdoAbort):
             polled.abort = reply
         elif isinstance(reply, SdoValue):
             self._view.measured(polled.from_sdo(reply, self._client.asked_s))
+        self.next_due_s = min(self._requester.due_s(now_s), now_s + ANSWER_LIMIT_S)
         if self._view.link.abort or polled.abort:
             abort = next((polled.abort for polled in self._plan.objects if polled.abort), None)
             self._view.set(abort=abort.cause if abort else None, abort_code=abort.code if abort else 0)
@@ -239,8 +239,7 @@ class BatteryNode:
         values = None if self._setup.tpdos_changed else self._plan.from_tpdo(tpdo, data, now_s)
         if values is None:
             self._view.dropped()
-            return
-        for fields in values:
+        for fields in values or ():
             self._view.measured(fields)
 
     def _publish(self) -> None:

@@ -80,6 +80,11 @@ class BmuSetup:
         self._odd = 0
         self._heard = self._rearm = False
 
+    @property
+    def settled(self) -> bool:
+        """Whether nothing is left to be written, sent or read back."""
+        return not (self._left or self.start_due or self.check_due)
+
     def next_write(self, now_s: float) -> TimerWrite | None:
         """The next write; None if nothing is left or it is too early to try again."""
         return self._left[0] if self._left and now_s >= self._retry_s else None

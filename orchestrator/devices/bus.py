@@ -4,15 +4,19 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from functools import partial
+from math import ceil, floor
 from typing import Protocol
 
 from orchestrator.devices.battery import BatteryNode
+from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.errors import LinkError
 from orchestrator.model import Cause
 from orchestrator.protocol.sdo import NMT_COB_ID
 
+#: Frames that one turn may send, however late it is: SocketCAN's transmit queue takes 10.
+MOST_AT_ONCE = 8
 REOPEN_S = 1.0  #: pause before a failed bus is reopened
-TICK_S = 0.1  #: longest wait for a frame, and so until `close()` is noticed
+IDLE_S = 0.1  #: longest wait for a frame, and so until `close()` is noticed
 CLOSE_S = 3.0  #: slcan sleeps 2 s when it opens
 STALL_S = 0.5  #: without a turn for this long the loop hangs; five ticks
 
@@ -32,8 +36,11 @@ class CanPort(Protocol):
     def close(self) -> None:
         """Never raises."""
 
-    def receive(self, timeout_s: float) -> None:
-        """Dispatch one frame, if one arrives in time; LinkError if the bus is broken."""
+    def receive(self, timeout_s: float, pause_s: float = 0.0) -> None:
+        """Dispatch the frames that arrive, waiting up to `timeout_s` for one; LinkError if the bus is broken.
+
+        For the first `pause_s` nobody waits for a frame: what arrives in that time may be taken together.
+        """
 
     def send(self, cob_id: int, data: bytes) -> None:
         """LinkError if the bus is broken, RefusedError for a frame that may not be sent."""
@@ -42,13 +49,18 @@ class CanPort(Protocol):
 class BatteryBus:
     """One bus with its BMUs. `clock` gives monotonic seconds."""
 
-    def __init__(self, port: CanPort, nodes: Sequence[BatteryNode], clock: Callable[[], float]) -> None:
+    def __init__(
+        self, port: CanPort, nodes: Sequence[BatteryNode], budget: BusBudget, clock: Callable[[], float]
+    ) -> None:
         self._port = port
+        self._budget = budget  # the one that the nodes share
         self._nodes = tuple(nodes)
         self._clock = clock
         self._closing = threading.Event()
         self._open = False
         self._trouble: Cause | None = None
+        self._busy = False  # something was sent or received: more will follow soon
+        self._sent = 0  # frames, in this turn
         self._turn_s = clock()
         self._thread = threading.Thread(target=self._run, name=f"can-{port.name}", daemon=True)
         for node in self._nodes:
@@ -91,24 +103,43 @@ class BatteryBus:
 
     def _turn(self) -> None:
         now_s = self._turn_s = self._clock()
-        due_s = now_s + TICK_S
-        for node in self._nodes:
+        due_s = self._take_turns(now_s)
+        # Waits end at ticks only: what is due between two ticks waits for the later one.
+        each_s = self._budget.tick_s
+        tick_s = floor(now_s / each_s + 1.0) * each_s
+        wait_s = (tick_s if due_s <= tick_s else ceil(due_s / each_s) * each_s) - now_s
+        pause_s, self._busy = (tick_s - now_s if self._busy else 0.0), False
+        self._port.receive(wait_s, pause_s)
+        if self._port.trouble != self._trouble:
+            self._trouble = self._port.trouble
+            for node in self._nodes:
+                node.trouble = self._trouble
+
+    def _take_turns(self, now_s: float) -> float:
+        """Let the nodes do what is due, and return when the next of them is due."""
+        due_s, self._sent = now_s + IDLE_S, 0
+        for number, node in enumerate(self._nodes):
             if node.next_due_s <= now_s:
+                if self._sent >= MOST_AT_ONCE:
+                    self._nodes = self._nodes[number:] + self._nodes[:number]  # the rest come first in the next turn
+                    return now_s
                 try:
-                    node.turn(now_s, self._port.send)
+                    node.turn(now_s, self._send)
                 except LinkError:
                     raise
                 except Exception as error:  # noqa: BLE001 - one node's fault must not take down the others' bus
                     self._node_failed(node, error)
             if node.next_due_s < due_s:  # twice as fast as min(), and this is the innermost loop
                 due_s = node.next_due_s
-        self._port.receive(due_s - now_s)
-        if self._port.trouble != self._trouble:
-            self._trouble = self._port.trouble
-            for node in self._nodes:
-                node.trouble = self._trouble
+        return due_s
+
+    def _send(self, cob_id: int, data: bytes) -> None:
+        self._sent += 1
+        self._busy = True
+        self._port.send(cob_id, data)
 
     def _on_frame(self, node: BatteryNode, cob_id: int, data: bytes) -> None:
+        self._busy = True
         try:
             node.on_frame(cob_id, data, self._clock())
         except Exception as error:  # noqa: BLE001 - as above

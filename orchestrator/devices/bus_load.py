@@ -12,16 +12,15 @@ SLOW_S = ANSWER_LIMIT_S / 2
 
 
 def slow_buses(station: Station) -> Iterator[str]:
-    """A warning, with its line, for each bus on which voltage, current, status and temperature are read too rarely."""
+    """A warning, with its line, for each bus on which voltage, current and status are read too rarely."""
     for name, settings in station.can.items():
         bitrate = settings.get("bitrate")
         nodes = [bay.battery for bay in station.bays if bay.battery.can == name]
         if not isinstance(bitrate, int) or not nodes:
             continue
         budget = BusBudget(bitrate)
-        for node in nodes:
-            ReadPlan(node, budget)
-        period_s = max(budget.fast_s(node.sweep_s) for node in nodes)
+        plans = [ReadPlan(node, budget) for node in nodes]
+        period_s = max(plan.fast_s for plan in plans)
         if period_s > SLOW_S:
             yield (
                 f"{station.source.at(f'can.{name}')}: warning: {len(nodes)} BMUs on {bitrate / 1000:g} kbit/s: with "

@@ -47,7 +47,7 @@ class NodeHealth:
         self._last, self._why = verdict, why
         if verdict in (Verdict.STRAY, Verdict.SECOND):
             self._strays = min(_MOST, self._strays + _STRAY)
-        elif verdict is Verdict.ACCEPTED:
+        elif verdict is Verdict.ACCEPTED and self._strays:
             self._strays = max(0, self._strays - _CLEAN)
         self._doubled = self._strays >= _DOUBLED or (self._doubled and self._strays > 0)
 

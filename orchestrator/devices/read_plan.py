@@ -1,5 +1,7 @@
 """Chooses the next object of a BMU to read: the most overdue one that may be requested."""
 
+from math import inf
+
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.polled import Fields, Polled
@@ -13,15 +15,15 @@ TPDO_PERIODS = 3  #: an object that no TPDO carried for this many periods is rea
 class ReadPlan:
     """The objects of one BMU, by the map of its station file, and their periods, by the budget of the bus."""
 
-    __slots__ = ("_budget", "_by_key", "_sweep_s", "_tpdo_s", "objects")
+    __slots__ = ("_budget", "_by_key", "_share", "_tpdo_s", "objects")
 
     def __init__(self, config: BatteryConfig, budget: BusBudget) -> None:
         self.objects = tuple(Polled(entry) for entry in config.map.objects)
         self._by_key = {polled.key: polled for polled in self.objects}
         self._budget = budget
-        self._sweep_s, self._tpdo_s = config.sweep_s, config.tpdo_s
-        fast = sum(entry.sweep is Sweep.FAST for entry in config.map.objects)
-        budget.join(fast, len(self.objects) - fast, config.sweep_s)
+        self._tpdo_s = config.tpdo_s
+        kinds = [entry.sweep for entry in config.map.objects]
+        self._share = budget.join({sweep: kinds.count(sweep) for sweep in Sweep}, config.sweep_s)
 
     def __getitem__(self, key: Key) -> Polled:
         return self._by_key[key]
@@ -35,9 +37,26 @@ class ReadPlan:
         for polled in self.objects:
             polled.forget(due_s=now_s)
 
+    @property
+    def closely(self) -> bool:
+        """Whether the fast objects are read every sweep."""
+        return self._share.closely
+
+    def watch(self, *, closely: bool) -> None:
+        """Read the fast objects at once and then every sweep, or as rarely as the others."""
+        self._budget.watch(self._share, closely=closely)
+        for polled in self.objects if closely else ():
+            if polled.entry.sweep is Sweep.FAST:
+                polled.due_s = -inf
+
+    @property
+    def fast_s(self) -> float:
+        """How often the fast objects are read."""
+        return self._budget.period_s(self._share, Sweep.FAST)
+
     def choose(self, now_s: float, client: SdoClient) -> Polled | float:
         """The object to read now, or the time at which to call this again."""
-        due = min(self.objects, key=_due_s)
+        due = self._most_overdue()
         if due.due_s > now_s:
             return due.due_s
         if client.may_ask(due.key):
@@ -51,6 +70,18 @@ class ReadPlan:
         client.clear()
         return due
 
+    @property
+    def due_s(self) -> float:
+        """When the next object is to be read."""
+        return self._most_overdue().due_s
+
+    def _most_overdue(self) -> Polled:
+        first = self.objects[0]
+        for polled in self.objects:  # three times as fast as min(); runs twice per read of every node
+            if polled.due_s < first.due_s:
+                first = polled
+        return first
+
     def unanswered(self, key: Key, now_s: float) -> None:
         """Its request was not answered: repeat it soon, whatever its period. Ignores objects that are not read."""
         if key in self._by_key:
@@ -60,8 +91,7 @@ class ReadPlan:
     def asked(self, polled: Polled, now_s: float) -> None:
         """It is being read now; schedule the next time."""
         by_tpdo = self._tpdo_s is not None and now_s - polled.tpdo_t_s < TPDO_PERIODS * self._tpdo_s
-        slow = by_tpdo or polled.entry.sweep is Sweep.SLOW
-        polled.due_s = now_s + (self._budget.slow_s if slow else self._budget.fast_s(self._sweep_s))
+        polled.due_s = now_s + self._budget.period_s(self._share, Sweep.SLOW if by_tpdo else polled.entry.sweep)
 
     def from_tpdo(self, tpdo: TpdoEntry, data: bytes, now_s: float) -> list[Fields] | None:
         """The values of each object in a TPDO; None if its length does not fit."""

@@ -40,6 +40,17 @@ class Requester:
         """The node answers, or has just booted: do not wait any longer."""
         self._not_before_s = -inf
 
+    def due_s(self, now_s: float) -> float:
+        """When the next request is due, with none in flight. A request that is due already gets its slot."""
+        if not self._setup.settled:
+            return now_s
+        due_s = self._plan.due_s
+        if due_s > now_s:
+            return due_s
+        if self._slot_s is None:
+            self._slot_s = self._budget.reserve(now_s)
+        return self._slot_s
+
     def fail(self, now_s: float) -> float:
         """The request is lost; returns when the node may be queried again."""
         self._client.drop()
@@ -49,6 +60,8 @@ class Requester:
 
     def ask(self, now_s: float, send: Send, *, online: bool) -> float:
         """Send the next request if one is due, and return when to call this again."""
+        if self._client.pending is not None:
+            return self._client.deadline_s
         if now_s < self._not_before_s:
             return self._not_before_s
         if self._setup.start_due:
@@ -83,4 +96,4 @@ class Requester:
         if not online:
             self._not_before_s = now_s + SILENT_S
         send(request_cob_id(self._node_id), frame)
-        return now_s
+        return self._client.deadline_s

@@ -1,28 +1,27 @@
 """A CAN bus by python-can and canopen: the only module that uses them.
 
-Both are prescribed. python-can opens every kind of adapter, and sends and receives single frames. canopen's `Network`
-dispatches frames by COB-ID and sends NMT commands; SDO is ours (`devices/sdo_client.py`), because canopen would take a
-late answer for the answer to the next request.
+Both are prescribed. python-can opens, configures, filters and closes every kind of adapter; it also sends and receives
+single frames where an adapter has no socket (`link/can_socket.py`). canopen's `Network` dispatches frames by COB-ID and
+sends NMT commands; SDO is ours (`devices/sdo_client.py`), because canopen would take a late answer for the answer to
+the next request.
 
 There is no Notifier, because the first exception kills it. One thread of ours calls `receive()` and `send()`. Whatever
 the libraries raise becomes a LinkError; then the bus is closed and, after a pause, a new one is opened: a Network that
 has seen its interface go down stays deaf.
 """
 
-import errno
 import logging
 from collections.abc import Callable, Collection, Mapping
-from contextlib import suppress
-from io import IOBase
-from socket import socket
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.errors import LinkError, RefusedError
-from orchestrator.link import can_filter, can_text
-from orchestrator.link.can_echo import CanEcho
+from orchestrator.link import can_driver, can_filter, can_text
+from orchestrator.link.can_echo import CanEcho, marks
+from orchestrator.link.can_frames import ERROR, ERROR_CLASS, OWN, Frame, Frames, Messages
 from orchestrator.link.can_gate import refusal
+from orchestrator.link.can_socket import socket_frames
 from orchestrator.model import Cause
-from orchestrator.protocol.sdo import FRAME_BYTES, NmtCommand
+from orchestrator.protocol.sdo import NmtCommand
 
 if TYPE_CHECKING:
     import can
@@ -32,17 +31,8 @@ FrameCallback = Callable[[int, bytes], None]
 
 #: For a bus without a wire (`virtual`, `udp_multicast`) and without a bit rate in its settings: CANopen's highest.
 DEFAULT_BITRATE = 1_000_000
-#: Longer than any driver needs to take one frame; a stalled line must not stall the thread.
-SEND_TIMEOUT_S = 0.02
 #: After this many unreadable frames in a row, treat it as a failure and reopen the bus.
 MAX_GARBAGE = 16
-#: Settings that we add unless the station file has them, by interface.
-PROTECTIVE: Mapping[str, Mapping[str, object]] = {
-    # python-can's default of 1 ms is a busy loop (5 % of a core when idle); this delays a read by at most as much.
-    "slcan": {"timeout": 0.01},
-    # Nothing leaves this machine.
-    "udp_multicast": {"hop_limit": 0},
-}
 
 
 class CanBus:
@@ -64,7 +54,7 @@ class CanBus:
     ) -> None:
         self.name = name
         self.trouble: Cause | None = None  #: error-passive, bus-off, nobody acknowledges; None once a frame comes again
-        self._settings = {**PROTECTIVE.get(str(settings.get("interface")), {}), **settings}
+        self._settings = can_driver.protected(settings)
         self._nodes = frozenset(nodes)
         self._pages = pages
         self._filtered = filtered and "can_filters" not in settings
@@ -72,6 +62,7 @@ class CanBus:
         self._callbacks: dict[int, FrameCallback] = {}
         self._garbage_run = 0
         self._bus: can.BusABC | None = None
+        self._frames: Frames | None = None
         self._network: canopen.Network | None = None
 
     @property
@@ -91,6 +82,7 @@ class CanBus:
             self._network = _new_network(self._bus, self.send)
             if self._filtered and self._callbacks and self._settings.get("interface") == "socketcan":
                 self._bus.set_filters(can_filter.filters(self._callbacks))
+            self._frames = socket_frames(self._bus, self._settings) or _messages(self._bus, self._settings)
         except Exception as error:
             self.close()
             raise self._failed(error) from error
@@ -101,11 +93,11 @@ class CanBus:
 
     def close(self) -> None:
         """Shut the bus down. Never raises: there is no better way to close a broken bus."""
-        bus, self._bus, self._network = self._bus, None, None
+        bus, frames, self._bus, self._frames, self._network = self._bus, self._frames, None, None, None
+        if frames is not None:
+            frames.close()
         if bus is not None:
-            with suppress(Exception):
-                bus.shutdown()
-            _close_files(bus)
+            can_driver.close(bus)
 
     def nmt(self, node_id: int, command: NmtCommand) -> None:
         """Ask a node to start, stop or reset; RefusedError for a node that is not of this station."""
@@ -122,41 +114,52 @@ class CanBus:
         """
         if reason := refusal(cob_id, data, self._nodes, pages=self._pages):
             raise RefusedError(f"CAN bus {self.name}: not sent: {reason}")
-        if self._bus is None:
+        if self._frames is None:
             raise self._closed()
         try:
-            self._bus.send(_new_message(cob_id, data), SEND_TIMEOUT_S)
+            self._frames.send(cob_id, data)
             self._echo.sent(cob_id, data)
         except Exception as error:
-            if not _is_queue_full(error):
+            if not can_driver.is_queue_full(error):
                 raise self._failed(error) from error
             self.trouble = can_text.QUEUE_FULL
 
-    def receive(self, timeout_s: float) -> None:
-        """Wait for one frame and dispatch it. Exceptions from callbacks propagate."""
-        if self._bus is None or self._network is None:
+    def receive(self, timeout_s: float, pause_s: float = 0.0) -> None:
+        """Wait for a frame and dispatch all that have arrived. Exceptions from callbacks propagate.
+
+        For the first `pause_s` nobody waits for a frame: what arrives in that time may be taken together.
+        """
+        frames, network = self._frames, self._network
+        if frames is None or network is None:
             raise self._closed()
         try:
-            message = self._bus.recv(max(timeout_s, 0.0))
+            taken = frames.take(max(timeout_s, 0.0), pause_s)
         except Exception as error:  # noqa: BLE001 - drivers raise anything; it ends here
             self._unreadable(error)
             return
-        self._garbage_run = 0
-        if message is not None:
-            self._dispatch(message, self._network)
+        for one in taken:
+            try:
+                frame = frames.frame(one)
+            except Exception as error:  # noqa: BLE001 - as above
+                self._unreadable(error)
+                continue
+            self._garbage_run = 0
+            self._dispatch(frame, network)
 
-    def _dispatch(self, message: "can.Message", network: "canopen.Network") -> None:
-        if message.is_error_frame:
-            self._error_frame(message)
+    def _dispatch(self, frame: Frame, network: "canopen.Network") -> None:
+        can_id, data = frame
+        if can_id & ERROR:
+            self._error_frame(can_id & ERROR_CLASS, data)
             return
         self.trouble = None
-        if message.is_extended_id or message.is_remote_frame or message.is_fd or message.dlc > FRAME_BYTES:
-            return  # not a CANopen frame
-        if message.arbitration_id in self._callbacks and not self._echo.is_own(message):
-            network.notify(message.arbitration_id, message.data, message.timestamp)
+        if can_id in self._callbacks:
+            if not self._echo.is_own(frame):
+                network.notify(can_id, data, 0.0)  # type: ignore[arg-type]  # data is only passed on
+        elif can_id & OWN:
+            self._echo.marked()
 
-    def _error_frame(self, message: "can.Message") -> None:
-        said = can_text.error_frame(message.arbitration_id, bytes(message.data))
+    def _error_frame(self, error_class: int, data: bytes) -> None:
+        said = can_text.error_frame(error_class, data)
         if said is None:
             return
         self.trouble = can_text.trouble(said, self._settings) if said else None
@@ -216,30 +219,26 @@ def _new_network(bus: "can.BusABC", send: FrameCallback) -> "canopen.Network":
                 raise RefusedError(f"remote frame 0x{can_id:X}: never sent")
             send(can_id, bytes(data))
 
+        def notify(self, can_id: int, data: bytearray, timestamp: float) -> None:
+            """As in canopen, without its search through all nodes."""
+            for callback in self.subscribers.get(can_id, ()):
+                callback(can_id, data, timestamp)
+
     network = Network(bus)
     # LSS is not used here, and canopen would keep every frame with its COB-ID for ever.
     network.unsubscribe(network.lss.LSS_RX_COBID)
     return network
 
 
-def _new_message(cob_id: int, data: bytes) -> "can.Message":
+def _messages(bus: "can.BusABC", settings: Mapping[str, object]) -> Messages:
     import can  # noqa: PLC0415 - see above
 
-    return can.Message(arbitration_id=cob_id, is_extended_id=False, data=data)
+    def message(cob_id: int, data: bytes) -> can.Message:
+        return can.Message(arbitration_id=cob_id, is_extended_id=False, data=data)
+
+    return Messages(bus, message, marks=marks(settings))
 
 
 def _without_time(callback: FrameCallback) -> Callable[[int, bytearray, float], None]:
     """Drop the frame's own time stamp, which is wall-clock time; the reader of the frame takes a monotonic one."""
     return lambda cob_id, data, _timestamp: callback(cob_id, bytes(data))
-
-
-def _close_files(bus: "can.BusABC") -> None:
-    """Close what a driver left open when its own shutdown failed: until then an adapter's name is not free again."""
-    for part in vars(bus).values():
-        if isinstance(part, IOBase | socket):
-            with suppress(OSError):
-                part.close()
-
-
-def _is_queue_full(error: Exception) -> bool:
-    return can_text.errno_of(error) == errno.ENOBUFS or str(error) == "Transmit buffer full"

@@ -2,7 +2,8 @@
 
 from collections import deque
 from collections.abc import Mapping
-from typing import Protocol
+
+from orchestrator.link.can_frames import Frame
 
 #: At most this many may still be on their way back.
 MAX_ECHO = 256
@@ -10,12 +11,9 @@ MAX_ECHO = 256
 ECHOING = frozenset({"udp_multicast"})
 
 
-class Message(Protocol):
-    """The attributes of `can.Message` used here."""
-
-    arbitration_id: int
-    data: bytearray
-    is_rx: bool
+def marks(settings: Mapping[str, object]) -> bool:
+    """Whether a frame that the driver marks as sent is ours. SocketCAN marks what any program on this machine sends."""
+    return settings.get("interface") != "socketcan"
 
 
 class CanEcho:
@@ -25,7 +23,7 @@ class CanEcho:
 
     def __init__(self, settings: Mapping[str, object]) -> None:
         self._comes = settings.get("interface") in ECHOING or bool(settings.get("receive_own_messages"))
-        self._sent: deque[tuple[int, bytes]] = deque(maxlen=MAX_ECHO)
+        self._sent: deque[Frame] = deque(maxlen=MAX_ECHO)
 
     def sent(self, cob_id: int, data: bytes) -> None:
         """Record a frame that has gone out."""
@@ -36,16 +34,17 @@ class CanEcho:
         """The bus was reopened: nothing comes back any more."""
         self._sent.clear()
 
-    def is_own(self, message: Message) -> bool:
+    def marked(self) -> None:
+        """The driver itself marks our frames: nothing to remember."""
+        self._comes = False
+        self._sent.clear()
+
+    def is_own(self, frame: Frame) -> bool:
         """Whether this is our own frame. Echoes arrive in the order of sending: those before it are lost.
 
-        Unless the driver marks echoes, only their number distinguishes them from identical frames by somebody else.
+        Only their number distinguishes echoes from identical frames by somebody else.
         """
-        if not message.is_rx:
-            self._comes = False
-            self._sent.clear()
-            return True
-        if not self._sent or (frame := (message.arbitration_id, bytes(message.data))) not in self._sent:
+        if not self._sent or frame not in self._sent:
             return False
         while self._sent.popleft() != frame:
             pass

@@ -25,7 +25,8 @@ class Evidence(StrEnum):
 class Sweep(StrEnum):
     """How often an object is read."""
 
-    FAST = "fast"  #: every sweep
+    FAST = "fast"  #: every sweep, while current flows or a charge is about to begin
+    MEDIUM = "medium"  #: twice a second
     SLOW = "slow"  #: once a second
 
 
@@ -51,7 +52,7 @@ class ObjectEntry:
     index: int = key("object index, e.g. 0x6000", ge=0x1000, le=0xFFFF)
     sub: int = key("sub-index", ge=0, le=255, default=0)
     size: int = key("bytes that the SDO answer must declare: 1, 2 or 4", ge=1, le=4)
-    sweep: Sweep = key("fast: every sweep; slow: once a second")
+    sweep: Sweep = key("fast: every sweep, at rest twice a second; medium: twice a second; slow: once a second")
     fields: tuple[FieldMap, ...] = key("the values inside")
 
 

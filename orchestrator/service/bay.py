@@ -11,7 +11,7 @@ from orchestrator.core.decide import decide
 from orchestrator.core.failed import carry_on
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
-from orchestrator.core.states import ENERGISED, SETTLED
+from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
 from orchestrator.model import (
     STOP,
@@ -65,6 +65,7 @@ class BayRunner:
         self._ending: Cause | None = None
         self._waits: Cause | None = None  # why the next run must wait for an operator
         self._asleep_s = 0.0
+        self._closely = True  # how often the BMU is read, until the first decision
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
@@ -160,6 +161,10 @@ class BayRunner:
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
         self.decision, self._internal, self.last_s = decision, "", now_s
+        # In a quiet state no current flows and none is about to: what a BMU reports changes slowly.
+        if self._closely is not (closely := decision.state not in QUIET):
+            self._closely = closely
+            self._battery.attend(closely=closely)
         clock, lines = WallClock(now_s, time()), []
         if before is None or decision != before:
             lines = list(decision_lines(before, decision, self._language, clock))

@@ -23,3 +23,6 @@ class BatteryDevice(Protocol):
     @property
     def view(self) -> tuple[BatteryReading, BatteryLink]:
         """The newest values and the state of the link."""
+
+    def attend(self, *, closely: bool) -> None:
+        """Read fast-changing values often, or not."""

@@ -102,7 +102,9 @@ class Supervisor:
                 contactor=contactor, starts=starts, snapshots=snapshots, language=self._language,
             )  # fmt: skip
             self._bays.append(runner)
-        self._buses = [BatteryBus(bus, nodes[name], monotonic) for name, bus in buses.items() if nodes[name]]
+        self._buses = [
+            BatteryBus(bus, nodes[name], budgets[name], monotonic) for name, bus in buses.items() if nodes[name]
+        ]
 
     @property
     def _devices(self) -> tuple[ChargerPort | BatteryBus, ...]:

@@ -1,6 +1,6 @@
 """What goes wrong with an emulated battery: its pack, and what its BMU says of it."""
 
-from orchestrator.sim.pack import DRIVEN_K_PER_S
+from orchestrator.sim.pack import DRIVEN_K
 from orchestrator.sim.rig import Rig
 
 #: SDO abort: "object does not exist in the object dictionary".
@@ -43,12 +43,12 @@ def frozen_temperature(rig: Rig, _: float | None) -> None:
 
 
 def over_temperature(rig: Rig, value: float | None) -> None:
-    """The pack heats up to 48 °C, 4 K at once and 4 K in each second."""
+    """The pack heats up to 48 °C, 2 K at once and 3 K in each second."""
     _drive_temperature(rig, 48.0 if value is None else value)
 
 
 def under_temperature(rig: Rig, value: float | None) -> None:
-    """The pack cools down to −5 °C, 4 K at once and 4 K in each second."""
+    """The pack cools down to −5 °C, 2 K at once and 3 K in each second."""
     _drive_temperature(rig, -5.0 if value is None else value)
 
 
@@ -56,7 +56,7 @@ def _drive_temperature(rig: Rig, target_c: float) -> None:
     """The first step is there at once, the rest comes as fast as a pack's temperature can change."""
     pack = rig.bay.pack
     pack.driven_c = target_c
-    pack.temperature_c += min(max(target_c - pack.temperature_c, -DRIVEN_K_PER_S), DRIVEN_K_PER_S)
+    pack.temperature_c += min(max(target_c - pack.temperature_c, -DRIVEN_K), DRIVEN_K)
 
 
 def temperature_jump(rig: Rig, value: float | None) -> None:

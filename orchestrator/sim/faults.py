@@ -65,10 +65,10 @@ FAULTS = {
     "temperature_jump": Fault("the BMU says 15 K more from one reading to the next", battery_faults.temperature_jump),
     "frozen_temperature": Fault("the BMU goes on saying the temperature of now", battery_faults.frozen_temperature),
     "over_temperature": Fault(
-        "the pack heats up to 48 °C, 4 K at once and 4 K in each second", battery_faults.over_temperature
+        "the pack heats up to 48 °C, 2 K at once and 3 K in each second", battery_faults.over_temperature
     ),
     "under_temperature": Fault(
-        "the pack cools down to −5 °C, 4 K at once and 4 K in each second", battery_faults.under_temperature
+        "the pack cools down to −5 °C, 2 K at once and 3 K in each second", battery_faults.under_temperature
     ),
     "over_voltage": Fault(
         "the pack's voltage rises 4 V above the charger's end of charge", battery_faults.over_voltage

@@ -21,7 +21,9 @@ HIGH_C, LOW_C = 60.0, -20.0
 REFERENCE_C, ZERO_C = 25.0, -273.15
 
 #: How fast a fault can heat or cool a pack: slowly enough for the sensor's reading to stay plausible.
-DRIVEN_K_PER_S = 4.0
+DRIVEN_K_PER_S = 3.0
+#: … and how much at once when it begins. Read twice a second, that is not a jump.
+DRIVEN_K = 2.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.config.policy import Policy
+from orchestrator.core.facts import FAST_STALE_S
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import ENERGISED
@@ -24,7 +25,7 @@ from orchestrator.model import (
 )
 from tests.core.bays import IN, POLICY, charging, continuous, full, idle, offline, pulse, suspended, tripped
 from tests.core.said import cause, reason_of, say
-from tests.core.world import World, bay, with_full
+from tests.core.world import TICK_S, World, bay, with_full
 
 S = State
 START_AT, FULL_AT = POLICY.source.at("start.soc_below_pct"), POLICY.source.at("finish.full.soc_pct")
@@ -728,6 +729,24 @@ def test_a_node_that_falls_silent_is_not_said_to_withhold_a_temperature() -> Non
     reason = reason_of(world.until(S.STOPPING, 3))
     assert {"heartbeat_lost", "stale_reading"} == set(world.raised)
     assert reason.startswith("no heartbeat of the BMU for 2.5 s")
+
+
+def test_a_node_that_falls_silent_is_said_to_be_silent_whatever_was_read_last() -> None:
+    """Its temperature, which is read twice a second, is too old before its voltage, and the bay stops then."""
+    world = charging()
+    world.frozen.add("temperature_c")
+    measured_s = world.now_s
+    world.run(0.45)
+    world.battery_answers = False
+    reason = reason_of(world.until(S.STOPPING, 2))
+    assert "bmu_silent" in world.raised and "stale_reading" not in world.raised, reason
+    assert world.now_s - measured_s <= FAST_STALE_S + TICK_S
+
+
+def test_a_node_that_answers_seldom_is_not_taken_for_a_silent_one() -> None:
+    world = charging()
+    world.frozen.update(("voltage_v", "current_a", "status"))
+    assert "no fresh voltage" in reason_of(world.until(S.STOPPING, 2))
 
 
 def test_a_node_that_answers_may_lose_three_heartbeats_and_a_silent_one_two() -> None:

@@ -6,7 +6,8 @@ from heapq import heappop, heappush
 import pytest
 
 from orchestrator.devices.battery import BatteryNode
-from orchestrator.devices.bus_budget import BURST, EXCHANGE_BITS, BusBudget
+from orchestrator.devices.bus_budget import BURST, EXCHANGE_BITS, TICK_S, BusBudget, Share
+from orchestrator.protocol.objects import Sweep
 from tests.devices.bmu_bench import WORDS, config
 
 
@@ -36,31 +37,67 @@ def test_an_idle_bus_saves_up_no_more_than_a_burst() -> None:
     assert begins[BURST] > 100.003
 
 
+#: The objects of a TABOS BMU: volts and amps, status; temperature; SOC and SOH, capacity and energy.
+COUNTS = {Sweep.FAST: 2, Sweep.MEDIUM: 1, Sweep.SLOW: 2}
+PLANNED_HZ = 0.9 * 75_000 / 270  #: of 250 kbit/s
+
+
+def joined(nodes: int) -> tuple[BusBudget, list[Share]]:
+    """So many nodes on 250 kbit/s, all of them watched closely."""
+    budget = BusBudget(250_000)
+    return budget, [budget.join(COUNTS, 0.05) for _ in range(nodes)]
+
+
+def periods(budget: BusBudget, share: Share) -> list[float]:
+    return [budget.period_s(share, sweep) for sweep in Sweep]
+
+
 def test_one_node_is_not_stretched_many_are_all_alike() -> None:
-    budget = BusBudget(250_000)
-    budget.join(3, 2, 0.05)
-    assert (budget.fast_s(0.05), budget.slow_s) == (0.05, 1.0)
-    for _ in range(15):
-        budget.join(3, 2, 0.05)
-    assert budget.fast_s(0.05) == pytest.approx(16 * 60 * 0.05 / (0.9 * 75_000 / 270 - 16 * 2))
-    assert budget.fast_s(0.1) == pytest.approx(2 * budget.fast_s(0.05))
-    assert budget.slow_s == 1.0
+    budget, shares = joined(1)
+    assert periods(budget, shares[0]) == [0.05, 0.5, 1.0]
+    budget, shares = joined(16)
+    assert budget.period_s(shares[0], Sweep.FAST) == pytest.approx(16 * 40 * 0.05 / (PLANNED_HZ - 16 * (2 + 2)))
+    twice = budget.join(COUNTS, 0.1)
+    assert budget.period_s(twice, Sweep.FAST) == pytest.approx(2 * budget.period_s(shares[0], Sweep.FAST))
+    assert periods(budget, shares[0])[1:] == [0.5, 1.0]
 
 
-def test_on_a_full_bus_the_slow_objects_yield_first() -> None:
-    budget = BusBudget(250_000)
-    for _ in range(64):
-        budget.join(3, 2, 0.05)
-    assert budget.slow_s == 2.0
-    assert budget.fast_s(0.05) == pytest.approx(64 * 3 / (0.9 * 75_000 / 270 - 64 * 2 / 2.0))
-    assert budget.fast_s(0.05) < 1.04
+def test_on_a_full_bus_all_else_yields_to_the_sweeps() -> None:
+    budget, shares = joined(64)
+    assert periods(budget, shares[0]) == [pytest.approx(64 * 2 / (PLANNED_HZ - 64 * (1 + 1))), 1.0, 2.0]
 
 
 def test_where_even_one_a_second_is_too_much_all_objects_share_alike() -> None:
-    budget = BusBudget(250_000)
-    for _ in range(128):
-        budget.join(3, 2, 0.05)
-    assert budget.fast_s(0.05) == budget.slow_s == pytest.approx(128 * 5 / (0.9 * 75_000 / 270))
+    budget, shares = joined(128)
+    assert periods(budget, shares[0]) == pytest.approx([128 * 5 / PLANNED_HZ] * 3)
+
+
+def test_what_the_nodes_at_rest_leave_the_others_have() -> None:
+    budget, shares = joined(32)
+    full_s = budget.period_s(shares[0], Sweep.FAST)
+    for share in shares[4:]:
+        budget.watch(share, closely=False)
+    assert periods(budget, shares[-1]) == [1.0, 1.0, 2.0]
+    few_s = budget.period_s(shares[0], Sweep.FAST)
+    assert few_s == pytest.approx(4 * 2 / (PLANNED_HZ - 32 * 2 - 28 * 2))
+    assert few_s < full_s / 5
+    for share in shares[4:]:
+        budget.watch(share, closely=True)
+    assert budget.period_s(shares[0], Sweep.FAST) == full_s
+
+
+def test_nobody_at_rest_is_read_more_often_than_who_is_watched_closely() -> None:
+    budget, shares = joined(64)
+    full = periods(budget, shares[0])
+    for share in shares[4:]:
+        budget.watch(share, closely=False)
+    assert periods(budget, shares[0]) == periods(budget, shares[-1]) == full
+
+
+def test_on_a_bus_with_room_a_node_at_rest_is_read_twice_a_second() -> None:
+    budget, shares = joined(8)
+    budget.watch(shares[0], closely=False)
+    assert periods(budget, shares[0]) == [0.5, 0.5, 1.0]
 
 
 class Station:
@@ -130,3 +167,19 @@ def test_silent_nodes_cost_the_others_next_to_nothing() -> None:
     assert all(not node.view[1].online for node in dead)
     assert all(station.exchanges[5 + i] <= 9 for i in range(4))
     assert all(station.exchanges[1 + i] >= 100 for i in range(4))
+
+
+@pytest.mark.parametrize(
+    ("nodes", "bitrate", "ticks"),
+    [(1, 250_000, 1), (16, 250_000, 2), (64, 250_000, 4), (64, 500_000, 2), (64, 1_000_000, 1), (16, 1_000_000, 1)],
+)
+def test_a_tick_is_as_long_as_the_queue_and_the_sweeps_allow(nodes: int, bitrate: int, ticks: int) -> None:
+    budget = BusBudget(bitrate)
+    shares = [budget.join(COUNTS, 0.05) for _ in range(nodes)]
+    assert budget.tick_s == ticks * TICK_S
+    assert budget.tick_s * budget.capacity_hz < 6
+    for share in shares:
+        budget.watch(share, closely=False)
+    assert budget.tick_s >= ticks * TICK_S  # nobody waits for anything at rest
+    budget.watch(shares[0], closely=True)
+    assert budget.tick_s <= budget.period_s(shares[0], Sweep.FAST) / 10

@@ -68,14 +68,50 @@ def test_every_answer_is_told_once_and_at_once() -> None:
     assert bench.changes == 5
 
 
-def test_fast_objects_each_sweep_slow_ones_each_second() -> None:
-    bench = online()
+def asked_in_10_s(bench: Bench, words: dict[int, int]) -> list[int]:
+    """How often each object was asked for."""
     begin = len(bench.sent)
-    bench.answer_reads(10.0, WORDS)
+    bench.answer_reads(10.0, words)
     asked = [data[1] for _, data in bench.sent[begin:]]
-    assert [asked.count(index) for index in range(5)] == [
-        pytest.approx(200, rel=0.05), pytest.approx(200, rel=0.05), 10, 10, pytest.approx(200, rel=0.05)
-    ]  # fmt: skip
+    return [asked.count(index) for index in range(5)]
+
+
+EVERY_SWEEP = pytest.approx(200, rel=0.05)
+CLOSELY, AT_REST = [EVERY_SWEEP, EVERY_SWEEP, 10, 10, 20], [20, 20, 10, 10, 20]
+
+
+def test_volts_amps_and_status_each_sweep_temperature_twice_a_second_the_others_once() -> None:
+    assert asked_in_10_s(online(), WORDS) == CLOSELY
+
+
+def test_at_rest_nothing_is_read_more_often_than_twice_a_second() -> None:
+    bench = online()
+    bench.node.attend(closely=False)
+    bench.answer_reads(1.0, WORDS)
+    assert asked_in_10_s(bench, WORDS) == AT_REST
+
+
+def test_who_is_to_be_watched_closely_is_read_at_once() -> None:
+    bench = online()
+    bench.node.attend(closely=False)
+    bench.answer_reads(10.3, WORDS)
+    bench.node.attend(closely=True)
+    begin_s, begin = bench.now_s, len(bench.sent)
+    bench.answer_reads(0.01, WORDS)
+    assert {data[1] for _, data in bench.sent[begin:]} == {0x00, 0x01}
+    assert bench.reading.voltage_v.t_s >= begin_s  # type: ignore[union-attr]  # it is read
+    assert asked_in_10_s(bench, WORDS) == CLOSELY
+
+
+def test_current_into_a_pack_at_rest_is_watched_closely_whoever_let_it_flow() -> None:
+    bench = online()
+    bench.node.attend(closely=False)
+    bench.answer_reads(1.0, WORDS)
+    assert asked_in_10_s(bench, WORDS | {0x6000: 0x09400000 + 40}) == AT_REST  # 0.4 A: an offset
+    bench.answer_reads(1.0, WORDS | {0x6000: 0x09400000 + 1400})
+    assert asked_in_10_s(bench, WORDS | {0x6000: 0x09400000 + 1400}) == CLOSELY
+    bench.answer_reads(1.0, WORDS)
+    assert asked_in_10_s(bench, WORDS) == AT_REST
 
 
 def test_what_was_not_answered_is_asked_again_before_its_next_turn() -> None:
@@ -222,7 +258,7 @@ def test_another_size_than_the_maps_is_implausible() -> None:
 
 def test_an_implausible_value_leaves_the_last_one_until_a_plausible_comes() -> None:
     bench = online()
-    bench.answer_reads(0.2, WORDS)
+    bench.answer_reads(0.6, WORDS)
     before = bench.reading.temperature_c
     bench.answer_reads(1.0, WORDS | {0x6004: 0x7FFF})
     assert list(bench.link.implausible) == ["temperature_c"]
@@ -231,7 +267,7 @@ def test_an_implausible_value_leaves_the_last_one_until_a_plausible_comes() -> N
     assert bench.reading.temperature_c is not None
     assert bench.reading.temperature_c.value == 25.0
     assert bench.now_s - bench.reading.temperature_c.t_s > 0.9
-    bench.answer_reads(0.1, WORDS)
+    bench.answer_reads(0.5, WORDS)
     assert bench.link.implausible == {}
 
 

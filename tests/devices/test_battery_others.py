@@ -70,8 +70,8 @@ def test_a_master_that_reads_everything_all_the_time_is_said_and_disturbs_nothin
     assert text_of(bench.link.other_master).startswith("another CANopen master reads 0x600")
     assert bench.link.other_master_t_s is not None
     assert bench.now_s - bench.link.other_master_t_s <= 1.1
-    assert bench.reading.temperature_c is not None
-    assert bench.now_s - bench.reading.temperature_c.t_s < 0.3
+    assert bench.reading.voltage_v is not None
+    assert bench.now_s - bench.reading.voltage_v.t_s < 0.3
 
 
 @pytest.mark.parametrize("ours_first", [True, False])
@@ -132,9 +132,9 @@ def test_a_value_is_as_old_as_the_older_of_two_requests() -> None:
 
 def test_a_request_that_the_node_lost_makes_no_later_value_old() -> None:
     bench = online()
-    other_asks(bench, read_request(TEMPERATURE, 0))
+    other_asks(bench, read_request(VOLTS, 0))
     bench.answer_reads(0.3, WORDS)
-    assert bench.now_s - bench.reading.temperature_c.t_s < 0.12  # type: ignore[union-attr]  # read each sweep
+    assert bench.now_s - bench.reading.voltage_v.t_s < 0.12  # type: ignore[union-attr]  # read each sweep
 
 
 def test_each_request_explains_one_answer_and_no_more() -> None:

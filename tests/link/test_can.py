@@ -408,7 +408,8 @@ def test_a_datagram_that_is_no_frame_is_noise(udp: dict[str, object]) -> None:
 
 def test_a_socket_closed_underneath_breaks_the_bus_and_a_new_one_works(udp: dict[str, object]) -> None:
     bus, heard = opened(udp)
-    bus._bus._multicast._socket.close()  # type: ignore[union-attr]  # the driver's own
+    with Path(os.devnull).open("rb") as nothing:
+        os.dup2(nothing.fileno(), bus._frames._socket.fileno())  # type: ignore[union-attr]  # our own descriptor
     with raises(LinkError, match="udp_multicast"):
         for _ in range(MAX_GARBAGE):
             bus.receive(0.0)

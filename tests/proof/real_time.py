@@ -31,8 +31,8 @@ LOOK_S = 0.1
 SAMPLE_S = 10.0
 #: Faults that need longer than SILENT_S to show or to be believed.
 LATER_S = {
-    "stale_reading": 0.5, "implausible_soc": 1.0, "volts_disagree": 3.0, "amps_disagree": 5.0, "over_temperature": 7.0,
-    "under_temperature": 6.0, "command_ignored": 5.0, "battery_removed": 1.0,
+    "stale_reading": 0.5, "implausible_soc": 1.0, "volts_disagree": 3.0, "amps_disagree": 5.0, "over_temperature": 10.0,
+    "under_temperature": 8.5, "command_ignored": 5.0, "battery_removed": 1.0,
 }  # fmt: skip
 #: Faults that stop no charge here: a stuck temperature is not detected, stuck charger values
 #: only after a minute, others show in a precharge or at rest only, and a jump of the SOC is just a warning.

@@ -105,6 +105,7 @@ class Battery:
 
     def __init__(self) -> None:
         self.now_s = 0.0
+        self.attended: list[bool] = []  #: whether it was to be watched closely, each time that this changed
         self.values = {
             "voltage_v": VOLTS,
             "current_a": 0.0,
@@ -118,6 +119,9 @@ class Battery:
     def view(self) -> tuple[BatteryReading, BatteryLink]:
         fresh = {name: Measurement(value, self.now_s) for name, value in self.values.items()}
         return BatteryReading(**fresh), BatteryLink(online=True)
+
+    def attend(self, *, closely: bool) -> None:
+        self.attended.append(closely)
 
 
 class Bench:

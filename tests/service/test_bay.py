@@ -51,6 +51,20 @@ def test_it_is_verified_when_it_stands_by_and_nothing_is_ordered(bench: Bench) -
     assert bench.bay.verified
 
 
+def test_the_bmu_is_watched_closely_from_qualifying_until_the_charger_is_verified(bench: Bench) -> None:
+    bench.battery.values["soc_pct"] = 99.0  # not worth a charge
+    bench.until(State.IDLE)
+    assert bench.battery.attended == [False]  # until then it was, as nobody knew better
+    bench.battery.values["soc_pct"] = 50.0
+    bench.until(State.QUALIFYING)
+    assert bench.battery.attended == [False, True]
+    bench.charging()
+    bench.ask(Request.STOP)
+    assert bench.battery.attended == [False, True]
+    bench.until(State.HELD)
+    assert bench.battery.attended == [False, True, False]
+
+
 def test_requests_are_answered_one_a_step_in_their_order(bench: Bench) -> None:
     bench.charging()
     stop, pause = Asked(Request.STOP), Asked(Request.PAUSE)

@@ -61,12 +61,12 @@ def after(seconds: float, seen: Callable[[Rig], object]) -> Callable[[Rig], obje
 
 
 def heating(rig: Rig) -> bool:
-    """4 K at once, then 4 K/s, then it stays."""
+    """2 K at once, then 3 K/s, then it stays."""
     first_c = rig.bay.readout().temperature_c
     rig.bay.advance(1)
     second_c = rig.bay.readout().temperature_c
     rig.bay.advance(20)
-    return 24 <= first_c < 24.1 and second_c == pytest.approx(first_c + 4) and rig.bay.readout().temperature_c == 48
+    return 22 <= first_c < 22.1 and second_c == pytest.approx(first_c + 3) and rig.bay.readout().temperature_c == 48
 
 
 def gap_v(rig: Rig) -> float:

@@ -107,7 +107,7 @@ def test_a_warm_pack_cools_towards_its_surroundings() -> None:
 def test_a_driven_temperature_goes_there_and_stays_until_it_is_back() -> None:
     pack = Pack(driven_c=48.0)
     pack.advance(1, 0)
-    assert pack.temperature_c == 24
+    assert pack.temperature_c == 23
     pack.advance(60, 14)
     assert pack.temperature_c == 48
     pack.driven_c = pack.ambient_c

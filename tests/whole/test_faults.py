@@ -44,8 +44,8 @@ CASES = (
     Case("implausible_soc", "SUSPENDED", "implausible"),
     Case("stale_reading", "OFFLINE", "bmu_silent", SILENCE_S, instead="stale_reading"),
     Case("temperature_jump", "TRIPPED", "temperature_invalid"),
-    Case("over_temperature", "SUSPENDED", "over_temperature", 10.0),
-    Case("under_temperature", "SUSPENDED", "under_temperature", 10.0),
+    Case("over_temperature", "SUSPENDED", "over_temperature", 12.0),
+    Case("under_temperature", "SUSPENDED", "under_temperature", 12.0),
     Case("over_voltage", "TRIPPED", "over_voltage", instead="status_trip"),  # the BMU may report it first
     Case("over_current", "TRIPPED", "over_current"),
     Case("volts_disagree", "TRIPPED", "volts_disagree", 3 + AT_ONCE_S),

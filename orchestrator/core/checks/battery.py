@@ -33,7 +33,8 @@ STATUS_LIMITS = (BatteryStatus.LOW_TEMPERATURE, BatteryStatus.DISCHARGE_OVER_CUR
 
 def bmu_silent(f: Facts) -> Cause | None:
     """FAULTS B1, B5, B19, B21: no values, or a line or node whose values cannot be trusted."""
-    if (f.battery.online and not f.silent) or f.just_booted:
+    silent = f.silent or (not f.present and f.quiet)  # not just one value: nothing arrives any more
+    if (f.battery.online and not silent) or f.just_booted:
         return None
     if f.battery.problem:
         return f.battery.problem
@@ -42,7 +43,7 @@ def bmu_silent(f: Facts) -> Cause | None:
 
 def stale_reading(f: Facts) -> Cause | None:
     """FAULTS B2: it answers, but not with everything that a charge needs."""
-    if f.silent or f.present:
+    if f.silent or f.present or (f.quiet and not f.just_booted):  # else it is silent
         return None
     return Cause.of("stale_reading", missing=f.missing)
 

@@ -26,7 +26,7 @@ BUS: tuple[Seed, ...] = (
         "bus",
         "a CAN FD frame with a BMU's id counts as its answer",
         ("on the bus, fd",),
-        (f"{LINK}can.py", " or message.is_fd or", " or"),
+        (f"{LINK}can_frames.py", " or taken.is_fd or", " or"),
     ),
     scene(
         "a heartbeat that somebody has set stays so",
