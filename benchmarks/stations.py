@@ -47,7 +47,7 @@ class Station:
         shutil.rmtree(self.directory / "run", ignore_errors=True)
         used = sorted({bay["can"] for bay in self.bays})
         rate = {} if self.bitrate is None else {"bitrate": self.bitrate}
-        lines = ["station: bench", "can:"]
+        lines = ["station: bench", "stagger_s: 0", "can:"]
         lines += [f"  can{number}: {json.dumps({**bus(number), **rate})}" for number in used]
         lines += ["bays:", *(line for bay in self.bays for line in _bay_lines(bay))]
         lines += ["control: {socket: run/orchestrator.sock}", "journal: {directory: run/journal}"]

@@ -20,6 +20,9 @@ from orchestrator.config.station import BayConfig
 from orchestrator.keys import Range
 from orchestrator.model import Cause, ControlMode
 
+#: A charger's current measurement may be off by this, whatever the step.
+OVER_CURRENT_OFFSET_A = 0.3
+
 Spans = tuple[tuple[str, Range, float], ...]  #: quantity, the range in which a rule holds, and its hysteresis
 
 
@@ -99,6 +102,10 @@ class Rules:
     def by_policy(self, id_: str, key: str, /, **params: Any) -> Cause:  # noqa: ANN401 - as those of a cause
         """The cause with this key of the policy, and the line where it stands."""
         return Cause(id_, tuple(params.items()), key, self.policy.source.at(key))
+
+    def measured_most_a(self, limit_a: float) -> float:
+        """The highest current that may be measured at a charger limited to `limit_a`."""
+        return limit_a * self.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
 
     @property
     def hottest_at(self) -> tuple[str, str]:

@@ -13,15 +13,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
-from orchestrator.model import (
-    STOP,
-    Alarm,
-    Cause,
-    Decision,
-    Request,
-    Snapshot,
-    State,
-)
+from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
@@ -89,6 +81,13 @@ class BayRunner:
     def owes(self) -> bool:
         """Whether somebody is waiting for an answer."""
         return bool(self._requests or self._answers.waiting)
+
+    @property
+    def has_news(self) -> bool:
+        """Whether the next decision cannot wait for the tick."""
+        if self.decision is None or self.owes or self._internal:
+            return True
+        return self.policy.news.matters(self.decision, self._snapshot, self._charger.view, self._battery.view)
 
     def answer(self) -> None:
         """Give all pending answers, at the end of the service."""

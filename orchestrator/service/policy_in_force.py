@@ -5,13 +5,17 @@ from dataclasses import replace
 from orchestrator.config.station import BayConfig
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause
+from orchestrator.service.news import News
 
 
 class PolicyInForce:
-    """`rules` are the rules in force. Used by the control loop's thread only, except `offer` and `status`."""
+    """`rules` are the rules in force, `news` tells which news matter under them.
+
+    Used by the control loop's thread only, except `offer` and `status`.
+    """
 
     def __init__(self, bay: BayConfig) -> None:
-        self.rules = Rules.of(bay)
+        self._adopt(bay)
         self._offered: BayConfig | None = None  # has a policy that is not in force yet
 
     def offer(self, bay: BayConfig | None) -> Cause:
@@ -32,8 +36,12 @@ class PolicyInForce:
         """The bay is in standby: put the offered policy into force. Returns the bay with it, None if there is none."""
         bay, self._offered = self._offered, None
         if bay is not None:
-            self.rules = Rules.of(bay)
+            self._adopt(bay)
         return bay
+
+    def _adopt(self, bay: BayConfig) -> None:
+        self.rules = Rules.of(bay)
+        self.news = News.of(self.rules)
 
     def status(self) -> dict[str, str]:
         """Its part of the status document."""

@@ -170,9 +170,10 @@ class Supervisor:
         self._wake.put(None)
 
     def _turn(self) -> None:
-        """Wait for news, then decide the bays that have some, and those without a decision for a tick."""
+        """Wait for news, then decide the bays for which it matters, and those without a decision for a tick."""
         for number in self._news():
-            self._run(self._bays[number])
+            if self._bays[number].has_news:
+                self._run(self._bays[number])
         if self._reload_asked:
             self._reload_asked = False
             self._reload.ask()

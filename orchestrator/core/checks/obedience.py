@@ -7,8 +7,6 @@ from orchestrator.model import Action, Cause, Operation, State
 
 #: A setting must be read back within this time (about ten attempts), and a run must be seen (FAULTS C7, C9).
 OBEY_S = 5.0
-#: A charger's current measurement may be off by this, whatever the step.
-OVER_CURRENT_OFFSET_A = 0.3
 #: After a step down the current may stay at the old step for this long. More would delay the stop beyond its budget (2
 #: s).
 FOLLOWS_S = 1.0
@@ -107,10 +105,10 @@ def above_step(f: Facts) -> Cause | None:
     step = f.memory.stage.step
     if f.memory.state is not State.CHARGING or step is None or f.amps is None or not f.rules.manual:
         return None
-    allowed_a = step.current_a * f.rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
-    if f.amps <= allowed_a:
+    limit_a = f.rules.measured_most_a(step.current_a)
+    if f.amps <= limit_a:
         return None
-    return Cause.of("above_step", charger_a=f.amps, limit_a=allowed_a, step_a=step.current_a)
+    return Cause.of("above_step", charger_a=f.amps, limit_a=limit_a, step_a=step.current_a)
 
 
 def port_locked(f: Facts) -> Cause | None:
@@ -164,10 +162,10 @@ def over_current(f: Facts) -> Cause | None:
     limit_a = rules.bay.limits.current_a
     if rules.manual and reading.current_step is not None:
         limit_a = min(limit_a, max([rules.steps_a[step] for step in _steps_in_force(f, reading.current_step)]))
-    allowed_a = limit_a * rules.policy.faults.over_current_pct / 100 + OVER_CURRENT_OFFSET_A
-    if reading.current_a <= allowed_a:
+    highest_a = rules.measured_most_a(limit_a)
+    if reading.current_a <= highest_a:
         return None
-    return Cause.of("over_current", charger_a=reading.current_a, allowed_a=allowed_a, limit_a=limit_a)
+    return Cause.of("over_current", charger_a=reading.current_a, allowed_a=highest_a, limit_a=limit_a)
 
 
 def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
