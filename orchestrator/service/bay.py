@@ -26,8 +26,8 @@ from orchestrator.service.status import bay_status, contactor_fields
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
 
-#: A bay without news is decided this often, so that stale values are noticed.
-TICK_S = 0.2
+#: A bay without news is decided this often, so that stale values are noticed; less often where no current flows.
+TICK_S, QUIET_TICK_S = 0.2, 0.5
 
 
 class BayRunner:
@@ -48,7 +48,7 @@ class BayRunner:
         language: str = "en",
     ) -> None:
         self.name, self.place = bay.name, Place.of(bay)
-        self.last_s = 0.0  #: when the last decision was made
+        self.due_s = -inf  #: when the next decision is due at the latest
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
         self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
@@ -140,7 +140,7 @@ class BayRunner:
         internal = f"{error!r} in {where.name}, line {where.lineno}"
         if internal != self._internal:
             self._say(Cause.of("bay_internal", bay=self.name, error=internal))
-        self._internal, self.last_s = internal, now_s
+        self._internal, self.due_s = internal, now_s + TICK_S
         try:
             snapshot, memory = replace(self._snapshot, request=request), self._memory
             memory = memory or self._store.past(self.place).memory(now_s)
@@ -159,9 +159,11 @@ class BayRunner:
         self._charger.command(decision.command, grant(snapshot, now_s) if decision.command else None)
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
-        self.decision, self._internal, self.last_s = decision, "", now_s
         # In a quiet state no current flows and none is about to: what a BMU reports changes slowly.
-        if self._closely is not (closely := decision.state not in QUIET):
+        closely = decision.state not in QUIET
+        self.decision, self._internal = decision, ""
+        self.due_s = now_s + (TICK_S if closely or decision.command is not None else QUIET_TICK_S)
+        if self._closely is not closely:
             self._closely = closely
             self._battery.attend(closely=closely)
         clock, lines = WallClock(now_s, time()), []
@@ -186,7 +188,7 @@ class BayRunner:
         """Everything known about the bay now."""
         reading, charger_link = self._charger.view
         values, battery_link = self._battery.view
-        late_s = now_s - self.last_s - TICK_S if self.decision else 0.0
+        late_s = now_s - self.due_s if self.decision else 0.0
         slept_s = asleep_s - self._asleep_s if self.decision else 0.0
         self._asleep_s = asleep_s
         snapshot = Snapshot(

@@ -1,7 +1,7 @@
 """The running service: one thread per serial port, one per CAN bus, and this loop, which wakes on every new reading.
 
 Theory of operation. Devices replace their view and put their bay's number into a queue; the loop makes a decision for
-every bay with news, and for every bay at least each TICK_S, so that *missing* readings are noticed as well. The loop
+every bay with news, and for every bay at least once a tick, so that *missing* readings are noticed as well. The loop
 waits only for the queue, and signals only put into it. At the end every bay is stopped and verified.
 """
 
@@ -19,7 +19,7 @@ from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.link.can import CanBus, load
 from orchestrator.model import Cause
-from orchestrator.service.bay import TICK_S, BayRunner
+from orchestrator.service.bay import BayRunner
 from orchestrator.service.boot import boot_id
 from orchestrator.service.closing import close_all
 from orchestrator.service.console import Console
@@ -179,7 +179,7 @@ class Supervisor:
             self._reload.ask()
         now_s = monotonic()
         for bay in self._bays:
-            if now_s - bay.last_s >= TICK_S:
+            if now_s >= bay.due_s:
                 self._run(bay)
         if now_s - self._beat_s >= BEAT_S:
             self._strays.look(now_s)

@@ -207,7 +207,7 @@ class Player:
         before = watch.before or Memory()
         if after.state is not before.state:
             self._changed(number, before.state, after.state)
-        taken = Taken(Move(0.0, "", ""), bay.last_s, snapshot, before, decision, after, bay.policy.rules)
+        taken = Taken(Move(0.0, "", ""), after.last_s or 0.0, snapshot, before, decision, after, bay.policy.rules)
         for rule in PROPERTIES:
             if (wrong := rule.check(taken)) is not None:
                 self._wrong(number, rule.name, wrong)

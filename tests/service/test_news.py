@@ -19,7 +19,8 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.service.asked import Asked
-from tests.service.bench import VOLTS, Bench
+from orchestrator.service.bay import QUIET_TICK_S, TICK_S
+from tests.service.bench import STEP_S, VOLTS, Bench
 
 
 @pytest.fixture(name="bench")
@@ -164,3 +165,16 @@ def test_at_rest_most_news_waits_too(tmp_path: Path) -> None:
     assert (bench.bay.decision and bench.bay.decision.state) is State.IDLE
     assert not battery_says(bench, voltage_v=VOLTS + 0.05)
     assert battery_says(bench, current_a=1.0)
+
+
+def test_the_tick_is_longer_where_no_current_flows(bench: Bench, tmp_path: Path) -> None:
+    assert bench.bay.due_s == bench.now_s + TICK_S
+    resting = Bench(tmp_path / "resting")
+    resting.battery.values["soc_pct"] = 100.0
+    resting.step()
+    assert resting.bay.due_s == resting.now_s + TICK_S  # its stop is not verified yet
+    resting.step(10)
+    assert resting.bay.due_s == resting.now_s + QUIET_TICK_S
+    resting.now_s += QUIET_TICK_S - STEP_S
+    resting.step()
+    assert not resting.bay._snapshot.late_s
