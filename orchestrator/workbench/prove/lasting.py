@@ -14,7 +14,7 @@ from orchestrator.workbench.prove.gist import details
 from orchestrator.workbench.prove.story import TICK_S, Move, Taken
 
 #: While nothing changes: this many steps of each length. After the last one all timers have run out.
-LADDER = ((16, TICK_S), (10, 1.0), (12, 5.0), (12, 30.0), (10, 300.0), (4, 3600.0), (12, 6 * 3600.0))
+LADDER = ((16, TICK_S), (8, 1.0), (8, 5.0), (8, 30.0), (8, 300.0), (4, 3600.0), (6, 12 * 3600.0))
 #: More changes of state than this without news: the longest orderly story is three backoffs and a latch.
 PATIENCE = 60
 #: … of which a story shows this many steps.
