@@ -4,14 +4,13 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from orchestrator.config.change import changed
 from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.plainfile import read_plain
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems
-from orchestrator.config.scenario import Scenario
 from orchestrator.config.station import Station
 from orchestrator.config.stationsteps import Steps, named_steps
 from orchestrator.config.yaml.reader import Reader
@@ -21,6 +20,9 @@ from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Node, Refused, par
 from orchestrator.config.yesterday import Yesterday
 from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
+
+if TYPE_CHECKING:
+    from orchestrator.config.scenario import Scenario
 
 T = TypeVar("T")
 Lint = Callable[[Mapping[str, object]], Problems]  #: a file's values by path → what is probably unintended
@@ -50,8 +52,10 @@ def load_map(name_or_path: str | Path, relative_to: Path | None = None) -> Objec
     return _load(MAP, _find(MAP, name_or_path, relative_to), ObjectMap)
 
 
-def load_scenario(name_or_path: str | Path) -> Scenario:
+def load_scenario(name_or_path: str | Path) -> "Scenario":
     """A scenario by a shipped name or a path. Raises `ConfigError`."""
+    from orchestrator.config.scenario import Scenario  # noqa: PLC0415 - as in `files.py`
+
     return _load(SCENARIO, _find(SCENARIO, name_or_path, None), Scenario)
 
 
@@ -148,8 +152,9 @@ class _Loader:
             self._steps_a.update(named_steps(node, base))
         yesterday = Yesterday(node, self._steps_a.get(real, ())) if kind is POLICY else None
         reader = Reader(self._name(where), named if kind is STATION else {}, self._digests[real], yesterday)
-        value = reader.read(kind.record, node)
-        for path, text in kind.rules(reader.values):
+        content = kind.content()
+        value = reader.read(content.record, node)
+        for path, text in content.rules(reader.values):
             reader.report(path, text)
         bad = bool(reader.findings)
         if not bad and kind.key in self._lint:
