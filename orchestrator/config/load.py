@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
@@ -143,9 +144,10 @@ class _Loader:
         if node is None or isinstance(node, Refused):
             return INVALID
         base = where.path.parent
+        # Many bays name the same files: each name is looked for once.
         named: dict[type, Callable[[str], object]] = {
-            Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),
-            ObjectMap: lambda text: self.load(MAP, find(MAP, text, base)),
+            Policy: cache(lambda text: self.load(POLICY, find(POLICY, text, base))),
+            ObjectMap: cache(lambda text: self.load(MAP, find(MAP, text, base))),
         }
         real = os.path.realpath(where.path)
         if kind is STATION:
