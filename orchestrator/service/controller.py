@@ -6,8 +6,12 @@ the threads that need them (`link/can.py`). An error from there on leaves the ch
 ports by then.
 """
 
+import gc
 import os
 import sys
+
+if __name__ == "__main__":
+    gc.disable()  # until all is imported: none of it is garbage, and looking for some takes a tenth of that time
 
 from orchestrator.config.load import load_station
 from orchestrator.errors import CauseError, ConfigError, OrchestratorError, StartError
@@ -32,6 +36,7 @@ def main(fd: int, station: str) -> int:
         ports.start()
         from orchestrator.service.supervisor import Supervisor  # noqa: PLC0415 - the ports must not wait for this
 
+        gc.enable()
         return Supervisor(loaded, guardian, ports).run()
     except ConfigError as error:
         print(error, file=sys.stderr)  # noqa: T201 - what people read
