@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
 from benchmarks.effort import Effort
@@ -27,13 +28,14 @@ FLOOR = "import serial, sys; serial.Serial(sys.argv[1], 19200).write(bytes.fromh
 #: If nothing comes within this, the program is broken.
 BROKEN_S = 20.0
 MANY = 64
-#: What happens until the first stop, each measured alone, from exec to exit. The argument is the station file.
+IMPORT = "import gc; gc.disable(); import orchestrator.service.controller as controller"
+#: What happens at a start, each measured alone, from exec to exit. The argument is the station file.
 PARTS: Mapping[str, str] = {
     "bare Python": "pass",
     "the guardian's imports": "import orchestrator.lastresort.guardian",
-    "the controller's imports before the ports": "import orchestrator.service.controller",
-    "… and the station file": "import sys, orchestrator.service.controller as c; c.load_station(sys.argv[1])",
-    "everything but the CAN libraries": "import orchestrator.service.controller, orchestrator.service.supervisor",
+    "the controller's imports before the ports": IMPORT,
+    "… and the station file": f"{IMPORT}, sys; controller.load_station(sys.argv[1])",
+    "everything but the CAN libraries": f"{IMPORT}, orchestrator.service.supervisor",
     "the CAN libraries": "import can, canopen",
 }
 
@@ -46,6 +48,7 @@ class Port:
     bay: dict[str, str | int]
     heard: bytes = b""
     came: dict[bytes, float] = field(default_factory=dict)
+    spent_ms: float = 0.0  #: processor time of guardian and controller when the stop came: others' load adds little
 
 
 def measure(effort: Effort) -> Iterator[Result]:
@@ -54,7 +57,11 @@ def measure(effort: Effort) -> Iterator[Result]:
     with _bytecode() as environment:
         with _ports(1) as (port,), TemporaryDirectory(prefix="bench-") as name:
             argv = ours(Station(Path(name), (1,), (port.bay,)))
-            begins = [_first(argv, [port], environment)[0] for _ in range(runs + 1)][1:]  # the first one compiles
+            _first(argv, [port], environment)  # which compiles everything
+            begins, spent = [], []
+            for _ in range(runs):
+                begins += _first(argv, [port], environment)
+                spent.append(port.spent_ms)
             bare = [sys.executable, "-c", FLOOR, str(port.bay["port"])]
             floor = [_first(bare, [port], environment)[0][POLL] for _ in range(runs)]
             parts = _parts(argv[-1], runs, environment)
@@ -64,6 +71,7 @@ def measure(effort: Effort) -> Iterator[Result]:
     slots = [begin[POLL] - begin[STOP] for begin in begins]
     yield Result("exec → first status poll", "s", Series("ours", polls), beside, Goal(median=0.5))
     yield Result("exec → first byte, a stop", "s", Series("ours", stops), beside)
+    yield Result("… processor time until then", "ms", Series("ours", spent))
     yield Result("first stop → first poll: two slots", "s", Series("ours", slots))
     yield Result(f"exec → a stop on the last of {MANY} ports", "s", Series("ours", many))
     yield from parts
@@ -72,7 +80,9 @@ def measure(effort: Effort) -> Iterator[Result]:
 def _parts(station: str, runs: int, environment: Mapping[str, str]) -> list[Result]:
     def row(what: str, code: str) -> Result:
         return Result(
-            f"alone: {what}", "ms", Series("ours", _times([sys.executable, "-c", code, station], runs, environment))
+            f"processor time alone: {what}",
+            "ms",
+            Series("ours", _times([sys.executable, "-c", code, station], runs, environment)),
         )
 
     return [row(what, code) for what, code in PARTS.items()]
@@ -114,13 +124,18 @@ def _ports(count: int) -> Iterator[list[Port]]:
 
 
 def _times(argv: Sequence[str], runs: int, environment: Mapping[str, str]) -> list[float]:
-    """From exec to exit, in ms; one run before them warms up."""
+    """Processor time from exec to exit, in ms; one run before them warms up."""
     times = []
     for _ in range(runs + 1):
-        begin_s = time.monotonic()
+        begin_s = _children_s()
         subprocess.run(argv, env=environment, check=True)
-        times.append(1000 * (time.monotonic() - begin_s))
+        times.append(1000 * (_children_s() - begin_s))
     return times[1:]
+
+
+def _children_s() -> float:
+    use = getrusage(RUSAGE_CHILDREN)
+    return use.ru_utime + use.ru_stime
 
 
 def _first(argv: Sequence[str], ports: Sequence[Port], environment: Mapping[str, str]) -> list[dict[bytes, float]]:
@@ -128,19 +143,19 @@ def _first(argv: Sequence[str], ports: Sequence[Port], environment: Mapping[str,
     for port in ports:
         while select.select([port.master], [], [], 0.0)[0]:
             os.read(port.master, 4096)  # from the previous program
-        port.heard, port.came = b"", {}
+        port.heard, port.came, port.spent_ms = b"", {}, 0.0
     begin_s = time.monotonic()
     with subprocess.Popen(
         argv, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     ) as process:
         try:
-            _listen(ports, begin_s)
+            _listen(ports, begin_s, process.pid)
         finally:
             os.killpg(process.pid, signal.SIGKILL)  # guardian and controller at once, so that neither stops anything
     return [port.came for port in ports]
 
 
-def _listen(ports: Sequence[Port], begin_s: float) -> None:
+def _listen(ports: Sequence[Port], begin_s: float, pid: int) -> None:
     of_master, poll = {port.master: port for port in ports}, select.poll()
     for master in of_master:
         poll.register(master, select.POLLIN)
@@ -155,3 +170,12 @@ def _listen(ports: Sequence[Port], begin_s: float) -> None:
             for frame in (POLL, STOP):
                 if frame in port.heard:
                     port.came.setdefault(frame, time.monotonic() - begin_s)
+            if STOP in port.came and not port.spent_ms:
+                port.spent_ms = _spent_ms(pid)
+
+
+def _spent_ms(pid: int) -> float:
+    """Of a process and its children, with all their threads."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+    tasks = (task for one in (pid, *children) for task in Path(f"/proc/{one}/task").iterdir())
+    return sum(int((task / "schedstat").read_text(encoding="ascii").split()[0]) for task in tasks) / 1e6
