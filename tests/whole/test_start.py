@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.protocol.charger import STOP_FRAME
 from tests.waiting import wait_until
-from tests.whole.station import Service, station_document
+from tests.whole.station import Service, orchestrator, station_document
 
 #: A status request, up to the kinds of values.
 POLL = bytes.fromhex("AF FA 90 05 01 90")
@@ -115,3 +115,13 @@ def test_a_can_library_that_cannot_be_imported_hurts_no_port(
         for frame in (STOP_FRAME, POLL, STOP_FRAME, POLL):
             read_until(master, frame)
         assert not service.bay()["battery"]["online"]
+
+
+def test_a_start_that_fails_later_has_stopped_the_chargers(service: Service, tmp_path: Path) -> None:
+    service.edit(lambda document: document["control"].update(socket="/proc/nowhere/socket"))
+    with silent_port(tmp_path / "bay-1") as master:
+        ended = orchestrator("run", str(service.file))
+        read_until(master, STOP_FRAME)
+    assert ended.returncode == 1
+    assert "orchestrator: the control socket /proc/nowhere/socket cannot be opened" in ended.stderr
+    assert "guardian: the controller has ended with status 1: stopping the chargers on 1 ports" in ended.stderr
