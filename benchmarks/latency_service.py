@@ -21,7 +21,7 @@ from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.lastresort.guardian import Guardian
 from orchestrator.link.serial import SerialLine
 from orchestrator.protocol.charger import STOP_FRAME
-from orchestrator.service import supervisor
+from orchestrator.service import ports, supervisor
 from orchestrator.service.guarded import GuardianLink
 
 CONTROLLER_ARGUMENTS = 3  #: more arguments than this: the guardian's socket is the last
@@ -53,10 +53,13 @@ def control(path: str, hot_c: float, fd: int) -> int:
     station = load_station(path)
     of_port = {bay.charger.port: Times() for bay in station.bays}
     with (
-        patch.object(supervisor, "SerialLine", _line_class(of_port)),
+        patch.object(ports, "SerialLine", _line_class(of_port)),
         patch.object(supervisor, "BatteryNode", _node_class(station, of_port, hot_c)),
     ):
-        status = supervisor.Supervisor(station, GuardianLink(fd)).run()
+        guardian = GuardianLink(fd)
+        chargers = ports.ChargerPorts(station, guardian)
+        chargers.start()
+        status = supervisor.Supervisor(station, guardian, chargers).run()
     for bay in station.bays:
         times = of_port[bay.charger.port]
         print(json.dumps({"bay": bay.name, **vars(times)}))

@@ -3,14 +3,13 @@
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from orchestrator.config.map_rules import MAP_RULES
 from orchestrator.config.policy import Policy
 from orchestrator.config.policy_rules import policy_problems
 from orchestrator.config.rules import Problems, problems
-from orchestrator.config.scenario import Scenario
-from orchestrator.config.scenario_rules import SCENARIO_RULES
 from orchestrator.config.shipped import shipped_dir, shipped_names
 from orchestrator.config.station import Station
 from orchestrator.config.station_rules import station_problems
@@ -19,20 +18,35 @@ from orchestrator.protocol.objects import ObjectMap
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
-    """One kind of file: its identifying key, its record, the folder of shipped ones, and its rules."""
+class Content:
+    """What a kind of file is read into, and its rules."""
 
-    key: str
-    about: str
     record: type
-    folder: str
     rules: Callable[[Mapping[str, object]], Problems]
 
 
-POLICY = Kind("policy", "policy", Policy, "policies", policy_problems)
-MAP = Kind("map", "object map", ObjectMap, "configs/maps", lambda values: problems(MAP_RULES, values))
-STATION = Kind("station", "station", Station, "configs/stations", station_problems)
-SCENARIO = Kind("scenario", "scenario", Scenario, "configs/scenarios", lambda values: problems(SCENARIO_RULES, values))
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One kind of file: its identifying key, the folder of shipped ones, and its content."""
+
+    key: str
+    about: str
+    folder: str
+    content: Callable[[], Content]
+
+
+def _scenario() -> Content:
+    """Imported when a scenario is read: the service never reads one, and starts 10 ms earlier without it."""
+    from orchestrator.config.scenario import Scenario  # noqa: PLC0415 - see above
+    from orchestrator.config.scenario_rules import SCENARIO_RULES  # noqa: PLC0415 - see above
+
+    return Content(Scenario, partial(problems, SCENARIO_RULES))
+
+
+POLICY = Kind("policy", "policy", "policies", lambda: Content(Policy, policy_problems))
+MAP = Kind("map", "object map", "configs/maps", lambda: Content(ObjectMap, partial(problems, MAP_RULES)))
+STATION = Kind("station", "station", "configs/stations", lambda: Content(Station, station_problems))
+SCENARIO = Kind("scenario", "scenario", "configs/scenarios", _scenario)
 KINDS = (POLICY, MAP, STATION, SCENARIO)
 
 

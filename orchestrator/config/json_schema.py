@@ -28,7 +28,7 @@ _BOUNDS = {"ge": "minimum", "gt": "exclusiveMinimum", "le": "maximum", "lt": "ex
 def json_schema(kind: Kind) -> Schema:
     """The schema of a whole file of this kind."""
     title = f"{kind.about} of a charging station" if kind.key != "station" else "charging station"
-    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": title, **_record(kind.record)}
+    return {"$schema": "http://json-schema.org/draft-07/schema#", "title": title, **_record(kind.content().record)}
 
 
 def _record(record: type) -> Schema:

@@ -2,16 +2,16 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from orchestrator.config.change import changed
 from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
 from orchestrator.config.plainfile import read_plain
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems
-from orchestrator.config.scenario import Scenario
 from orchestrator.config.station import Station
 from orchestrator.config.stationsteps import Steps, named_steps
 from orchestrator.config.yaml.reader import Reader
@@ -21,6 +21,9 @@ from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Node, Refused, par
 from orchestrator.config.yesterday import Yesterday
 from orchestrator.errors import ConfigError, Finding
 from orchestrator.protocol.objects import ObjectMap
+
+if TYPE_CHECKING:
+    from orchestrator.config.scenario import Scenario
 
 T = TypeVar("T")
 Lint = Callable[[Mapping[str, object]], Problems]  #: a file's values by path → what is probably unintended
@@ -50,8 +53,10 @@ def load_map(name_or_path: str | Path, relative_to: Path | None = None) -> Objec
     return _load(MAP, _find(MAP, name_or_path, relative_to), ObjectMap)
 
 
-def load_scenario(name_or_path: str | Path) -> Scenario:
+def load_scenario(name_or_path: str | Path) -> "Scenario":
     """A scenario by a shipped name or a path. Raises `ConfigError`."""
+    from orchestrator.config.scenario import Scenario  # noqa: PLC0415 - as in `files.py`
+
     return _load(SCENARIO, _find(SCENARIO, name_or_path, None), Scenario)
 
 
@@ -139,17 +144,19 @@ class _Loader:
         if node is None or isinstance(node, Refused):
             return INVALID
         base = where.path.parent
+        # Many bays name the same files: each name is looked for once.
         named: dict[type, Callable[[str], object]] = {
-            Policy: lambda text: self.load(POLICY, find(POLICY, text, base)),
-            ObjectMap: lambda text: self.load(MAP, find(MAP, text, base)),
+            Policy: cache(lambda text: self.load(POLICY, find(POLICY, text, base))),
+            ObjectMap: cache(lambda text: self.load(MAP, find(MAP, text, base))),
         }
         real = os.path.realpath(where.path)
         if kind is STATION:
             self._steps_a.update(named_steps(node, base))
         yesterday = Yesterday(node, self._steps_a.get(real, ())) if kind is POLICY else None
         reader = Reader(self._name(where), named if kind is STATION else {}, self._digests[real], yesterday)
-        value = reader.read(kind.record, node)
-        for path, text in kind.rules(reader.values):
+        content = kind.content()
+        value = reader.read(content.record, node)
+        for path, text in content.rules(reader.values):
             reader.report(path, text)
         bad = bool(reader.findings)
         if not bad and kind.key in self._lint:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from orchestrator.config.files import POLICY, find
@@ -17,12 +18,13 @@ def named_steps(node: Node, base: Path) -> dict[str, Steps]:
     Reading the station file reports them.
     """
     found: dict[str, Steps] = {}
+    real_path = cache(lambda text: os.path.realpath(find(POLICY, text, base).path))  # many bays name the same policy
     for bay in _items(_get(node, "bays")):
         name, steps = _get(bay, "policy"), tuple(_floats(_get(_get(bay, "charger"), "steps_a")))
         if not isinstance(name, Scalar) or not steps:
             continue
         try:
-            real = os.path.realpath(find(POLICY, name.text, base).path)
+            real = real_path(name.text)
         except UnfitError:
             continue
         found[real] = tuple(min(pair) for pair in zip(found.get(real, steps), steps, strict=False))

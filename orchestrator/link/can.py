@@ -185,13 +185,7 @@ class CanBus:
         return LinkError(can_text.failure(self.name, self._settings, error))
 
 
-# --- the libraries; imported late because that takes 0.2 s, which the chargers' first poll must not wait for ----------
-
-
-def load() -> None:
-    """Import the libraries now: a quarter of a second on a fast machine, too long for any monitored loop."""
-    import can  # noqa: F401, PLC0415 - only here and below, so that other verbs do not wait for it
-    import canopen  # noqa: F401, PLC0415 - as above
+# --- the libraries; imported late, by the thread of a bus: it takes 0.2 s, which nothing else must wait for -----------
 
 
 def _open_bus(settings: Mapping[str, Any]) -> "can.BusABC":

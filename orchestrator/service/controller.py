@@ -1,15 +1,24 @@
-"""The controller process, as the guardian starts it: `python -m orchestrator.service.controller FD STATION`."""
+"""The controller process, as the guardian starts it: `python -m orchestrator.service.controller FD STATION`.
 
+Theory of operation. A charger may be running, so whatever it takes to stop it comes first: the station file, then the
+ports. Everything else is imported while the ports stop their chargers; python-can and canopen, which take longest, by
+the threads that need them (`link/can.py`). An error from there on leaves the chargers to the guardian, which has the
+ports by then.
+"""
+
+import gc
 import os
 import sys
+
+if __name__ == "__main__":
+    gc.disable()  # until all is imported: none of it is garbage, and looking for some takes a tenth of that time
 
 from orchestrator.config.load import load_station
 from orchestrator.errors import CauseError, ConfigError, OrchestratorError, StartError
 from orchestrator.lastresort.descriptors import raised
 from orchestrator.model import Cause
 from orchestrator.service.guarded import GuardianLink
-from orchestrator.service.supervisor import Supervisor
-from orchestrator.text.catalogue import say
+from orchestrator.service.ports import ChargerPorts
 
 #: Open files besides bays and buses: streams, sockets, journal, clients.
 SHARED = 32
@@ -23,10 +32,17 @@ def main(fd: int, station: str) -> int:
         loaded = load_station(station)
         language = loaded.language.value
         check_limit(len(loaded.bays), len(loaded.can))
-        return Supervisor(loaded, guardian).run()
+        ports = ChargerPorts(loaded, guardian)
+        ports.start()
+        from orchestrator.service.supervisor import Supervisor  # noqa: PLC0415 - the ports must not wait for this
+
+        gc.enable()
+        return Supervisor(loaded, guardian, ports).run()
     except ConfigError as error:
         print(error, file=sys.stderr)  # noqa: T201 - what people read
     except CauseError as error:
+        from orchestrator.text.catalogue import say  # noqa: PLC0415 - as above
+
         print(f"orchestrator: {say(error.cause, language)}", file=sys.stderr)  # noqa: T201
     except OrchestratorError as error:
         print(f"orchestrator: {error}", file=sys.stderr)  # noqa: T201

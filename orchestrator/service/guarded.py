@@ -4,11 +4,14 @@ import array
 import socket
 import threading
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from orchestrator.lastresort.guardian import ALIVE, BEAT, CONTACTOR, DONE, DROP, PORT
-from orchestrator.link.gpio import OutputLine
 from orchestrator.link.serial import SerialLine
 from orchestrator.model import Cause
+
+if TYPE_CHECKING:
+    from orchestrator.link.gpio import OutputLine
 
 #: A guardian that has not answered a heartbeat for this long is gone, or hangs.
 SILENCE_S = 2.0
@@ -96,7 +99,7 @@ class GuardedLine:
 class GuardedOutput:
     """A contactor's line; the guardian has a duplicate of it while it is open."""
 
-    def __init__(self, name: str, open_output: Callable[[], OutputLine], guardian: GuardianLink) -> None:
+    def __init__(self, name: str, open_output: "Callable[[], OutputLine]", guardian: GuardianLink) -> None:
         self._name, self._guardian = name, guardian
         self._output = open_output()
         guardian.hold_contactor(name, self._output.fileno())

@@ -8,7 +8,7 @@ waits only for the queue, and signals only put into it. At the end every bay is 
 import signal
 from collections.abc import Callable, Collection
 from functools import partial
-from queue import Empty, SimpleQueue
+from queue import Empty
 from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
 from types import FrameType
 
@@ -17,7 +17,7 @@ from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
-from orchestrator.link.can import CanBus, load
+from orchestrator.link.can import CanBus
 from orchestrator.model import Cause
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.boot import boot_id
@@ -27,19 +27,20 @@ from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
+from orchestrator.service.ports import REQUESTS, ChargerPorts
 from orchestrator.service.reload import Reload
 from orchestrator.service.request_handler import RequestHandler
 from orchestrator.service.starts import Starts
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
-from orchestrator.service.wiring import charger_port, open_contactor, stray_port
+from orchestrator.service.wiring import open_contactor, stray_port
 from orchestrator.text.catalogue import say
 
 #: The heartbeat period: the guardian acts after five missed ones.
 BEAT_S = 0.1
 #: How long the end of the service waits for every charger to be verified.
 STOP_S = 3.0
-#: A working disk delivers the persisted state within this; otherwise the chargers are stopped meanwhile …
+#: A working disk delivers the persisted state within this; otherwise journal and control socket start meanwhile …
 LOCK_S = 0.3
 #: … and it has this long.
 LOAD_S = 3.0
@@ -50,21 +51,23 @@ CLOSE_S = 2.5
 
 
 class Supervisor:
-    """The service for one station. `run` returns when the service is told to end."""
+    """The service for one station. `run` returns when the service is told to end.
 
-    def __init__(self, station: Station, guardian: GuardianLink) -> None:
+    `ports` have already been started: stopping the chargers does not wait for any of this.
+    """
+
+    def __init__(self, station: Station, guardian: GuardianLink, ports: ChargerPorts) -> None:
         self._station, self._language = station, station.language.value
         self._guardian = guardian
         self._beat_s = 0.0
         self._lost: Cause | None = None  # why the guardian cannot be relied on any more
-        self._wake: SimpleQueue[int | None] = SimpleQueue()
+        self._ports, self._wake = ports.all, ports.news
         self._ending: Cause | None = None
         boot, kept = boot_id(), station.journal
         self._console = Console(language=self._language)
         self._journal = Journal(kept.directory, kept.max_mb, monotonic, time, boot=boot, say=self._say)
         places = [Place.of(bay) for bay in station.bays]
         self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_persisted=self._on_persisted)
-        self._ports: list[ChargerPort] = []
         self._buses: list[BatteryBus] = []
         self._bays: list[BayRunner] = []
         self._build()
@@ -90,12 +93,10 @@ class Supervisor:
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
         alone = len(self._station.bays) == 1
         starts = Starts(0.0 if alone else self._station.stagger_s, self._station.source.at("stagger_s"))
-        for number, bay in enumerate(self._station.bays):
+        for number, (bay, port) in enumerate(zip(self._station.bays, self._ports, strict=True)):
             poke: Callable[[], None] = partial(self._wake.put, number)
-            port = charger_port(bay.charger, bay.limits, poke, self._guardian)
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
-            self._ports.append(port)
             contactor, snapshots = open_contactor(bay, self._guardian), self._station.journal.snapshots
             runner = BayRunner(
                 bay, port, node, self._journal, self._store, self._say,
@@ -118,6 +119,7 @@ class Supervisor:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGHUP, self._on_hangup)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, REQUESTS)
         try:
             self._begin()
             while self._ending is None:
@@ -128,7 +130,7 @@ class Supervisor:
             self._console.close()
 
     def _begin(self) -> None:
-        """Stop every charger, read the persisted state, and make every bay's first decision."""
+        """Read the persisted state, and make every bay's first decision. The ports stop their chargers meanwhile."""
         self._store.start()
         if known := self._store.wait(LOCK_S):
             self._strays.begin()
@@ -136,9 +138,6 @@ class Supervisor:
         self._journal.start()
         self._reload.start()
         self._control.start()
-        for port in self._ports:
-            port.start()
-        load()  # the ports stop their chargers meanwhile; the first heartbeat comes after this
         if not known and self._store.wait(LOAD_S):
             self._strays.begin()
         for bus in self._buses:

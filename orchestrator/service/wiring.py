@@ -1,31 +1,16 @@
-"""Creates a bay's devices for the service: the guardian gets a duplicate of each port and each contactor's line."""
+"""Creates what a bay may have besides charger and BMU: a contactor, and an earlier run's charger on another port."""
 
 from collections.abc import Callable
 from functools import partial
-from time import monotonic
 
-from orchestrator.config.station import BayConfig, ChargerConfig, Limits, Rs485
+from orchestrator.config.station import BayConfig, ChargerConfig, Limits
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.keys import Range
 from orchestrator.link.gpio import OutputLine, need_gpiod
-from orchestrator.link.serial import SerialLine
 from orchestrator.service.contactor import Contactor
-from orchestrator.service.guarded import GuardedLine, GuardedOutput, GuardianLink
+from orchestrator.service.guarded import GuardedOutput, GuardianLink
 from orchestrator.service.past import Place
-
-
-def charger_port(
-    charger: ChargerConfig, limits: Limits, poke: Callable[[], None], guardian: GuardianLink
-) -> ChargerPort:
-    """The port of one charger, not started; `poke` is called for every reading."""
-    port, kernel = charger.port, charger.rs485 is Rs485.KERNEL
-    return ChargerPort(
-        charger,
-        limits,
-        open_line=partial(GuardedLine, port, partial(SerialLine.open, port, kernel_rs485=kernel), guardian),
-        clock=monotonic,
-        on_change=poke,
-    )
+from orchestrator.service.ports import charger_port
 
 
 def stray_port(guardian: GuardianLink, poke: Callable[[], None], place: Place) -> ChargerPort:

@@ -13,6 +13,7 @@ from orchestrator.config.load import load_station
 from orchestrator.model import Request
 from orchestrator.service import client
 from orchestrator.service.guarded import GuardianLink
+from orchestrator.service.ports import ChargerPorts
 from orchestrator.service.supervisor import Supervisor
 from tests.fuzz.target import Target, kind_of_word, scratch
 
@@ -54,7 +55,8 @@ def _service() -> tuple[Supervisor, Loop]:
     bays = "\n  - ".join(BAY % (name, name, 16 + number) for number, name in enumerate(BAYS))
     (directory / "station.yaml").write_text(STATION.replace("&", bays), encoding="utf-8")
     ours, _theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    supervisor = Supervisor(load_station(directory / "station.yaml"), GuardianLink(ours.detach()))
+    station, guardian = load_station(directory / "station.yaml"), GuardianLink(ours.detach())
+    supervisor = Supervisor(station, guardian, ChargerPorts(station, guardian))
     supervisor._store.persisted_revision = sys.maxsize  # the disk is instantaneous
     loop = Loop(supervisor)
     supervisor._handler._wake = loop.put

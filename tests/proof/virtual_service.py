@@ -39,12 +39,14 @@ from orchestrator.link import can as can_module
 from orchestrator.link import serial as serial_module
 from orchestrator.model import ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
+from orchestrator.service import ports as ports_module
 from orchestrator.service import reload as reload_module
 from orchestrator.service import supervisor as supervisor_module
 from orchestrator.service import wiring as wiring_module
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.past import Place
+from orchestrator.service.ports import ChargerPorts
 from orchestrator.service.supervisor import Supervisor
 from orchestrator.sim.can_noise import Bus
 from orchestrator.sim.can_wire import PERFECT
@@ -56,6 +58,11 @@ from tests.proof.virtual_time import Time
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 FIRST_NODE = 0x10
+#: Of the real signals only the names: a world is ended by `World.end`.
+SIGNALS = SimpleNamespace(
+    signal=lambda *_: None, pthread_sigmask=lambda *_: None, SIG_BLOCK=0, SIG_UNBLOCK=1,
+    SIGTERM=15, SIGINT=2, SIGHUP=1, Signals=signal.Signals,
+)  # fmt: skip
 
 
 class Guardian:
@@ -223,7 +230,8 @@ class World:
         self._kept = kept
         self._patch()
         self.guardian = Guardian()
-        self.supervisor = Supervisor(the_station, self.guardian)  # type: ignore[arg-type]  # as the real one
+        self._ports = ChargerPorts(the_station, self.guardian)  # type: ignore[arg-type]  # as the real one
+        self.supervisor = Supervisor(the_station, self.guardian, self._ports)  # type: ignore[arg-type]  # as above
         self.on_step: Callable[[BayRunner], None] = lambda _: None
         self._watch_steps()
 
@@ -261,6 +269,7 @@ class World:
     def run(self) -> int:
         """Run until it ends; returns the exit status. Raises whatever breaks the world."""
         try:
+            self._ports.start()
             return self.supervisor.run()
         except BaseException:
             if self.time.failure is not None:
@@ -293,15 +302,13 @@ class World:
         replaced: dict[Any, dict[str, Any]] = {
             wiring_module: {
                 "OutputLine": SimpleNamespace(open=lambda _chip, line, **_: Contactor(self.rigs[line])),
-                "monotonic": time.clock,
             },
+            ports_module: {"monotonic": time.clock, "SimpleQueue": _Queues(time), "signal": SIGNALS},
             supervisor_module: {
-                "monotonic": time.clock, "boottime": time.clock, "SimpleQueue": _Queues(time),
+                "monotonic": time.clock, "boottime": time.clock,
                 "Journal": Notebook, "Console": Notebook, "ControlSocket": Silence,
                 "Store": partial(Shelf, self._kept), "boot_id": lambda: "virtual", "close_all": _close_all,
-                "signal": SimpleNamespace(
-                    signal=lambda *_: None, SIGTERM=15, SIGINT=2, SIGHUP=1, Signals=signal.Signals
-                ),
+                "signal": SIGNALS,
             },
             asked_module: {"Event": event},
             reload_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},

@@ -1,6 +1,6 @@
 """Volts and amps of charger and BMU side by side, and which of the two is likelier wrong."""
 
-from statistics import fmean
+from math import fsum
 
 from orchestrator.config.amperes import volts_differ
 from orchestrator.core.cells import chemistry
@@ -63,7 +63,8 @@ def _steady(f: Facts, name: str, now: float) -> float:
     """
     if f.reading is None or f.reading.charge_mode not in PULSES:
         return now
-    return fmean([getattr(sample, name) for sample in f.memory.witnessed.trail] or [now])
+    trail = [getattr(sample, name) for sample in f.memory.witnessed.trail] or [now]
+    return fsum(trail) / len(trail)
 
 
 def _fits_soc(f: Facts, volts: float) -> bool:
