@@ -74,8 +74,16 @@ def _charged(f: Facts, _faults: Faults) -> Found:
     if wanted:
         return None
     if f.memory.battery.full_pct is not None:
-        return Trigger.FILL, why
+        return Trigger.FILL, _full(f, why)
     return (Trigger.REST, why) if f.soc is not None else None
+
+
+def _full(f: Facts, why: Cause) -> Cause:
+    """Why the battery counts as full, and what begins the next charge."""
+    ended = f.memory.stop.stop_cause
+    known = ended if ended is not None and ended.id == "full" else Cause("full_before")
+    again = Cause("charged_again", why.params, why.key, why.place) if f.soc is not None else why
+    return Cause(known.id, (*known.params, ("past", True), ("then", again)), known.key, known.place)
 
 
 def _barred(_f: Facts, faults: Faults) -> Found:

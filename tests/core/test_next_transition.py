@@ -279,7 +279,10 @@ def test_a_full_battery_is_charged_again_when_it_has_lost_enough(
     world.values["soc_pct"] = not_below_pct
     world.run(30)
     assert world.is_in(S.FULL)
-    assert reason_of(world.decision).startswith(f"SOC {not_below_pct:.0f} % is not below {not_below_pct:g} % (")
+    told = reason_of(world.decision)
+    assert told.startswith("full: SOC 100 %" if full_pct == 100 else "full: the charger reported full (mode 5) (")
+    assert f"; SOC {not_below_pct:.0f} % now, charged again below {not_below_pct:g} % (" in told
+    assert world.ask(Request.START) == f"nothing to start: FULL: {told}"
     world.values["soc_pct"] = below_pct
     world.until(S.CHARGING, 5)
 

@@ -143,9 +143,11 @@ GOES = (
          bmu={"soc_pct": 97.0}),
     Edge(goes, (Trigger.QUALIFY, f"SOC 99 % is below 100 % ({AT('finish.target_soc_pct')})"), session(), SUSPENDED,
          **AT_REST, bmu={"soc_pct": 99.0}),
-    Edge(goes, (None, f"SOC 95 % is not below 95 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 100.0}, FULL,
+    Edge(goes, (None, f"full: the battery was charged full here, and is there since; SOC 95 % now, charged again below "
+                f"95 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 100.0}, FULL,
          **AT_REST, bmu={"soc_pct": 95.0}),
-    Edge(goes, (None, f"SOC 87 % is not below 87 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 90.0}, FULL,
+    Edge(goes, (None, f"full: the battery was charged full here, and is there since; SOC 87 % now, charged again below "
+                f"87 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 90.0}, FULL,
          **AT_REST, bmu={"soc_pct": 87.0}),
     Edge(goes, (Trigger.QUALIFY, f"SOC 86 % is below 87 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 90.0}, FULL,
          **AT_REST, bmu={"soc_pct": 86.0}),

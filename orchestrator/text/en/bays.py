@@ -24,6 +24,8 @@ TEXTS: Mapping[str, str] = {
     "soc_unknown": "a battery is there; its SOC is not known yet",
     "soc_below": "SOC {soc_pct:.0f} % is below {threshold_pct:g} %{at}",
     "soc_not_below": "SOC {soc_pct:.0f} % is not below {threshold_pct:g} %{at}",
+    "full_before": "full: the battery was charged full here, and is there since",
+    "charged_again": "SOC {soc_pct:.0f} % now, charged again below {threshold_pct:g} %{at}",
     "to_go_on": "to go on",
     "start_bay": "orchestrator start {bay}",
     # a charger that was not seen to stop
@@ -58,7 +60,7 @@ TEXTS: Mapping[str, str] = {
     "pulses_over": "{limit_min:g} min of pulses{at}",
     "full": "full: {what}",
     "full_soc": "SOC {soc_pct:.0f} % reached {limit_pct:g} %{at}",
-    "full_charger": "the charger reports full (mode 5){at}",
+    "full_charger": "the charger {reports|reported} full (mode 5){at}",
     "full_taper": "{charger_a:.2f} A, tapered below {below_a:g} A for {for_s:g} s{at}",
     "charging": "step {step} ({step_a:.1f} A): {rule}{limited:after}{rises:after}{held:after}",
     "held_at_the_top": "full, and held at the top for another {left_min:.0f} min{at}",

@@ -24,6 +24,8 @@ TEXTS: Mapping[str, str] = {
     "soc_unknown": "배터리가 있으나 아직 SOC를 알 수 없습니다",
     "soc_below": "SOC {soc_pct:.0f} %가 {threshold_pct:g} %보다 낮습니다{at}",
     "soc_not_below": "SOC {soc_pct:.0f} %가 {threshold_pct:g} % 이상입니다{at}",
+    "full_before": "충전 완료: 배터리가 여기서 완충된 뒤 그대로 있습니다",
+    "charged_again": "현재 SOC는 {soc_pct:.0f} %이며 {threshold_pct:g} % 아래에서 다시 충전합니다{at}",
     "to_go_on": "계속하려면",
     "start_bay": "orchestrator start {bay}",
     # a charger that was not seen to stop
@@ -58,7 +60,7 @@ TEXTS: Mapping[str, str] = {
     "pulses_over": "펄스를 {limit_min:g}분 동안 주었습니다{at}",
     "full": "충전 완료: {what}",
     "full_soc": "SOC {soc_pct:.0f} %가 {limit_pct:g} %에 도달했습니다{at}",
-    "full_charger": "충전기가 충전 완료(모드 5)를 보고합니다{at}",
+    "full_charger": "충전기가 충전 완료(모드 5)를 {보고합니다|보고했습니다}{at}",
     "full_taper": "전류가 {for_s:g} s 동안 {below_a:g} A 아래로 줄어 {charger_a:.2f} A입니다{at}",
     "charging": "단계 {step}({step_a:.1f} A): {rule}{limited:after}{rises:after}{held:after}",
     "held_at_the_top": "충전이 완료되어 앞으로 {left_min:.0f}분 동안 유지합니다{at}",
