@@ -29,6 +29,9 @@ LIVE: Mapping[str, Callable[[Facts], float | None]] = {
     "bad_pct": lambda f: f.charger.bad_pct,
 }
 
+#: Evidence that calls for something else than its row's advice: for the advice under its own id.
+OWN_ADVICE = frozenset({"unfinished", "temperature_jump"})
+
 
 def active_faults(
     memory: Memory, now_s: float, bay: str, f: Facts | None = None, *, at_rest: bool = False
@@ -69,10 +72,13 @@ def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cau
     if fault.clean_s is not None or row.moment:
         more["past"] = True
     seen = fault.now if fault.now is not None and not row.moment else fault.cause
-    advice = row.at_rest if at_rest and row.at_rest else row.id
+    seen = seen or Cause(row.id)
+    advice = seen.id if seen.id in OWN_ADVICE else row.id
+    if at_rest and row.at_rest:
+        advice = row.at_rest
     if row.clear is Clear.AUTO and fault.clean_s is not None:  # nothing is left to do
         advice = ""
-    return (seen or Cause(row.id)).with_(advice, **more)
+    return seen.with_(advice, **more)
 
 
 def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:

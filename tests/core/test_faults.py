@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
+from orchestrator.core.active import OWN_ADVICE
 from orchestrator.core.faults import FAULTS, ROW, Check, Clear, FaultRow
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.core.states import ENERGISED

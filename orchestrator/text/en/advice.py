@@ -17,7 +17,8 @@ ADVICE: Mapping[str, str] = {
     "port_locked": "end that program (fuser -v shows it) and keep it away from this port",
     "noisy_line": "check the cable, its shield and its ground",
     "charger_silent": "check the charger's power and its cable",
-    "found_running": "it was stopped; find out why it ran, then start",
+    "found_running": "the charger was stopped: find out who started it, then start",
+    "unfinished": "find out why the service ended (its log and the system's say it), then start",
     "rogue_run": "somebody else commands this charger, or it is defective: find out, then reset",
     "current_without_order": "cut the charger's mains if the current goes on; if the BMU shows it with the mains off "
     "too, restart the BMU, else check the bay's serial cable and what else charges this pack, then reset",
@@ -59,6 +60,7 @@ ADVICE: Mapping[str, str] = {
     "over_temperature": "let it cool down",
     "under_temperature": "let it warm up",
     "runaway": "keep people away; inspect the pack, then reset",
+    "temperature_jump": "no pack warms or cools this fast: check the sensor and its wiring, then reset",
     "temperature_invalid": "no temperature, no charge: check the sensor and the object map, then reset",
     "implausible": "check the object map against this BMU",
     "under_voltage": "too deeply discharged to be woken here: have the pack inspected",

@@ -125,7 +125,8 @@ TEXTS: Mapping[str, str] = {
     "{tried_s:.0f} s, and cannot verify the stop that it repeats ({error})",
     "failed_request": "internal error: {error}; this is a defect of the software; the charger is being stopped",
     # left by the previous run
-    "unfinished": "the last run of this service ended in mid-charge; its charger was stopped first when it began again",
+    "unfinished": "this service began again after its last run had ended in mid-charge, and had to stop the charger "
+    "first",
     "fault_of_another_version": "{fault}",
     "ended_in_charge": "the last run ended in mid-charge: {why}",
     "stray_ran": "the station file had no bay on {port} while its charger was running",

@@ -125,7 +125,7 @@ TEXTS: Mapping[str, str] = {
     "못했고, 반복하는 정지를 확인할 수 없습니다({error})",
     "failed_request": "내부 에러: {error}. 소프트웨어 결함입니다. 충전기를 정지하고 있습니다",
     # left by the previous run
-    "unfinished": "이 서비스의 지난 실행이 충전 중에 끝났습니다. 다시 시작할 때 먼저 충전기를 정지시켰습니다",
+    "unfinished": "이 서비스가 충전 중에 끝난 뒤 다시 시작되어, 먼저 충전기를 정지해야 했습니다",
     "fault_of_another_version": "{fault}",
     "ended_in_charge": "지난 실행이 충전 중에 끝났습니다: {why}",
     "stray_ran": "충전기가 동작하는 동안 스테이션 파일에 {port}의 베이가 없었습니다",
