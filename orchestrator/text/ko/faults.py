@@ -67,6 +67,7 @@ TEXTS: Mapping[str, str] = {
     "bmu_frozen": "충전기 전압이 {moved_v:.2f} V 변하고 {moved_ah:.2f} Ah가 충전되는 동안 BMU의 모든 값이 "
     "{lasted_s:.0f} s째 {그대로입니다|그대로였습니다}: 값이 멈추었습니다",
     "pack_sunk": "충전 중에 팩 전압이 {floor_v:g} V 아래인 {pack_v:.2f} V까지 내려갔습니다{at}",
+    "pack_stays_low": "충전 중에 팩 전압이 떨어진 뒤 {pack_v:.2f} V로 {floor_v:g} V보다 {낮습니다|낮았습니다}{at}",
     "pack_fell": "{pack_a:.2f} A가 흐르는 동안 팩 전압이 {passed_s:.0f} s 안에 {before_v:.2f} V에서 {pack_v:.2f} V로 "
     "떨어졌습니다: 셀 또는 접점에 이상이 있습니다",
     "back_feed": "충전기가 동작하는 동안 BMU가 {discharge_a:.2f} A의 방전을 {보고합니다|보고했습니다}",
