@@ -18,6 +18,7 @@ TEXTS: Mapping[str, str] = {
     "span_unknown": "{quantity:word} 값을 알 수 없음",
     "span_in": "{value}({low:g} … {high:g} 구간)",
     "span_near": "{value}({low:g} … {high:g} 구간을 아직 {well:g} 이상 벗어나지 않음)",
+    "span_left": "{value}({low:g} … {high:g} 구간을 벗어남)",
     "span_kept": "{value}({low:g} … {high:g} 구간 밖이나 이번 충전에서 너무 자주 되돌아옴)",
     # what the row allows
     "allows_nothing": "전류를 허용하지 않습니다",
