@@ -31,6 +31,12 @@ LIVE: Mapping[str, Callable[[Facts], float | None]] = {
 
 #: Evidence that calls for something else than its row's advice: for the advice under its own id.
 OWN_ADVICE = frozenset({"unfinished", "temperature_jump"})
+#: Problems of a line whose sentence ends with what to do about exactly them.
+SAY_WHAT_TO_DO = frozenset({
+    "port_missing", "port_gone", "port_busy", "port_forbidden", "port_not_serial", "port_stubborn", "port_stalled",
+    "port_taken", "port_too_many_files", "port_not_rs485", "charger_no_reply", "charger_noise", "charger_complains",
+    "charger_late", "bmu_stopped", "bmu_late", "bmu_unreachable",
+})  # fmt: skip
 
 
 def active_faults(
@@ -76,7 +82,8 @@ def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cau
     advice = seen.id if seen.id in OWN_ADVICE else row.id
     if at_rest and row.at_rest:
         advice = row.at_rest
-    if row.clear is Clear.AUTO and fault.clean_s is not None:  # nothing is left to do
+    nothing_left = row.clear is Clear.AUTO and fault.clean_s is not None
+    if nothing_left or (seen.id in SAY_WHAT_TO_DO and not fault.latched):
         advice = ""
     return seen.with_(advice, **more)
 

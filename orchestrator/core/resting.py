@@ -2,11 +2,14 @@
 
 from collections.abc import Callable
 
+from orchestrator.core.active import active_faults
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import full_due, goes_on, target
 from orchestrator.core.machine import Trigger
 from orchestrator.core.outofcontrol import problem
+from orchestrator.core.parts import changed
+from orchestrator.core.states import DONE
 from orchestrator.model import ActiveFault, Cause, Effect, State
 
 Faults = tuple[ActiveFault, ...]
@@ -56,7 +59,7 @@ def _ends(f: Facts, _faults: Faults) -> Found:
 
 
 def _pauses(f: Facts, _faults: Faults) -> Found:
-    return (Trigger.SUSPEND, Cause("operator_pause", advice="start")) if f.memory.operator.paused else None
+    return (Trigger.SUSPEND, held(f, Cause("operator_pause"))) if f.memory.operator.paused else None
 
 
 def _absent(f: Facts, _faults: Faults) -> Found:
@@ -86,10 +89,13 @@ def _full(f: Facts, why: Cause) -> Cause:
     return Cause(known.id, (*known.params, ("past", True), ("then", again)), known.key, known.place)
 
 
-def _barred(_f: Facts, faults: Faults) -> Found:
+def _barred(f: Facts, faults: Faults) -> Found:
     worst = faults[0] if faults else None
     if worst is None or worst.effect < Effect.NO_START:
         return None
+    if f.memory.state in DONE:  # it is told where the bay goes: there it waits to go on
+        waiting = changed(f.memory, state=State.SUSPENDED)
+        worst = active_faults(waiting, f.now_s, f.rules.bay.name, f, at_rest=True)[0]
     return Trigger.SUSPEND, worst.told
 
 

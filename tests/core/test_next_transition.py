@@ -492,7 +492,7 @@ def test_a_pause_goes_on_in_the_same_session() -> None:
     world.ask(Request.PAUSE)
     world.run(3600, dt_s=1.0)
     assert world.is_in(S.SUSPENDED)
-    assert reason_of(world.decision) == "paused by the operator; start to go on"
+    assert reason_of(world.decision) == "paused by the operator; to go on: orchestrator start bay-1"
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
     assert sessions(world) == []
@@ -529,11 +529,14 @@ def test_a_charger_that_comes_back_running_is_stopped_and_waits_for_a_person() -
 
 def test_offline_and_back() -> None:
     world = offline()
-    assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 0x10) does not answer"
+    assert reason_of(world.decision).startswith("48.0 V at the charger, but the BMU (node 0x10) does not answer; ")
     world.battery_link = replace(
         world.battery_link, problem=cause("BMU 0x10 on can0 does not answer: no frame of it came")
     )
-    assert reason_of(world.tick()) == "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came"
+    assert reason_of(world.tick()) == (
+        "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came; "
+        "the bay goes on by itself once the BMU answers"
+    )
     world.battery_answers = True
     world.until(S.CHARGING, 10)
 

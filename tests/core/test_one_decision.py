@@ -44,6 +44,10 @@ def course_of(f: Facts) -> Next:
     return next_transition(f, active_faults(f.memory, f.now_s, "bay-1", f))
 
 
+#: What a bay does that cannot hear its BMU.
+GOES_ON = "; the bay goes on by itself once the BMU answers"
+
+
 def goes(f: Facts) -> tuple[Trigger | None, Cause]:
     return course_of(f)[:2]
 
@@ -126,14 +130,15 @@ GOES = (
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, IDLE, charger={"t_s": ago(9)}),
     Edge(goes, (Trigger.HOLD, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, FULL, **AT_REST),
     Edge(goes, (None, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, HELD, **AT_REST),
-    Edge(goes, (Trigger.SUSPEND, "paused by the operator; start to go on"), {"paused": True}, IDLE, **AT_REST),
+    Edge(goes, (Trigger.SUSPEND, "paused by the operator; to go on: orchestrator start bay-1"), {"paused": True}, IDLE,
+         **AT_REST),
     Edge(goes, (Trigger.RESET, "reset by the operator; to go on: orchestrator start bay-1"), {}, TRIPPED, **AT_REST),
-    Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer"), {}, IDLE,
+    Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer" + GOES_ON), {}, IDLE,
          **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0}, charger_link=STOP_SENT, snapshot={"connected": False}),
-    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted"), {}, IDLE, **AT_REST,
-         bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "boot_t_s": ago(1)}),
-    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but unplugged"), {}, IDLE, **AT_REST, bmu=SILENT_BMU["bmu"],
-         bmu_link={"online": False, "problem": cause("unplugged")}),
+    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted" + GOES_ON), {}, IDLE,
+         **AT_REST, bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "boot_t_s": ago(1)}),
+    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but unplugged" + GOES_ON), {}, IDLE, **AT_REST,
+         bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "problem": cause("unplugged")}),
     Edge(goes, (None, "no battery"), {}, IDLE, **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0},
          charger_link=STOP_SENT),
     Edge(goes, (None, "a battery is there; its SOC is not known yet"), {}, IDLE, **AT_REST, bmu={"soc_pct": None}),

@@ -5,8 +5,10 @@ from collections.abc import Mapping
 ADVICE: Mapping[str, str] = {
     "reverse_polarity": "correct the battery's polarity, then reset",
     "polarity_contradicts": "measure the battery's polarity; if that is right, the charger is defective; then reset",
-    "error_stop": "look at the charger's own display and manual, then reset",
-    "system_stop": "find out who stopped the charger, then start",
+    "error_stop": "read the error at the charger itself, and switch its mains off and on; once it has left mode 8, reset; if it comes "
+    "back, have the charger repaired",
+    "system_stop": "look whether somebody or something switched it off at the charger; if it stays in mode 7, switch its mains off and "
+    "on; then start; if it comes back, have the charger repaired",
     "illegal_value": "a value outside its documented list: check the line and the charger's version",
     "mode_taken_over": "set the charger's rotary switch or the station file, then start",
     "rejected_frame": "this charger does not know our commands: check its model and version, then reset",
@@ -54,8 +56,8 @@ ADVICE: Mapping[str, str] = {
     "bmu_rebooted": "if it happens again, check the BMU's supply",
     "status_trip": "inspect the pack, then reset",
     "status_limit": "charging goes on, on the lowest step",
-    "emergency": "look the error up in the BMU's manual; once the BMU has taken it back (restart it if it "
-    "does not), start",
+    "emergency": "look the code up in the BMU's manual and mend what it names; if the BMU does not take the error back, "
+    "restart it; then start",
     "hot_trip": "keep people away until it has cooled down; inspect the pack, then reset",
     "over_temperature": "let it cool down",
     "under_temperature": "let it warm up",
@@ -89,6 +91,4 @@ ADVICE: Mapping[str, str] = {
     "internal": "this is a defect of the software: report it with the journal, then reset",
     # once the charger is in standby
     "stands_by_now": "the charger stands by now: have the cause repaired, then reset",
-    # what a person does next
-    "start": "start to go on",
 }

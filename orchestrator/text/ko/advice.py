@@ -7,8 +7,10 @@ PROGRAM = "이 포트를 사용하는 프로그램(fuser -v, ModemManager, getty
 ADVICE: Mapping[str, str] = {
     "reverse_polarity": "배터리의 극성을 바로잡은 뒤 리셋하십시오",
     "polarity_contradicts": "배터리의 극성을 측정하십시오. 극성이 맞으면 충전기 고장입니다. 그런 다음 리셋하십시오",
-    "error_stop": "충전기의 표시부와 설명서를 확인한 뒤 리셋하십시오",
-    "system_stop": "누가 충전기를 정지시켰는지 확인한 뒤 시작하십시오",
+    "error_stop": "충전기에서 에러를 확인하고 주전원을 껐다가 켜십시오. 모드 8에서 벗어나면 리셋하십시오. 다시 발생하면 수리를 "
+    "의뢰하십시오",
+    "system_stop": "충전기에서 직접 정지시켰는지 확인하십시오. 모드 7이 계속되면 주전원을 껐다가 켠 뒤 시작하십시오. 다시 발생하면 수리를 "
+    "의뢰하십시오",
     "illegal_value": "규격에 없는 값입니다. 통신선과 충전기의 버전을 확인하십시오",
     "mode_taken_over": "충전기의 로터리 스위치 또는 스테이션 파일을 맞춘 뒤 시작하십시오",
     "rejected_frame": "이 충전기는 우리의 명령을 알지 못합니다. 모델과 버전을 확인한 뒤 리셋하십시오",
@@ -54,7 +56,8 @@ ADVICE: Mapping[str, str] = {
     "bmu_rebooted": "다시 발생하면 BMU의 전원을 확인하십시오",
     "status_trip": "팩을 점검한 뒤 리셋하십시오",
     "status_limit": "가장 낮은 단계로 충전을 계속합니다",
-    "emergency": "BMU 설명서에서 에러를 찾아보십시오. BMU가 에러를 해제하면(해제하지 않으면 재시작) 시작하십시오",
+    "emergency": "BMU 설명서에서 코드를 찾아 원인을 해결하십시오. BMU가 에러를 해제하지 않으면 재시작하십시오. 그런 다음 "
+    "시작하십시오",
     "hot_trip": "식을 때까지 사람의 접근을 막으십시오. 팩을 점검한 뒤 리셋하십시오",
     "over_temperature": "식을 때까지 기다리십시오",
     "under_temperature": "따뜻해질 때까지 기다리십시오",
@@ -88,6 +91,4 @@ ADVICE: Mapping[str, str] = {
     "internal": "소프트웨어 결함입니다. 저널과 함께 신고한 뒤 리셋하십시오",
     # once the charger is in standby
     "stands_by_now": "이제 충전기가 대기 중입니다. 원인을 수리한 뒤 리셋하십시오",
-    # what a person does next
-    "start": "계속하려면 시작하십시오",
 }

@@ -18,7 +18,7 @@ TEXTS: Mapping[str, str] = {
     "stopped_first": "다른 무엇보다 먼저 충전기를 정지하고 있습니다",
     "runs_uncommanded": "기동 명령이 없었는데 충전기가 동작합니다",
     "battery_absent": "배터리가 없습니다",
-    "battery_not_heard": "충전기에 {charger_v:.1f} V가 있으나 {what}",
+    "battery_not_heard": "충전기에 {charger_v:.1f} V가 있으나 {what}. BMU가 응답하면 자동으로 재개합니다",
     "bmu_just_booted": "BMU(노드 0x{node_id:02X})가 방금 부팅되었습니다",
     "bmu_does_not_answer": "BMU(노드 0x{node_id:02X})가 응답하지 않습니다",
     "soc_unknown": "배터리가 있으나 아직 SOC를 알 수 없습니다",
@@ -29,16 +29,16 @@ TEXTS: Mapping[str, str] = {
     "to_go_on": "계속하려면",
     "start_bay": "orchestrator start {bay}",
     # a charger that was not seen to stop
-    "uncontrollable": "지금 이 충전기({port})의 주전원을 차단하십시오: {since_s:.0f} s 동안 정지 명령에 따르지 않습니다: {why}",
-    "uncontrollable_unproved": "지금 이 충전기({port})의 주전원을 차단하십시오: {since_s:.0f} s 동안 정지가 확인되지 "
+    "uncontrollable": "지금 이 충전기({port})의 주전원을 차단하십시오: {since_s:.0f}초 동안 정지 명령에 따르지 않습니다: {why}",
+    "uncontrollable_unproved": "지금 이 충전기({port})의 주전원을 차단하십시오: {since_s:.0f}초 동안 정지가 확인되지 "
     "않았습니다: {why}",
     "uncontrollable_contradicted": "이 충전기({port})의 주전원을 차단하십시오: 충전기는 {charger_a:.2f} A라고 하고 BMU에는 "
     "아직 {pack_a:.1f} A가 보입니다. 둘 중 하나가 틀렸습니다. 주전원을 차단해도 BMU에 보이면 BMU를 재시작하십시오",
-    "uncontrollable_stands_by": "이 충전기({port})가 계속 꺼져 있지 않으면 주전원을 차단하십시오: {lasts_s:.0f} s 동안 대기 "
-    "상태입니다. {limit_s:g} s가 지나야 정지로 인정합니다",
+    "uncontrollable_stands_by": "이 충전기({port})가 계속 꺼져 있지 않으면 주전원을 차단하십시오: {lasts_s:.0f}초 동안 대기 "
+    "상태입니다. {limit_s:g}초가 지나야 정지로 인정합니다",
     "witnesses": "{charger}{last:after}{bmu:after}",
     "no_answer_on": "{port}에서 응답이 없습니다",
-    "last_heard": "마지막으로 {age_s:.0f} s 전에 {charger_a:.2f} A였습니다",
+    "last_heard": "마지막으로 {age_s:.0f}초 전에 {charger_a:.2f} A였습니다",
     "delivers": "충전기가 {charger_a:.2f} A를 출력합니다",
     "no_lasting_standby": "충전기의 상태가 지속되는 대기를 보이지 않습니다",
     "bmu_sees": "BMU에는 {pack_a:.1f} A가 보입니다",
@@ -52,6 +52,9 @@ TEXTS: Mapping[str, str] = {
     "policy_waits": "변경된 정책은 이 베이가 대기 상태가 되면 적용됩니다",
     "old_charger": "충전기의 {charger_a:.2f} A는 {age:word} 전의 값입니다{bmu:after}",
     "old_values": "{names:word}: {age:word} 전의 값입니다",
+    "age_s": "{age:.0f}초",
+    "age_min": "{age:.0f}분",
+    "age_h": "{age:.0f}시간",
     # while current flows
     "precharge_impossible": "프리차지 규칙이 없거나 팩 전압을 알 수 없습니다",
     "precharging_pulse": "팩 전압이 {below_v:g} V 아래입니다: 펄스 프리차지{at}",
@@ -61,14 +64,14 @@ TEXTS: Mapping[str, str] = {
     "full": "충전 완료: {what}",
     "full_soc": "SOC {soc_pct:.0f} %가 {limit_pct:g} %에 도달했습니다{at}",
     "full_charger": "충전기가 충전 완료(모드 5)를 {보고합니다|보고했습니다}{at}",
-    "full_taper": "전류가 {for_s:g} s 동안 {below_a:g} A 아래로 줄어 {charger_a:.2f} A입니다{at}",
+    "full_taper": "전류가 {for_s:g}초 동안 {below_a:g} A 아래로 줄어 {charger_a:.2f} A입니다{at}",
     "charging": "단계 {step}({step_a:.1f} A): {rule}{limited:after}{rises:after}{held:after}",
     "held_at_the_top": "충전이 완료되어 앞으로 {left_min:.0f}분 동안 유지합니다{at}",
     "not_held_yet": "팩이 완충되었으나 아직 {hold_min:g}분 동안 유지하지 않았습니다{at}",
     "not_known_full": "충전이 중단되었고 팩이 완충되었는지 알 수 없습니다{at}",
     "full_held": "{what}, {hold_min:g}분 동안 유지했습니다{at}",
     "full_by_all": "{whats:and}",
-    "rises": "더 높은 단계가 허용되어 {hold_s:g} s 후에 적용됩니다{at}",
+    "rises": "더 높은 단계가 허용되어 {hold_s:g}초 후에 적용됩니다{at}",
     "charges_by_itself": "충전기가 스스로 충전합니다(자동 모드)",
     "precharge_step": "프리차지는 항상 가장 낮은 단계로 합니다",
     # before a charge
@@ -79,13 +82,13 @@ TEXTS: Mapping[str, str] = {
     "waits_for_values": "최신 값을 기다리고 있습니다: {missing:word}",
     "waits_for_contactor": "접촉기를 기다리고 있습니다. 닫히기 전에는 충전기와 배터리를 비교할 수 없습니다",
     "waits_for_turn": "차례를 기다리고 있습니다: {other}이(가) 충전을 시작하고 있습니다",
-    "waits_for_stagger": "차례를 기다리고 있습니다: 이 스테이션의 충전은 {stagger_s:g} s 간격으로 시작합니다{at}",
+    "waits_for_stagger": "차례를 기다리고 있습니다: 이 스테이션의 충전은 {stagger_s:g}초 간격으로 시작합니다{at}",
     # requests
     "operator_stop": "작업자가 정지했습니다",
     "operator_pause": "작업자가 일시 정지했습니다",
     "operator_reset": "작업자가 리셋했습니다",
     "not_running": "동작 중이 아닙니다: {what}",
-    "out_of_control": "충전기의 정지가 확인되지 않았습니다: 주전원을 차단하십시오. {lasts_s:g} s 동안 대기 상태가 유지되기 "
+    "out_of_control": "충전기의 정지가 확인되지 않았습니다: 주전원을 차단하십시오. {lasts_s:g}초 동안 대기 상태가 유지되기 "
     "전에는 시작도 리셋도 할 수 없습니다",
     "reset_first": "동작 중이 아닙니다: 먼저 {faults}을(를) 리셋해야 합니다",
     "nothing_to_start": "시작할 것이 없습니다: {state}: {what}",
@@ -97,18 +100,20 @@ TEXTS: Mapping[str, str] = {
     "refused_until": "{until_at}까지 {request:word}할 수 없습니다. 확인된 내용이 그때까지 유효합니다",
     "gone": "{gone_at}에 해소됨",
     "not_seen": "{gone_at}부터 확인되지 않음",
-    "refused_for": "{gone}, 앞으로 {left_s} s 동안 {request:word}할 수 없습니다",
+    "refused_for": "{gone}, 앞으로 {left_s}초 동안 {request:word}할 수 없습니다",
     "reset_locked": "1시간 안에 {times}회 리셋했으나 다시 발생했으므로 {until_at}까지 리셋할 수 없습니다",
     "waits_for_fault": "{gone}, {fault} 때문에 {request:word}할 수 없습니다",
-    "after_standby": "충전기가 {lasts_s:g} s 동안 대기 상태를 유지해야 {request:word}할 수 있습니다",
+    "after_standby": "충전기가 {lasts_s:g}초 동안 대기 상태를 유지해야 {request:word}할 수 있습니다",
     "reset_now": "{gone}: orchestrator reset {bay}, 이어서 orchestrator start {bay}",
     "start_now": "{gone}: orchestrator start {bay}",
     "counts_until": "{until_at}까지 유효합니다",
-    "goes_on_after": "해소되고 {wait_s:g} s 후에 스스로 계속합니다{strike}",
-    "goes_on_in": "{gone}, {left_s} s 후에 스스로 계속합니다{strike}",
-    "goes_on_in_at_the_earliest": "{gone}, 빨라도 {left_s} s 후에 스스로 계속합니다{strike}",
-    "clears_after": "해소되고 {wait_s:g} s 후에 스스로 해제됩니다{strike}",
-    "clears_in": "{gone}, {left_s} s 후에 스스로 해제됩니다{strike}",
+    "goes_on_after": "해소되고 {wait_s:g}초 후에 자동으로 재개합니다{strike}",
+    "goes_on_after_last": "더 이상 발생하지 않으면 {wait_s:g}초 후에 자동으로 재개합니다{strike}",
+    "goes_on_in": "{gone}, {left_s}초 후에 자동으로 재개합니다{strike}",
+    "goes_on_in_at_the_earliest": "{gone}, 빨라도 {left_s}초 후에 자동으로 재개합니다{strike}",
+    "clears_after": "해소되고 {wait_s:g}초 후에 자동으로 해제됩니다{strike}",
+    "clears_after_last": "더 이상 발생하지 않으면 {wait_s:g}초 후에 자동으로 해제됩니다{strike}",
+    "clears_in": "{gone}, {left_s}초 후에 자동으로 해제됩니다{strike}",
     "strike": "(1시간 내 {of}회 중 {number:nth}회째)",
     # single figures
     "up_to": "최고 {figure}",
@@ -121,7 +126,7 @@ TEXTS: Mapping[str, str] = {
     # our own defects
     "failed": "내부 에러: {error}",
     "failed_stopping": "정지하고 있습니다: 내부 에러: {error}",
-    "failed_uncontrollable": "이 충전기의 주전원을 차단하십시오: 소프트웨어가 {tried_s:.0f} s 동안 이 베이를 판정하지 "
+    "failed_uncontrollable": "이 충전기의 주전원을 차단하십시오: 소프트웨어가 {tried_s:.0f}초 동안 이 베이를 판정하지 "
     "못했고, 반복하는 정지를 확인할 수 없습니다({error})",
     "failed_request": "내부 에러: {error}. 소프트웨어 결함입니다. 충전기를 정지하고 있습니다",
     # left by the previous run
