@@ -90,7 +90,7 @@ TEXTS: Mapping[str, str] = {
     "not_running": "동작 중이 아닙니다: {what}",
     "out_of_control": "충전기의 정지가 확인되지 않았습니다: 주전원을 차단하십시오. {lasts_s:g}초 동안 대기 상태가 유지되기 "
     "전에는 시작도 리셋도 할 수 없습니다",
-    "reset_first": "동작 중이 아닙니다: 먼저 {faults}을(를) 리셋해야 합니다",
+    "reset_first": "동작 중이 아닙니다: 먼저 리셋해야 합니다: {faults}",
     "nothing_to_start": "시작할 것이 없습니다: {state}: {what}",
     "nothing_to_reset": "리셋할 것이 없습니다: {state}: {what}",
     "refused": "{fault} 장애: {why}. {what}",

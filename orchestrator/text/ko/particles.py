@@ -27,7 +27,7 @@ UNITS = {"%": V, "°C": V, "V": V, "A": V, "Ah": V, "Wh": V, "K": V, "baud": V}
 LETTERS = {"L": L, "M": C, "N": C, "R": L}
 #: How foreign words end whose last letter is clear.
 ENDINGS = {"l": L, "m": C, "n": C, **dict.fromkeys("adefhijorsuvwxyz", V)}
-SILENT_E = {"le": L, "me": C, "ne": C}
+TWO_LETTERS = {"le": L, "me": C, "ne": C, "ck": C, "ng": C}
 PAIR = re.compile("|".join(map(re.escape, PAIRS)))
 CLOSED = re.compile(r"\([^()]*\)$|[\"'`)\]]+$")
 #: No name with what is in brackets behind it is longer.
@@ -67,4 +67,4 @@ def _sound(before: str) -> Sound | None:
         return UNITS[unit.group()]
     if last.isupper():
         return LETTERS.get(last, V)
-    return SILENT_E.get(word[-2:], ENDINGS.get(last))
+    return TWO_LETTERS.get(word[-2:], ENDINGS.get(last))
