@@ -29,6 +29,8 @@ LEVELS = ("danger", "attention")
 LEAST_WHY = 40
 #: The most current that standby may show, at the charger and at the BMU.
 STANDBY_A, BMU_A = 0.5, 1.0
+#: Values whose ages differ by no more than this are of one moment.
+SWEEP_S = 2.0
 
 Bay = Mapping[str, object]
 
@@ -160,11 +162,13 @@ def _old_values(bay: Bay) -> Iterator[Cause]:
         fresh = battery.get("current_a") is not None and "current_a" not in _old(bay)
         bmu = Cause.of("bmu_sees", pack_a=battery["current_a"]) if fresh else None
         yield Cause.of("old_charger", charger_a=charger["current_a"], age=_age(charger["age_s"]), bmu=bmu)
-    by_age: dict[str, list[str]] = {}
     ages_s = cast("Mapping[str, object]", battery.get("age_s", {}))
-    for name in (name for name in BATTERY if name in _old(bay)):
-        by_age.setdefault(_age(ages_s.get(name)), []).append(BATTERY[name])
-    yield from (Cause.of("old_values", names=tuple(names), age=age) for age, names in by_age.items())
+    old = [name for name in BATTERY if name in _old(bay)]
+    while old:  # values of the same moment have one age
+        first_s = ages_s.get(old[0])
+        alike = [name for name in old if _alike(ages_s.get(name), first_s)]
+        yield Cause.of("old_values", names=tuple(BATTERY[name] for name in alike), age=_age(first_s))
+        old = [name for name in old if name not in alike]
 
 
 def _old(bay: Bay) -> Sequence[str]:
@@ -204,11 +208,18 @@ def figure(value: object, form: str) -> str:
     return form.format(value) if isinstance(value, int | float) else "–"
 
 
-def _age(age_s: object) -> str:
+def _alike(one_s: object, other_s: object) -> bool:
+    """Whether two values are equally old: all are read within a second, but not at once."""
+    if isinstance(one_s, int | float) and isinstance(other_s, int | float):
+        return abs(one_s - other_s) <= SWEEP_S
+    return one_s == other_s
+
+
+def _age(age_s: object) -> Cause | str:
     """An age in the unit that a person would use."""
     if not isinstance(age_s, int | float):
         return "long"
-    for unit, seconds in (("h", 3600), ("min", 60)):
+    for id_, seconds in (("age_h", 3600), ("age_min", 60)):
         if age_s >= 2 * seconds:
-            return f"{age_s / seconds:.0f} {unit}"
-    return f"{age_s:.0f} s"
+            return Cause.of(id_, age=age_s / seconds)
+    return Cause.of("age_s", age=age_s)

@@ -29,6 +29,15 @@ LIVE: Mapping[str, Callable[[Facts], float | None]] = {
     "bad_pct": lambda f: f.charger.bad_pct,
 }
 
+#: Evidence that calls for something else than its row's advice: for the advice under its own id.
+OWN_ADVICE = frozenset({"unfinished", "temperature_jump"})
+#: Problems of a line whose sentence ends with what to do about exactly them.
+SAY_WHAT_TO_DO = frozenset({
+    "port_missing", "port_gone", "port_busy", "port_forbidden", "port_not_serial", "port_stubborn", "port_stalled",
+    "port_taken", "port_too_many_files", "port_not_rs485", "charger_no_reply", "charger_noise", "charger_complains",
+    "charger_late", "bmu_stopped", "bmu_late", "bmu_unreachable",
+})  # fmt: skip
+
 
 def active_faults(
     memory: Memory, now_s: float, bay: str, f: Facts | None = None, *, at_rest: bool = False
@@ -69,10 +78,14 @@ def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cau
     if fault.clean_s is not None or row.moment:
         more["past"] = True
     seen = fault.now if fault.now is not None and not row.moment else fault.cause
-    advice = row.at_rest if at_rest and row.at_rest else row.id
-    if row.clear is Clear.AUTO and fault.clean_s is not None:  # nothing is left to do
+    seen = seen or Cause(row.id)
+    advice = seen.id if seen.id in OWN_ADVICE else row.id
+    if at_rest and row.at_rest:
+        advice = row.at_rest
+    nothing_left = row.clear is Clear.AUTO and fault.clean_s is not None
+    if nothing_left or (seen.id in SAY_WHAT_TO_DO and not fault.latched):
         advice = ""
-    return (seen or Cause(row.id)).with_(advice, **more)
+    return seen.with_(advice, **more)
 
 
 def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:

@@ -49,7 +49,7 @@ def _by_itself(memory: Memory, now_s: float, name: str, wait_s: float) -> Cause:
         ends_s = row.until(memory) if row.until is not None else None
         if ends_s is not None:
             return Cause.of("counts_until", until_t_s=ends_s + wait_s)
-        return Cause.of(f"{verb}_after", wait_s=wait_s, strike=strike)
+        return Cause.of(f"{verb}_after_last" if row.moment else f"{verb}_after", wait_s=wait_s, strike=strike)
     ends_s, earliest = fault.clean_s + wait_s, ""
     if verb == "goes_on":
         others = [_ends_s(*item) for item in raised(memory.faults) if latches.effect(*item) >= Effect.NO_START]

@@ -5,13 +5,16 @@ up after a hold. `core/rows.py` tracks which rows apply.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import chain
 
 from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ranges
 from orchestrator.config.policy import Band, Where
 from orchestrator.core.facts import Facts
+from orchestrator.core.memory import Memory
 from orchestrator.core.rows import values
-from orchestrator.core.rules import Bound
-from orchestrator.model import ActiveFault, Cause, CurrentStep, Effect
+from orchestrator.core.rules import Bound, Rules
+from orchestrator.model import ActiveFault, Cause, CurrentStep, Decision, Effect, Snapshot
 
 # --- how much they allow ----------------------------------------------------------------------------------------------
 
@@ -95,6 +98,27 @@ def limit(f: Facts, bound: Bound) -> Cause:
     return Cause(id_, params, bound.key, _place(f, bound.key))
 
 
+def told(decision: Decision, snapshot: Snapshot, memory: Memory | None, rules: Rules) -> Decision:
+    """The decision for people, with the present values in the rule that limits its current; `memory` is its own.
+
+    A decision keeps the rule as it was when the step was chosen: nothing depends on its figures, and readers are few.
+    """
+    step = decision.step
+    bound = next((one for one in _rows(rules) if step is not None and one.key == step.key), None)
+    if step is None or bound is None or memory is None or memory.last_s is None:
+        return decision
+    rule, cause = limit(Facts.of(memory.last_s, snapshot, memory, rules), bound), decision.cause
+    params = tuple((name, rule if name == "rule" else value) for name, value in cause.params)
+    if cause.id == "charging":
+        cause = replace(cause, params=params)
+    return replace(decision, step=replace(step, rule=rule), cause=cause)
+
+
+def _rows(rules: Rules) -> Iterator[Bound]:
+    """The bound of each row, and of each rule of `where`."""
+    return chain(*rules.table_bounds, rules.where_bounds)
+
+
 def _place(f: Facts, key: str) -> str:
     """Where a key stands; "" if it is in no file."""
     if not key or key.startswith("fault "):
@@ -126,11 +150,11 @@ def _spans(f: Facts, bound: Bound, row: Band | Where) -> tuple[Cause, ...]:
     """Each quantity that the row is about."""
     if isinstance(row, Band):
         name = next(name for name in RESOLUTION if bound.key.startswith(f"current.{name}."))
-        return (_span(f, name, row.from_, row.to),)
-    return tuple(_span(f, name, span.low, span.high) for name, span in ranges(row).items())
+        return (_span(f, name, row.from_, row.to, bound.key),)
+    return tuple(_span(f, name, span.low, span.high, bound.key) for name, span in ranges(row).items())
 
 
-def _span(f: Facts, name: str, low: float, high: float) -> Cause:
+def _span(f: Facts, name: str, low: float, high: float, key: str) -> Cause:
     """A value and its row: the row it is in, or one it was in and is not yet well outside of."""
     value = values(f)[name]
     if value is None:
@@ -138,6 +162,8 @@ def _span(f: Facts, name: str, low: float, high: float) -> Cause:
     said = _value(name, value)
     if low <= value <= high:
         return Cause.of("span_in", value=said, low=low, high=high)
+    if all(key != bound.key for bound in bounds(f, None)):
+        return Cause.of("span_left", value=said, low=low, high=high)
     well = hysteresis(f.rules.policy.current, name)
     if not low - well < value < high + well:
         return Cause.of("span_kept", value=said, low=low, high=high)

@@ -2,11 +2,14 @@
 
 from collections.abc import Callable
 
+from orchestrator.core.active import active_faults
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import full_due, goes_on, target
 from orchestrator.core.machine import Trigger
 from orchestrator.core.outofcontrol import problem
+from orchestrator.core.parts import changed
+from orchestrator.core.states import DONE
 from orchestrator.model import ActiveFault, Cause, Effect, State
 
 Faults = tuple[ActiveFault, ...]
@@ -56,7 +59,7 @@ def _ends(f: Facts, _faults: Faults) -> Found:
 
 
 def _pauses(f: Facts, _faults: Faults) -> Found:
-    return (Trigger.SUSPEND, Cause("operator_pause", advice="start")) if f.memory.operator.paused else None
+    return (Trigger.SUSPEND, held(f, Cause("operator_pause"))) if f.memory.operator.paused else None
 
 
 def _absent(f: Facts, _faults: Faults) -> Found:
@@ -74,14 +77,25 @@ def _charged(f: Facts, _faults: Faults) -> Found:
     if wanted:
         return None
     if f.memory.battery.full_pct is not None:
-        return Trigger.FILL, why
+        return Trigger.FILL, _full(f, why)
     return (Trigger.REST, why) if f.soc is not None else None
 
 
-def _barred(_f: Facts, faults: Faults) -> Found:
+def _full(f: Facts, why: Cause) -> Cause:
+    """Why the battery counts as full, and what begins the next charge."""
+    ended = f.memory.stop.stop_cause
+    known = ended if ended is not None and ended.id == "full" else Cause("full_before")
+    again = Cause("charged_again", why.params, why.key, why.place) if f.soc is not None else why
+    return Cause(known.id, (*known.params, ("past", True), ("then", again)), known.key, known.place)
+
+
+def _barred(f: Facts, faults: Faults) -> Found:
     worst = faults[0] if faults else None
     if worst is None or worst.effect < Effect.NO_START:
         return None
+    if f.memory.state in DONE:  # it is told where the bay goes: there it waits to go on
+        waiting = changed(f.memory, state=State.SUSPENDED)
+        worst = active_faults(waiting, f.now_s, f.rules.bay.name, f, at_rest=True)[0]
     return Trigger.SUSPEND, worst.told
 
 

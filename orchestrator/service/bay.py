@@ -9,6 +9,7 @@ from time import monotonic, time
 from orchestrator.config.station import BayConfig
 from orchestrator.core.decide import decide
 from orchestrator.core.failed import carry_on
+from orchestrator.core.limits import told
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.states import ENERGISED, QUIET, SETTLED
@@ -239,10 +240,10 @@ class BayRunner:
     def status(self) -> dict[str, object]:
         """The bay's part of the status document."""
         decision = self.decision or Decision(State.STARTING, Memory().cause)
-        status = bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language)
+        decision = told(decision, self._snapshot, self._memory, self.policy.rules)
         contactor = self._contactor
         return {
-            **status,
+            **bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language),
             "contactor": contactor and contactor_fields(contactor, self._language),
             "port": self.place.port,
             "policy": self.policy.status(),

@@ -14,7 +14,7 @@ example from an older or newer version, or incomplete is shown as its data.
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from orchestrator.model import Cause
@@ -34,6 +34,7 @@ from orchestrator.text.ko.codes import CODES as KO_CODES
 from orchestrator.text.ko.faults import TEXTS as KO_FAULTS
 from orchestrator.text.ko.limits import TEXTS as KO_LIMITS
 from orchestrator.text.ko.links import TEXTS as KO_LINKS
+from orchestrator.text.ko.particles import resolved
 from orchestrator.text.ko.service import TEXTS as KO_SERVICE
 from orchestrator.text.ko.words import FRAMES as KO_FRAMES
 from orchestrator.text.ko.words import WORDS as KO_WORDS
@@ -59,13 +60,18 @@ class Language:
     words: Mapping[str, str]
     frames: Mapping[str, str]
     past: Mapping[str, str]  #: the texts in the past tense
+    finish: Callable[[str], str]  #: what depends on the finished sentence
 
 
 def _language(
-    texts: Mapping[str, str], advice: Mapping[str, str], words: Mapping[str, str], frames: Mapping[str, str]
+    texts: Mapping[str, str],
+    advice: Mapping[str, str],
+    words: Mapping[str, str],
+    frames: Mapping[str, str],
+    finish: Callable[[str], str] = str,
 ) -> Language:
     present, past = ({id_: TENSES.sub(tense, text) for id_, text in texts.items()} for tense in (r"\1", r"\2"))
-    return Language(present, advice, words, frames, past)
+    return Language(present, advice, words, frames, past, finish)
 
 
 LANGUAGES: Mapping[str, Language] = {
@@ -80,6 +86,7 @@ LANGUAGES: Mapping[str, Language] = {
         KO_ADVICE,
         {**KO_WORDS, **KO_CODES},
         KO_FRAMES,
+        resolved,
     ),
 }
 
@@ -93,7 +100,7 @@ def say(cause: Cause | None, language: str = "en", otherwise: str = "") -> str:
         return ""
     texts = LANGUAGES.get(language, LANGUAGES["en"])
     try:
-        return _sentence(cause, texts)[:MOST_CHARACTERS]
+        return texts.finish(_sentence(cause, texts)[:MOST_CHARACTERS])
     except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError):
         return otherwise or _data(cause, texts)
 
@@ -159,7 +166,7 @@ class _Params(dict[str, "_Value"]):
         for name, value in cause.params:
             if name.endswith(MOMENT) and isinstance(value, int | float):
                 self[f"{name.removesuffix(MOMENT)}{TIME_OF_DAY}"] = _Value(f"{value:.0f} s", texts)
-        self["at"] = _Value(f" ({cause.place})" if cause.place else "", texts)
+        self["at"] = _Value(texts.frames["place"].format(place=cause.place) if cause.place else "", texts)
         self["place"] = _Value(cause.place, texts)
 
 

@@ -46,7 +46,7 @@ def test_a_charger_that_was_found_running_wants_a_person() -> None:
     world = running_at_the_start()
     decision = world.until(State.HELD)
     assert decision.alarm is Alarm.ATTENTION
-    assert "find out why it ran, then start; gone since " in reason_of(decision)
+    assert "find out who started it, then start; gone since " in reason_of(decision)
     assert reason_of(decision).endswith(": orchestrator start bay-1")
     world.ask(Request.STOP)
     world.run(1)

@@ -279,7 +279,10 @@ def test_a_full_battery_is_charged_again_when_it_has_lost_enough(
     world.values["soc_pct"] = not_below_pct
     world.run(30)
     assert world.is_in(S.FULL)
-    assert reason_of(world.decision).startswith(f"SOC {not_below_pct:.0f} % is not below {not_below_pct:g} % (")
+    told = reason_of(world.decision)
+    assert told.startswith("full: SOC 100 %" if full_pct == 100 else "full: the charger reported full (mode 5) (")
+    assert f"; SOC {not_below_pct:.0f} % now, charged again below {not_below_pct:g} % (" in told
+    assert world.ask(Request.START) == f"nothing to start: FULL: {told}"
     world.values["soc_pct"] = below_pct
     world.until(S.CHARGING, 5)
 
@@ -489,7 +492,7 @@ def test_a_pause_goes_on_in_the_same_session() -> None:
     world.ask(Request.PAUSE)
     world.run(3600, dt_s=1.0)
     assert world.is_in(S.SUSPENDED)
-    assert reason_of(world.decision) == "paused by the operator; start to go on"
+    assert reason_of(world.decision) == "paused by the operator; to go on: orchestrator start bay-1"
     world.ask(Request.START)
     world.until(S.CHARGING, 10)
     assert sessions(world) == []
@@ -526,11 +529,14 @@ def test_a_charger_that_comes_back_running_is_stopped_and_waits_for_a_person() -
 
 def test_offline_and_back() -> None:
     world = offline()
-    assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 0x10) does not answer"
+    assert reason_of(world.decision).startswith("48.0 V at the charger, but the BMU (node 0x10) does not answer; ")
     world.battery_link = replace(
         world.battery_link, problem=cause("BMU 0x10 on can0 does not answer: no frame of it came")
     )
-    assert reason_of(world.tick()) == "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came"
+    assert reason_of(world.tick()) == (
+        "48.0 V at the charger, but BMU 0x10 on can0 does not answer: no frame of it came; "
+        "the bay goes on by itself once the BMU answers"
+    )
     world.battery_answers = True
     world.until(S.CHARGING, 10)
 

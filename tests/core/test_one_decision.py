@@ -44,6 +44,10 @@ def course_of(f: Facts) -> Next:
     return next_transition(f, active_faults(f.memory, f.now_s, "bay-1", f))
 
 
+#: What a bay does that cannot hear its BMU.
+GOES_ON = "; the bay goes on by itself once the BMU answers"
+
+
 def goes(f: Facts) -> tuple[Trigger | None, Cause]:
     return course_of(f)[:2]
 
@@ -126,14 +130,15 @@ GOES = (
     Edge(goes, (Trigger.LOSE, "the charger on /dev/ttyX does not answer"), {}, IDLE, charger={"t_s": ago(9)}),
     Edge(goes, (Trigger.HOLD, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, FULL, **AT_REST),
     Edge(goes, (None, "held; to go on: orchestrator start bay-1"), {"hold": cause("held")}, HELD, **AT_REST),
-    Edge(goes, (Trigger.SUSPEND, "paused by the operator; start to go on"), {"paused": True}, IDLE, **AT_REST),
+    Edge(goes, (Trigger.SUSPEND, "paused by the operator; to go on: orchestrator start bay-1"), {"paused": True}, IDLE,
+         **AT_REST),
     Edge(goes, (Trigger.RESET, "reset by the operator; to go on: orchestrator start bay-1"), {}, TRIPPED, **AT_REST),
-    Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer"), {}, IDLE,
+    Edge(goes, (Trigger.LOSE, "0.0 V at the charger, but the BMU (node 0x10) does not answer" + GOES_ON), {}, IDLE,
          **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0}, charger_link=STOP_SENT, snapshot={"connected": False}),
-    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted"), {}, IDLE, **AT_REST,
-         bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "boot_t_s": ago(1)}),
-    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but unplugged"), {}, IDLE, **AT_REST, bmu=SILENT_BMU["bmu"],
-         bmu_link={"online": False, "problem": cause("unplugged")}),
+    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but the BMU (node 0x10) has just booted" + GOES_ON), {}, IDLE,
+         **AT_REST, bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "boot_t_s": ago(1)}),
+    Edge(goes, (Trigger.LOSE, "48.0 V at the charger, but unplugged" + GOES_ON), {}, IDLE, **AT_REST,
+         bmu=SILENT_BMU["bmu"], bmu_link={"online": False, "problem": cause("unplugged")}),
     Edge(goes, (None, "no battery"), {}, IDLE, **SILENT_BMU, charger={**STANDS_BY, "voltage_v": 0.0},
          charger_link=STOP_SENT),
     Edge(goes, (None, "a battery is there; its SOC is not known yet"), {}, IDLE, **AT_REST, bmu={"soc_pct": None}),
@@ -143,9 +148,11 @@ GOES = (
          bmu={"soc_pct": 97.0}),
     Edge(goes, (Trigger.QUALIFY, f"SOC 99 % is below 100 % ({AT('finish.target_soc_pct')})"), session(), SUSPENDED,
          **AT_REST, bmu={"soc_pct": 99.0}),
-    Edge(goes, (None, f"SOC 95 % is not below 95 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 100.0}, FULL,
+    Edge(goes, (None, f"full: the battery was charged full here, and is there since; SOC 95 % now, charged again below "
+                f"95 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 100.0}, FULL,
          **AT_REST, bmu={"soc_pct": 95.0}),
-    Edge(goes, (None, f"SOC 87 % is not below 87 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 90.0}, FULL,
+    Edge(goes, (None, f"full: the battery was charged full here, and is there since; SOC 87 % now, charged again below "
+                f"87 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 90.0}, FULL,
          **AT_REST, bmu={"soc_pct": 87.0}),
     Edge(goes, (Trigger.QUALIFY, f"SOC 86 % is below 87 % ({AT('recharge.soc_below_pct')})"), {"full_pct": 90.0}, FULL,
          **AT_REST, bmu={"soc_pct": 86.0}),

@@ -67,7 +67,10 @@ def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None
     assert world.decision.alarm is not Alarm.DANGER
     if ran:
         assert not any(decision.state in ENERGISED for decision in world.decisions)
-        assert say(UNFINISHED) in world.raised["found_running"]
+        told = world.raised["found_running"]
+        assert say(UNFINISHED) in told
+        assert "find out why the service ended" in told, "it ran because this service had commanded it"
+        assert "find out who started it" not in told
         assert world.ask(Request.START if "will_not_stop" not in world.raised else Request.RESET) == ""
     elif state is State.TRIPPED:
         assert world.is_in(State.TRIPPED)

@@ -202,7 +202,7 @@ def test_nobody_charges_by_what_was_said_before_the_boot() -> None:
     world.boot()
     world.tick()
     assert world.is_in(State.OFFLINE)
-    assert reason_of(world.decision) == "48.0 V at the charger, but the BMU (node 0x10) has just booted"
+    assert reason_of(world.decision).startswith("48.0 V at the charger, but the BMU (node 0x10) has just booted; ")
     world.run(1)
     assert not ENERGISED & {decision.state for decision in world.decisions}
     world.until(State.CHARGING, 10)

@@ -374,6 +374,24 @@ def test_a_pack_that_collapses_is_stopped_at_once_and_for_good() -> None:
     assert world.is_in(State.STOPPING)
     assert world.raised["pack_collapsed"].startswith("keep people away")
     world.until(State.TRIPPED, 2.0)
+    world.run(60)
+    told = world.raised["pack_collapsed"]
+    assert "the pack has 31.00 V, below 39 V" in told
+    assert "gone since" not in told
+    refused = world.ask(Request.RESET)
+    assert refused.startswith("pack_collapsed: reset is refused while it lasts: ")
+    world.values["voltage_v"] = 45.0
+    world.run(1)
+    assert world.ask(Request.RESET) == ""
+
+
+def test_a_collapsed_pack_can_be_exchanged() -> None:
+    world = World(voltage_v=45.0, soc_pct=22.0).charging()
+    world.values["voltage_v"] = 31.0
+    world.until(State.TRIPPED, 2.0)
+    world.leave()
+    world.run(5)
+    assert world.ask(Request.RESET) == ""
 
 
 def test_the_fall_at_the_end_of_a_current_is_no_collapse() -> None:

@@ -477,9 +477,9 @@ def test_frames_of_a_wrong_length_are_dropped_and_counted(cob_id: int, data: str
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ("10 42 08 01 02 03 04 05", "EMCY 0x4210: temperature"),
-        ("10 42", "EMCY 0x4210: temperature"),  # canopen would lose a short one
-        ("30 31 04 00 00 00 00 00", "EMCY 0x3130: voltage"),
+        ("10 42 08 01 02 03 04 05", "EMCY 0x4210, temperature"),
+        ("10 42", "EMCY 0x4210, temperature"),  # canopen would lose a short one
+        ("30 31 04 00 00 00 00 00", "EMCY 0x3130, voltage"),
         ("01 FF 00 00 00 00 00 00", "device-specific"),
     ],
 )

@@ -30,6 +30,10 @@ def said(bench: Bench) -> list[str]:
     return bench.said
 
 
+def decisions(bench: Bench) -> int:
+    return sum(kind == "decision" for _, _, _, (kind, _) in bench.journal._waiting)
+
+
 def test_before_the_first_step_the_status_says_that_it_starts(bench: Bench) -> None:
     assert (bench.bay.status()["state"], bench.bay.verified) == ("STARTING", False)
 
@@ -40,6 +44,22 @@ def test_the_first_order_is_a_stop_and_every_later_one_has_its_evidence(bench: B
     assert first == STOP
     assert all(grant is not None for command, grant in others if command not in (None, STOP))
     assert all(grant is None for command, grant in others if command is None)
+
+
+def test_the_rule_that_limits_the_current_is_told_with_the_present_value(bench: Bench) -> None:
+    bench.battery.values["soc_pct"] = 90.0
+    bench.charging()
+    written = decisions(bench)
+    for soc_pct in (93.0, 96.0):
+        bench.battery.values["soc_pct"] = soc_pct
+        bench.step(10)
+        status = bench.bay.status()
+        assert f"SOC {soc_pct:.0f} % in 90 … 100 allows 8.0 A" in str(status["reason"])
+        assert f"SOC {soc_pct:.0f} % in 90 … 100 allows 8.0 A" in str(status["step_rule"])
+    assert decisions(bench) == written, "the decision is the same"
+    bench.battery.values["soc_pct"] = 85.0
+    bench.step(4)
+    assert "SOC 85 % has left 90 … 100, which allows 8.0 A" in str(bench.bay.status()["step_rule"]), "not raised yet"
 
 
 def test_it_is_verified_when_it_stands_by_and_nothing_is_ordered(bench: Bench) -> None:

@@ -86,7 +86,7 @@ def test_what_was_not_heard_lately_is_marked_with_what_is_known_instead() -> Non
 
 
 def test_what_both_said_long_ago_is_no_evidence() -> None:
-    ages_s = {"soc_pct": 600.0, "voltage_v": 600.0, "temperature_c": 9000.0, "current_a": 600.0}
+    ages_s = {"soc_pct": 120.9, "voltage_v": 119.6, "temperature_c": 9000.0, "current_a": 600.0}
     told = bay(
         charger={"current_a": 14.0, "age_s": 601.0, "old": True},
         battery={
@@ -97,7 +97,7 @@ def test_what_both_said_long_ago_is_no_evidence() -> None:
     line, below = table([told]).splitlines()[1:]
     assert line.count("(old)") == 4
     assert below == (
-        "  OLD: the charger's 14.00 A, last heard 10 min ago; SOC, pack voltage: last heard 10 min ago; "
+        "  OLD: the charger's 14.00 A, last heard 10 min ago; SOC, pack voltage: last heard 2 min ago; "
         "temperature: last heard 2 h ago"
     )
 

@@ -52,7 +52,7 @@ def test_korean_is_korean() -> None:
             figure = id_.startswith("figure_")  # a number with its unit
             korean = any("가" <= one <= "힣" for one in bare)
             assert figure or korean or not WORD.search(bare) or bare in NAMES, id_
-    assert say(HOT, "ko") == ("팩 온도가 45.2 °C이고 상한은 45 °C입니다 (p.yaml:3). 40 °C 아래에서 다시 충전합니다")
+    assert say(HOT, "ko") == ("팩 온도가 45.2 °C이고 상한은 45 °C입니다(p.yaml:3). 40 °C 아래에서 다시 충전합니다")
 
 
 def test_what_is_out_of_control_begins_with_the_mains() -> None:

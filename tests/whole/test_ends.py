@@ -70,7 +70,7 @@ def test_a_controller_that_died_is_not_started_into_a_charge(tmp_path: Path) -> 
 def held(plant: PlantProcess, service: Service) -> None:
     bay = service.wait("HELD")["bay-1"]
     assert [fault["id"] for fault in bay["faults"]] == ["found_running"]
-    assert "the last run of this service ended in mid-charge" in bay["reason"]
+    assert "this service began again after its last run had ended in mid-charge" in bay["reason"]
     assert plant.state()["operation"] == 0
 
 

@@ -143,7 +143,7 @@ def test_a_disk_that_hangs_delays_no_stop_and_is_named_at_the_end(station: Stati
         service.close()
     healthy.start()
     reason = healthy.wait("HELD")["bay-1"]["reason"]
-    assert "ended in mid-charge" in reason, "the disk knows of its beginning, and of no end"
+    assert "had ended in mid-charge" in reason, "the disk knows of its beginning, and of no end"
 
 
 def test_a_disk_that_does_not_tell_the_past_holds_every_bay_after_the_stops(station: Station) -> None:

@@ -35,11 +35,16 @@ def another_pack(f: Facts) -> Cause | None:
 
 
 def collapsed(f: Facts) -> Cause | None:
-    """FAULTS B24: a cell that fails under current takes its share of the voltage with it, and both witnesses see it."""
-    if f.memory.state is not State.CHARGING or f.pack_v is None or f.pack_a is None or f.volts is None:
-        return None
+    """FAULTS B24: a cell that fails under current takes its share of the voltage with it, and both witnesses see it.
+
+    Once it has failed, the voltage at rest counts, too, for as long as it is that low.
+    """
     rule, pack = f.rules.policy.precharge, f.rules.policy.pack
     floor_v, key = (rule.below_v, "precharge.below_v") if rule is not None else (pack.voltage_v.low, "pack.voltage_v")
+    if "pack_collapsed" in f.raised and not f.energised and f.pack_v is not None and f.pack_v < floor_v:
+        return f.rules.by_policy("pack_stays_low", key, pack_v=f.pack_v, floor_v=floor_v)
+    if f.memory.state is not State.CHARGING or f.pack_v is None or f.pack_a is None or f.volts is None:
+        return None
     if f.rules.manual and f.pack_v < floor_v * (1 - MARGIN) and f.volts < floor_v:
         return f.rules.by_policy("pack_sunk", key, pack_v=f.pack_v, floor_v=floor_v)
     pack_v = f.pack_v

@@ -5,8 +5,10 @@ from collections.abc import Mapping
 ADVICE: Mapping[str, str] = {
     "reverse_polarity": "correct the battery's polarity, then reset",
     "polarity_contradicts": "measure the battery's polarity; if that is right, the charger is defective; then reset",
-    "error_stop": "look at the charger's own display and manual, then reset",
-    "system_stop": "find out who stopped the charger, then start",
+    "error_stop": "read the error at the charger itself, and switch its mains off and on; once it has left mode 8, reset; if it comes "
+    "back, have the charger repaired",
+    "system_stop": "look whether somebody or something switched it off at the charger; if it stays in mode 7, switch its mains off and "
+    "on; then start; if it comes back, have the charger repaired",
     "illegal_value": "a value outside its documented list: check the line and the charger's version",
     "mode_taken_over": "set the charger's rotary switch or the station file, then start",
     "rejected_frame": "this charger does not know our commands: check its model and version, then reset",
@@ -17,7 +19,8 @@ ADVICE: Mapping[str, str] = {
     "port_locked": "end that program (fuser -v shows it) and keep it away from this port",
     "noisy_line": "check the cable, its shield and its ground",
     "charger_silent": "check the charger's power and its cable",
-    "found_running": "it was stopped; find out why it ran, then start",
+    "found_running": "the charger was stopped: find out who started it, then start",
+    "unfinished": "find out why the service ended (its log and the system's say it), then start",
     "rogue_run": "somebody else commands this charger, or it is defective: find out, then reset",
     "current_without_order": "cut the charger's mains if the current goes on; if the BMU shows it with the mains off "
     "too, restart the BMU, else check the bay's serial cable and what else charges this pack, then reset",
@@ -53,12 +56,13 @@ ADVICE: Mapping[str, str] = {
     "bmu_rebooted": "if it happens again, check the BMU's supply",
     "status_trip": "inspect the pack, then reset",
     "status_limit": "charging goes on, on the lowest step",
-    "emergency": "look the error up in the BMU's manual; once the BMU has taken it back (restart it if it "
-    "does not), start",
+    "emergency": "look the code up in the BMU's manual and mend what it names; if the BMU does not take the error back, "
+    "restart it; then start",
     "hot_trip": "keep people away until it has cooled down; inspect the pack, then reset",
     "over_temperature": "let it cool down",
     "under_temperature": "let it warm up",
     "runaway": "keep people away; inspect the pack, then reset",
+    "temperature_jump": "no pack warms or cools this fast: check the sensor and its wiring, then reset",
     "temperature_invalid": "no temperature, no charge: check the sensor and the object map, then reset",
     "implausible": "check the object map against this BMU",
     "under_voltage": "too deeply discharged to be woken here: have the pack inspected",
@@ -87,6 +91,4 @@ ADVICE: Mapping[str, str] = {
     "internal": "this is a defect of the software: report it with the journal, then reset",
     # once the charger is in standby
     "stands_by_now": "the charger stands by now: have the cause repaired, then reset",
-    # what a person does next
-    "start": "start to go on",
 }

@@ -70,6 +70,7 @@ TEXTS: Mapping[str, str] = {
     "bmu_frozen": "the BMU {has|had} said the same in every word for {lasted_s:.0f} s, while the charger's voltage moved by "
     "{moved_v:.2f} V and {moved_ah:.2f} Ah went in: its values {are|were} frozen",
     "pack_sunk": "the pack {has sunk|sank} to {pack_v:.2f} V while it {is|was} charged, below {floor_v:g} V{at}",
+    "pack_stays_low": "the pack {has|had} {pack_v:.2f} V, below {floor_v:g} V{at}, after its voltage fell while it was charged",
     "pack_fell": "the pack fell from {before_v:.2f} to {pack_v:.2f} V within {passed_s:.0f} s while {pack_a:.2f} A "
     "flowed: a cell or a contact {has given|gave} way",
     "back_feed": "the BMU {reports|reported} a discharge of {discharge_a:.2f} A while the charger {runs|ran}",

@@ -18,6 +18,7 @@ TEXTS: Mapping[str, str] = {
     "span_unknown": "{quantity:word} unknown",
     "span_in": "{value} in {low:g} … {high:g}",
     "span_near": "{value} not yet {well:g} beyond {low:g} … {high:g}",
+    "span_left": "{value} has left {low:g} … {high:g}, which",
     "span_kept": "{value} beyond {low:g} … {high:g}, to which it came back too often in this charge:",
     # what the row allows
     "allows_nothing": "allows no current",

@@ -24,12 +24,12 @@ TEXTS: Mapping[str, str] = {
     "that switches by itself, with rs485: off",
     "port_failed": "{port}: cannot be opened ({error:word})",
     # a charger that answers badly or not at all
-    "charger_no_reply": "{port}: no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + "
+    "charger_no_reply": "{port}: {there is|there was} no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + "
     "and −)",
-    "charger_noise": "{port}: only broken frames come in: check shield, ground and termination of the cable, and 19200 "
+    "charger_noise": "{port}: only broken frames {come|came} in: check shield, ground and termination of the cable, and 19200 "
     "8N1",
-    "charger_complains": "{port}: it answers with error frames only: check shield, ground and termination of the cable",
-    "charger_late": "{port}: it answers, but not in time or not what was asked: check for a slow converter in the line",
+    "charger_complains": "{port}: it {answers|answered} with error frames only: check shield, ground and termination of the cable",
+    "charger_late": "{port}: it {answers|answered}, but not in time or not what was asked: check for a slow converter in the line",
     "charger_internal": "{port}: internal: {error}",
     "undocumented": "{value:word} {raw} (documented: {documented})",
     # others at its port
@@ -86,27 +86,27 @@ TEXTS: Mapping[str, str] = {
     "can_no_ack": "nobody acknowledges our frames: check the BMU's power, cable and bit rate",
     # a BMU that does not answer or is unreliable
     "bmu_not_asked": "BMU 0x{node_id:02X} on {bus}: not asked yet",
-    "bmu_stopped": "BMU 0x{node_id:02X} on {bus} does not answer: an NMT command has stopped it; NMT start wakes it",
-    "bmu_cut_off": "BMU 0x{node_id:02X} on {bus} does not answer: {why}",
-    "bmu_late": "BMU 0x{node_id:02X} on {bus} does not answer: its answers come later than {timeout_s:g} s "
-    "(sdo_timeout_s)",
-    "bmu_garbled": "BMU 0x{node_id:02X} on {bus} does not answer: its newest answer is not understood: {why}",
-    "bmu_unreachable": "BMU 0x{node_id:02X} on {bus} does not answer: check its power, the cable, the bit rate and its "
+    "bmu_stopped": "BMU 0x{node_id:02X} on {bus} {does|did} not answer: an NMT command has stopped it; NMT start wakes it",
+    "bmu_cut_off": "BMU 0x{node_id:02X} on {bus} {does|did} not answer: {why}",
+    "bmu_late": "BMU 0x{node_id:02X} on {bus} {does|did} not answer: its answers {come|came} later than {timeout_s:g} s "
+    "(sdo_timeout_s): look for load and errors on the bus, or raise sdo_timeout_s in the station file",
+    "bmu_garbled": "BMU 0x{node_id:02X} on {bus} {does|did} not answer: its newest answer {is|was} not understood: {why}",
+    "bmu_unreachable": "BMU 0x{node_id:02X} on {bus} {does|did} not answer: check its power, the cable, the bit rate and its "
     "node switch (node id = switch + 0x10)",
-    "bmu_doubled": "BMU 0x{node_id:02X} on {bus}: requests are answered twice: two BMUs have this node id, or something "
+    "bmu_doubled": "BMU 0x{node_id:02X} on {bus}: requests {are|were} answered twice: two BMUs have this node id, or something "
     "else answers for this one",
-    "bmu_babbles": "BMU 0x{node_id:02X} on {bus}: it sends more than {limit_hz} frames a second",
+    "bmu_babbles": "BMU 0x{node_id:02X} on {bus}: it {sends|sent} more than {limit_hz} frames a second",
     "bmu_internal": "BMU 0x{node_id:02X} on {bus}: internal error: {error}",
     "sdo_length": "a frame of {size} bytes, expected {expected}: {data}",
     "sdo_command": "command 0x{command:02X}, expected 43, 4B, 4F, 60 or 80: {data}",
     "sdo_abort": "0x{index:04X}:{sub:02X} aborted with 0x{code:08X}: {meaning:word}",
-    "emcy": "EMCY 0x{code:04X}: {meaning:word} ({data})",
+    "emcy": "the BMU {reports|reported} an error of its own: EMCY 0x{code:04X}, {meaning:word} ({data})",
     # values that are not believed
-    "value_outside": "{field} {value:g} is outside {low:g} … {high:g} (raw {raw})",
+    "value_outside": "{field:word} {value:g} is outside {low:g} … {high:g} (raw {raw})",
     "size_differs": "0x{index:04X}:{sub:02X} came with a size of {size}, the map says {expected}",
-    "tpdo_contradicts": "{field}: a TPDO says {tpdo:g}, the SDO read {sdo:g}",
-    "two_answers": "{field}: two answers to one request, {one} and {other}",
-    "two_answers_elsewhere": "{field}: two answers to one request, which differ in {other}",
+    "tpdo_contradicts": "{field:word}: a TPDO says {tpdo:g}, the SDO read {sdo:g}",
+    "two_answers": "{field:word}: two answers to one request, {one} and {other}",
+    "two_answers_elsewhere": "{field:word}: two answers to one request, which differ in {other:word}",
     "not_available": "not available",
     "a_refusal": "a refusal",
     # actions of another CANopen master

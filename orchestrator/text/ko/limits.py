@@ -5,11 +5,11 @@ from collections.abc import Mapping
 TEXTS: Mapping[str, str] = {
     "limit_none": "가장 높은 단계이며 제한이 없습니다",
     "limit_fault": "{fault} 장애",
-    "limit_pack": "팩의 허용 전류는 {allowed_a:.1f} A입니다, {place}",
-    "limit_station": "스테이션의 전류 한계, {place}",
-    "limit_unknown": "{quantity:word} 값을 알 수 없습니다, {place}",
-    "limit_outside": "{value}: 정책의 표에 없는 값입니다, {place}",
-    "limit_row": "{spans:and}: {allows}, {place}",
+    "limit_pack": "팩의 허용 전류는 {allowed_a:.1f} A입니다({place})",
+    "limit_station": "스테이션의 전류 한계({place})",
+    "limit_unknown": "{quantity:word} 값을 알 수 없습니다({place})",
+    "limit_outside": "{value}: 정책의 표에 없는 값입니다({place})",
+    "limit_row": "{spans:and}: {allows}({place})",
     # a quantity with its value, and the row it is in
     "value_temperature_c": "온도 {pack_c:.1f} °C",
     "value_soc_pct": "SOC {soc_pct:.0f} %",
@@ -18,6 +18,7 @@ TEXTS: Mapping[str, str] = {
     "span_unknown": "{quantity:word} 값을 알 수 없음",
     "span_in": "{value}({low:g} … {high:g} 구간)",
     "span_near": "{value}({low:g} … {high:g} 구간을 아직 {well:g} 이상 벗어나지 않음)",
+    "span_left": "{value}({low:g} … {high:g} 구간을 벗어남)",
     "span_kept": "{value}({low:g} … {high:g} 구간 밖이나 이번 충전에서 너무 자주 되돌아옴)",
     # what the row allows
     "allows_nothing": "전류를 허용하지 않습니다",

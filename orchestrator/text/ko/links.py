@@ -14,7 +14,7 @@ TEXTS: Mapping[str, str] = {
     "port_not_serial": "{port}: 시리얼 포트가 아닙니다: 스테이션 파일의 이름을 확인하십시오(ls -l /dev/serial/by-path)",
     "port_stubborn": "{port}: 드라이버가 충전기의 설정({baud} baud 8N1)을 받아들이지 않습니다. 다른 어댑터를 "
     "사용하십시오({found:word})",
-    "port_stalled": "{port}: {limit_s:g} s 동안 아무것도 받아들이지 않습니다. 어댑터를 뽑았다가 다시 꽂으십시오",
+    "port_stalled": "{port}: {limit_s:g}초 동안 아무것도 받아들이지 않습니다. 어댑터를 뽑았다가 다시 꽂으십시오",
     "port_taken": "{port}: 다른 프로그램이 이 포트를 독점으로 열어(TIOCEXCL) 아무도 이 충전기를 정지할 수 없습니다: 그 "
     "프로그램을 종료하거나 충전기의 주전원을 차단하십시오{program:after}",
     "port_too_many_files": "{port}: 열린 파일이 너무 많습니다: 서비스의 한계(LimitNOFILE)를 올리십시오",
@@ -22,10 +22,10 @@ TEXTS: Mapping[str, str] = {
     "rs485: off로 사용하십시오",
     "port_failed": "{port}: 열 수 없습니다({error:word})",
     # a charger that answers badly or not at all
-    "charger_no_reply": "{port}: 응답이 없습니다: 충전기의 전원과 케이블, 뒤바뀐 배선(RX와 TX, 또는 +와 −)을 확인하십시오",
-    "charger_noise": "{port}: 깨진 프레임만 수신됩니다: 케이블의 차폐, 접지, 종단 저항과 19200 8N1을 확인하십시오",
-    "charger_complains": "{port}: 에러 프레임으로만 응답합니다: 케이블의 차폐, 접지, 종단 저항을 확인하십시오",
-    "charger_late": "{port}: 응답하지만 제시간에 오지 않거나 요청과 다릅니다: 통신선에 느린 변환기가 있는지 확인하십시오",
+    "charger_no_reply": "{port}: 응답이 {없습니다|없었습니다}: 충전기의 전원과 케이블, 뒤바뀐 배선(RX와 TX, 또는 +와 −)을 확인하십시오",
+    "charger_noise": "{port}: 깨진 프레임만 {수신됩니다|수신되었습니다}: 케이블의 차폐, 접지, 종단 저항과 19200 8N1을 확인하십시오",
+    "charger_complains": "{port}: 에러 프레임으로만 {응답합니다|응답했습니다}: 케이블의 차폐, 접지, 종단 저항을 확인하십시오",
+    "charger_late": "{port}: {응답하지만|응답했지만} 제시간에 오지 않거나 요청과 {다릅니다|달랐습니다}: 통신선에 느린 변환기가 있는지 확인하십시오",
     "charger_internal": "{port}: 내부 에러: {error}",
     "undocumented": "{value:word} {raw}(규격: {documented})",
     # others at its port
@@ -38,7 +38,7 @@ TEXTS: Mapping[str, str] = {
     "no_command": "'{command:word} {value}' 명령은 {control:word} 모드의 충전기에 보낼 수 없습니다",
     "no_grant": "{command:word}: 충전기, 팩 전압, 팩 온도의 최신 값이 없습니다",
     "not_on_disk": "{command:word}: 이 충전기가 동작할 수 있다는 사실이 디스크에 기록되지 않았습니다",
-    "grant_old": "{command:word}: 근거가 되는 값이 {age_s:.1f} s만큼 오래되었습니다",
+    "grant_old": "{command:word}: 근거가 되는 값이 {age_s:.1f}초만큼 오래되었습니다",
     "above_station_v": "{command:word}: {voltage_v:g} V는 스테이션의 한계 {limit_v:g} V를 넘습니다",
     "outside_station_c": "{command:word}: {pack_c:g} °C는 스테이션의 범위 {low_c:g} … {high_c:g} °C를 벗어납니다",
     "step_unknown": "{command:word}: 충전기의 전류 제한 {step:d}의 의미를 알 수 없습니다",
@@ -80,26 +80,27 @@ TEXTS: Mapping[str, str] = {
     "can_no_ack": "프레임에 대한 수신 확인이 없습니다: BMU의 전원, 케이블, 비트 레이트를 확인하십시오",
     # a BMU that does not answer or is unreliable
     "bmu_not_asked": "{bus}의 BMU 0x{node_id:02X}: 아직 요청하지 않았습니다",
-    "bmu_stopped": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 않습니다: NMT 명령으로 정지되었습니다. NMT start로 깨우십시오",
-    "bmu_cut_off": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 않습니다: {why}",
-    "bmu_late": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 않습니다: 응답이 {timeout_s:g} s(sdo_timeout_s)보다 늦습니다",
-    "bmu_garbled": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 않습니다: 최신 응답을 해석할 수 없습니다: {why}",
-    "bmu_unreachable": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 않습니다: 전원, 케이블, 비트 레이트, 노드 스위치(노드 ID = "
+    "bmu_stopped": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 {않습니다|않았습니다}: NMT 명령으로 정지되었습니다. NMT start로 깨우십시오",
+    "bmu_cut_off": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 {않습니다|않았습니다}: {why}",
+    "bmu_late": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 {않습니다|않았습니다}: 응답이 {timeout_s:g}초(sdo_timeout_s)보다 "
+    "{늦습니다|늦었습니다}. 버스의 부하와 에러를 확인하거나 스테이션 파일의 sdo_timeout_s를 늘리십시오",
+    "bmu_garbled": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 {않습니다|않았습니다}: 최신 응답을 해석할 수 {없습니다|없었습니다}: {why}",
+    "bmu_unreachable": "{bus}의 BMU 0x{node_id:02X}이(가) 응답하지 {않습니다|않았습니다}: 전원, 케이블, 비트 레이트, 노드 스위치(노드 ID = "
     "스위치 + 0x10)를 확인하십시오",
-    "bmu_doubled": "{bus}의 BMU 0x{node_id:02X}: 요청마다 응답이 두 번 옵니다: 두 BMU의 노드 ID가 같거나 다른 장치가 대신 "
+    "bmu_doubled": "{bus}의 BMU 0x{node_id:02X}: 요청마다 응답이 두 번 {옵니다|왔습니다}: 두 BMU의 노드 ID가 같거나 다른 장치가 대신 "
     "응답합니다",
-    "bmu_babbles": "{bus}의 BMU 0x{node_id:02X}: 1초에 {limit_hz}개가 넘는 프레임을 보냅니다",
+    "bmu_babbles": "{bus}의 BMU 0x{node_id:02X}: 1초에 {limit_hz}개가 넘는 프레임을 {보냅니다|보냈습니다}",
     "bmu_internal": "{bus}의 BMU 0x{node_id:02X}: 내부 에러: {error}",
     "sdo_length": "{size}바이트 프레임입니다. {expected}바이트여야 합니다: {data}",
     "sdo_command": "command 0x{command:02X}입니다. 43, 4B, 4F, 60, 80 중 하나여야 합니다: {data}",
     "sdo_abort": "0x{index:04X}:{sub:02X}에 대해 abort 0x{code:08X}을(를) 회신했습니다: {meaning:word}",
-    "emcy": "EMCY 0x{code:04X}: {meaning:word} ({data})",
+    "emcy": "BMU가 자체 에러를 {보고합니다|보고했습니다}: EMCY 0x{code:04X}, {meaning:word}({data})",
     # values that are not believed
-    "value_outside": "{field} {value:g}은(는) {low:g} … {high:g} 범위를 벗어납니다(원시 값 {raw})",
+    "value_outside": "{field:word} {value:g}은(는) {low:g} … {high:g} 범위를 벗어납니다(원시 값 {raw})",
     "size_differs": "0x{index:04X}:{sub:02X}의 크기가 {size}인데 오브젝트 맵에는 {expected}입니다",
-    "tpdo_contradicts": "{field}: TPDO는 {tpdo:g}, SDO 읽기는 {sdo:g}입니다",
-    "two_answers": "{field}: 한 요청에 두 응답이 왔습니다: {one}, {other}",
-    "two_answers_elsewhere": "{field}: 한 요청에 두 응답이 왔고 {other} 값이 서로 다릅니다",
+    "tpdo_contradicts": "{field:word}: TPDO는 {tpdo:g}, SDO 읽기는 {sdo:g}입니다",
+    "two_answers": "{field:word}: 한 요청에 두 응답이 왔습니다: {one}, {other}",
+    "two_answers_elsewhere": "{field:word}: 한 요청에 두 응답이 왔고 {other:word} 값이 서로 다릅니다",
     "not_available": "값 없음",
     "a_refusal": "거부",
     # actions of another CANopen master
@@ -111,6 +112,6 @@ TEXTS: Mapping[str, str] = {
     "master_reset": "다른 CANopen 마스터가 {whom:word}을(를) 리셋했습니다(NMT)",
     "master_reset_communication": "다른 CANopen 마스터가 {whom:word}의 통신을 리셋했습니다(NMT)",
     "heartbeat_was_off": "BMU의 heartbeat가 꺼져 있었습니다: 다른 마스터가 껐거나 감지되지 않은 재시작입니다. 다시 "
-    "{period_s:g} s로 설정합니다",
-    "heartbeat_was": "다른 마스터가 BMU의 heartbeat를 {found_s:g} s로 바꾸었습니다. 다시 {period_s:g} s로 설정합니다",
+    "{period_s:g}초로 설정합니다",
+    "heartbeat_was": "다른 마스터가 BMU의 heartbeat를 {found_s:g}초로 바꾸었습니다. 다시 {period_s:g}초로 설정합니다",
 }

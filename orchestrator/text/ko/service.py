@@ -6,7 +6,7 @@ TEXTS: Mapping[str, str] = {
     # why it ends
     "signal": "{name}",
     "guardian_died": "감시 프로세스(guardian)가 종료되었습니다",
-    "guardian_silent": "감시 프로세스(guardian)가 {limit_s:g} s 동안 응답하지 않았습니다",
+    "guardian_silent": "감시 프로세스(guardian)가 {limit_s:g}초 동안 응답하지 않았습니다",
     "guardian_full": "감시 프로세스(guardian)가 메시지를 받지 않습니다",
     "ending": "{why}: 모든 베이를 정지하고 있습니다",
     "ended": "종료했습니다: {verdicts:then}",
@@ -16,15 +16,15 @@ TEXTS: Mapping[str, str] = {
     # its disk
     "would_forget": "재시작하면 변경 내용을 잃습니다: {problem}",
     "disk_failed": "{file}에 쓸 수 없습니다: {error:word}",
-    "disk_slow": "{file}을(를) {limit_s:g} s 안에 쓰지 못했습니다",
-    "disk_hangs": "{file}을(를) {limit_s:g} s 안에 쓰지 못했습니다: 디스크가 멈추어 있습니다",
+    "disk_slow": "{file}을(를) {limit_s:g}초 안에 쓰지 못했습니다",
+    "disk_hangs": "{file}을(를) {limit_s:g}초 안에 쓰지 못했습니다: 디스크가 멈추어 있습니다",
     "disk_silent": "{directory}의 디스크가 응답하지 않습니다",
     "restart_then": "응답하면 서비스를 재시작하십시오",
     "disk_internal": "내부 에러: {error}",
     "directory_taken": "다른 서비스가 {directory}에 상태를 저장하고 있습니다: 먼저 그 서비스를 정지하거나 이 스테이션에 별도의 "
     "journal.directory를 지정하십시오",
     "journal_dead": "저널이 기록되지 않고 있습니다",
-    "journal_hangs": "저널이 {lasted_s:.0f} s 동안 기록되지 않았습니다: 디스크가 멈추어 있습니다",
+    "journal_hangs": "저널이 {lasted_s:.0f}초 동안 기록되지 않았습니다: 디스크가 멈추어 있습니다",
     "journal_failed": "저널을 기록할 수 없습니다: {error:word}: {file}",
     "journal_again": "저널이 다시 기록되고 있습니다",
     # its output on standard error
@@ -81,8 +81,8 @@ TEXTS: Mapping[str, str] = {
     # around the table of the status
     "alarm": "경보: {what}",
     "warning": "경고: {what}",
-    "old": "오래된 값: {what}",
+    "old": "이전 값: {what}",
     "policy_note": "정책: {what}",
     "see_alarm": "경보를 확인하십시오",
-    "old_figure": "{figure} (이전 값)",
+    "old_figure": "{figure}(이전 값)",
 }
