@@ -12,15 +12,18 @@ def width_of(text: str) -> int:
     return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
 
 
-def folded(line: str, width: int, indent: int = 4) -> str:
-    """The line folded to this width (0: not folded), every line but the first indented."""
-    if not width or width_of(line) <= width:
-        return line
-    head = max(len(line) - len(line.lstrip()), indent if indent > 4 else 0)  # aligned text stays aligned
-    lines, now = [], line[:head]
-    for word in WORD.findall(line[head:]):
-        if now.strip() and width_of(now) + width_of(word) > width:
+def folded(line: str, width: int, head: str = "") -> str:
+    """The line behind its head, folded to this width (0: not folded).
+
+    Text with a head stays in its column; without one, every line but the first is indented.
+    """
+    if not width or width_of(head + line) <= width:
+        return head + line
+    indent = width_of(head) or 4
+    lines, now = [], head or " " * (len(line) - len(line.lstrip()))
+    for word in WORD.findall(line):
+        if now[len(head) :].strip() and width_of(now) + width_of(word) > width:
             lines.append(now.rstrip())
-            now = " " * indent
+            now, head = " " * indent, ""
         now += f"{word} "
     return "\n".join([*lines, now.rstrip()])

@@ -78,7 +78,7 @@ def table(bays: Sequence[Bay], language: str = "", width: int = 0) -> str:
     for row, bay in zip(rows, [None, *bays], strict=True):
         cells = "".join(cell + " " * (columns - width_of(cell) + 2) for cell, columns in zip(row, widths, strict=False))
         narrow = width and width - width_of(cells) < LEAST_WHY
-        lines.append(cells.rstrip() if narrow else folded(f"{cells}{row[-1]}", width, width_of(cells)).rstrip())
+        lines.append(cells.rstrip() if narrow else folded(row[-1], width, cells).rstrip())
         if bay is not None:
             below = [row[-1], *_below(bay, language)] if narrow else _below(bay, language)
             lines.extend(folded(f"  {line}", width) for line in below)

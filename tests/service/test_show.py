@@ -276,6 +276,18 @@ def test_korean_is_as_wide_as_a_terminal_shows_it() -> None:
     assert max(len(line) for line in told.splitlines()[2:]) < 45
 
 
+@pytest.mark.parametrize("old", [["soc_pct"], ["soc_pct", "voltage_v"], ["soc_pct", "voltage_v", "temperature_c"]])
+def test_a_wide_letter_before_a_reason_takes_nothing_out_of_it(old: list[str]) -> None:
+    reason = " ".join(["전압이 47.0 V가 아니라 47.9 V이므로 기다립니다"] * 3)
+    battery = {"soc_pct": 54.6, "voltage_v": 48.1, "temperature_c": 8.4, "age_s": {}, "old": old}
+    for width in range(130, 221):
+        head, *lines = table([bay(reason=reason, battery=battery)], "ko", width).splitlines()
+        first, *more = lines[:-1]
+        column = width_of(head[: head.index("WHY")])
+        start = next(number for number in range(len(first)) if width_of(first[:number]) == column)
+        assert " ".join([first[start:], *map(str.strip, more)]) == reason, width
+
+
 def test_alarms_are_folded_too() -> None:
     alarming = bay(state="UNCONTROLLABLE", alarm="danger", reason="why " * 30, command={"order": {"action": "stop"}})
     assert all(len(line) <= 80 for line in page({"bays": [alarming]}, width=80).splitlines()[:3])
