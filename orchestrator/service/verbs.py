@@ -91,7 +91,8 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
-    from orchestrator.show import own_language, own_width, page
+    from orchestrator.columns import own_width
+    from orchestrator.show import own_language, page
 
     if as_json:
         print(json.dumps(document, ensure_ascii=False), flush=True)

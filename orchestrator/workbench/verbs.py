@@ -68,29 +68,30 @@ def prove_all(files: Sequence[str], jobs: int | None) -> int:
 
 
 def _simulate(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import own_width
     from orchestrator.workbench.simulate.verb import as_table, play
 
     if arguments.sweep:
         return _sweep(arguments)
     runs = play(arguments.policy, arguments.scenario, _progress())
-    print(as_table(runs))
+    print(as_table(runs, own_width()))
     if arguments.out is not None:
         print("", *_present().save(runs, arguments.out), sep="\n")
     return 0
 
 
 def _sweep(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import own_width
     from orchestrator.config.load import load_scenario
     from orchestrator.workbench.processes import cores
-    from orchestrator.workbench.simulate.figures import aligned
-    from orchestrator.workbench.simulate.sweep import axis, cluster, played, rows
+    from orchestrator.workbench.simulate.sweep import as_table, axis, cluster, played
 
     if len(arguments.policy) != 1:
         raise UsageError("--sweep: name one policy")
     axes, scenario = [axis(text) for text in arguments.sweep], load_scenario(arguments.scenario)
     with cluster(arguments.dask) if arguments.dask else cores(arguments.jobs) as pool:
         done = played(arguments.policy[0], scenario, axes, pool, _progress())
-    print(aligned(rows(done)))
+    print(as_table(done, own_width()))
     if arguments.out is not None:
         print("", *_present().save_sweep(done, arguments.out), sep="\n")
     return 0 if any(point.figures for point in done.points) else 1
