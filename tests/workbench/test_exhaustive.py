@@ -27,18 +27,18 @@ BROKEN = {
     "odd/narrow": (
         "charges",
         "→ SUSPENDED: the pack has 22.0 °C, the limit is 24 °C (narrow.yaml:2); it charges again below 19 °C; 24.1 °C "
-        "at 1001 s; let it cool down; goes on by itself 10 s after it is gone; no command",
+        "at t = 0.75 s; let it cool down; goes on by itself 10 s after it is gone; no command",
     ),
     "broken/volts": (
         "charges, as measured",
         "→ SUSPENDED: the charger reads 47.95 V, the BMU 47.45 V: not the same battery, or a bad connection; "
-        "since 1032 s; check that this BMU belongs to this charger's battery; goes on by itself 1 s after it is gone; "
-        "no command",
+        "since t = 32.00 s; check that this BMU belongs to this charger's battery; goes on by itself 1 s after it is "
+        "gone; no command",
     ),
     "broken/amps": (
         "charges, as measured",
         "→ TRIPPED: check for loads on the battery and for a wrong node id, then reset – the charger reads 0.00 A, "
-        "the BMU 0.50 A; 14.00 A and 14.50 A at 1039 s; reset is refused while it lasts; no command",
+        "the BMU 0.50 A; 14.00 A and 14.50 A at t = 38.75 s; reset is refused while it lasts; no command",
     ),
 }  # fmt: skip
 

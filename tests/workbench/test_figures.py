@@ -9,9 +9,9 @@ from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Visit
 from orchestrator.model import Cause, State
 from orchestrator.workbench.simulate.compare import differences
-from orchestrator.workbench.simulate.figures import clock, clock_s, compared, figures, table
+from orchestrator.workbench.simulate.figures import clock, compared, figures, table
 from orchestrator.workbench.simulate.simulation import Run, simulate
-from orchestrator.workbench.simulate.trail import Moment, Span, Trail, bounds
+from orchestrator.workbench.simulate.trail import Moment, Span, Trail, bounds, clock_s
 from tests.workbench.scenarios import battery, scenario
 
 POLICY = load_policy("li-ion-48v")
@@ -122,6 +122,12 @@ def test_a_figure_keeps_its_unit_where_a_cell_is_folded() -> None:
 
 def test_clocks() -> None:
     assert (clock(2.0833), clock(0.999), clock_s(2.0853)) == ("2:05", "1:00", "2:05:07")
+
+
+def test_moments_in_a_reason_are_on_the_clock_of_the_simulation() -> None:
+    told = Span(8.27 * 3600, 9 * 3600, State.HELD, None, None, Cause.of("gone", gone_t_s=29766.2)).why
+    assert "8:16:06" in told
+    assert "29766" not in told
 
 
 def test_rules_are_gathered_whatever_was_measured() -> None:

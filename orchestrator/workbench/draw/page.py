@@ -6,9 +6,9 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader
 
 from orchestrator.workbench.draw.plot import colour, says, svg, when
-from orchestrator.workbench.simulate.figures import clock_s, compared, titles
+from orchestrator.workbench.simulate.figures import compared, titles
 from orchestrator.workbench.simulate.simulation import Run
-from orchestrator.workbench.simulate.trail import Moment, bounds
+from orchestrator.workbench.simulate.trail import Moment, bounds, clock_s
 
 #: Moments kept per policy for the values shown under the pointer.
 MAX_MOMENTS = 1500

@@ -15,9 +15,9 @@ from matplotlib.lines import Line2D
 
 from orchestrator.model import State
 from orchestrator.workbench.simulate.compare import differences
-from orchestrator.workbench.simulate.figures import clock_s, titles
+from orchestrator.workbench.simulate.figures import titles
 from orchestrator.workbench.simulate.simulation import Run
-from orchestrator.workbench.simulate.trail import Bound, Moment, Span, bounds
+from orchestrator.workbench.simulate.trail import Bound, Moment, Span, bounds, clock_s
 
 #: One colour per policy, safe for colour-blind readers (Okabe and Ito); further policies repeat them with other dashes.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

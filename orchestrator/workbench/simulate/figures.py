@@ -9,7 +9,7 @@ from orchestrator.config.scenario import Cell, Scenario, Visit
 from orchestrator.core.states import ENERGISED
 from orchestrator.model import State
 from orchestrator.workbench.simulate.simulation import Run
-from orchestrator.workbench.simulate.trail import Moment, Span
+from orchestrator.workbench.simulate.trail import Moment, Span, clock_s
 
 #: Above this cell voltage, time counts as time at high voltage, in which cells age fastest.
 HIGH_CELL_V: dict[Cell, float] = {Cell.NMC: 4.10, Cell.LFP: 3.45}
@@ -154,9 +154,3 @@ def titles(runs: Sequence[Run]) -> list[str]:
 def compared(runs: Sequence[Run]) -> list[list[str]]:
     """The table of all runs, each under its policy's title."""
     return table([replace(figures(run), policy=title) for run, title in zip(runs, titles(runs), strict=True)])
-
-
-def clock_s(hours: float) -> str:
-    """Hours, minutes and seconds, `2:05:07`."""
-    seconds = round(hours * 3600)
-    return f"{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
