@@ -26,9 +26,11 @@ def _run(arguments: list[str]) -> int:
 
         return estop(arguments[1:], _catch)
     if arguments[:1] == ["run"] and not any(word.startswith("-") for word in arguments) and len(arguments) <= 2:
-        from orchestrator.lastresort.guardian import guard
+        stations = arguments[1:] or ["station.yaml"]
+        if arguments[1:] or os.path.exists(stations[0]):  # noqa: PTH110 - pathlib takes long to import
+            from orchestrator.lastresort.guardian import guard
 
-        return guard(arguments[1:] or ["station.yaml"])
+            return guard(stations)
     from orchestrator.cli import main as command_line
 
     return command_line(arguments)

@@ -103,8 +103,20 @@ NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
 def _kinds(text: str) -> tuple[int, int]:
-    """Two masks in hexadecimal, as in a status request; argparse turns a ValueError into a message."""
-    first, second = bytes.fromhex(text.replace("0x", "").replace(",", " "))
+    """Two masks in hexadecimal, as in a status request."""
+    try:
+        first, second = bytes.fromhex(text.replace("0x", "").replace(",", " "))
+    except ValueError:
+        from orchestrator.protocol.charger import Kind1, Kind2
+
+        one, two = (
+            ", ".join(f"{kind.value:02X} {(kind.name or '').lower().replace('_', ' ')}" for kind in kinds)
+            for kinds in (Kind1, Kind2)
+        )
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: write two bytes in hexadecimal, e.g. 03,04, each a sum of kinds; "
+            f"the first of {one}; the second of {two}"
+        ) from None
     return first, second
 
 

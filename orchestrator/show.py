@@ -1,13 +1,11 @@
 """The status document as text for a terminal: first what to do, then one line per bay, and why."""
 
 import os
-import shutil
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
 
-from orchestrator.columns import folded, width_of
+from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import in_language, language_of_answer
@@ -38,11 +36,6 @@ Bay = Mapping[str, object]
 def own_language() -> str:
     """The language of this terminal's user; "" if unset."""
     return language_of(os.environ)
-
-
-def own_width() -> int:
-    """How many columns the terminal has; 0 where it is none."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
 
 
 def page(document: Mapping[str, object], language: str = "", width: int = 0) -> str:
@@ -78,9 +71,9 @@ def table(bays: Sequence[Bay], language: str = "", width: int = 0) -> str:
     widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
     lines = [folded(_labelled("alarm", what_to_do(bay, language), language), width) for bay in bays if is_alarming(bay)]
     for row, bay in zip(rows, [None, *bays], strict=True):
-        cells = "".join(cell + " " * (columns - width_of(cell) + 2) for cell, columns in zip(row, widths, strict=False))
+        cells = beside(row[:-1], widths, width)
         narrow = width and width - width_of(cells) < LEAST_WHY
-        lines.append(cells.rstrip() if narrow else folded(f"{cells}{row[-1]}", width, width_of(cells)).rstrip())
+        lines.append(cells.rstrip() if narrow else folded(row[-1], width, cells).rstrip())
         if bay is not None:
             below = [row[-1], *_below(bay, language)] if narrow else _below(bay, language)
             lines.extend(folded(f"  {line}", width) for line in below)

@@ -29,8 +29,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     "link": ("errors", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
     # The devices know the link only as a typing.Protocol: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
-    "service": ("config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "protocol",
-        "show", "text",
+    "service": (
+        "columns", "config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model",
+        "protocol", "show", "text",
     ),
     "commissioning": (
         "config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile", "text",
@@ -39,7 +40,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "sim": ("model", "protocol.objects"),
     # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
-        "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
+        "columns", "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
         "sim.chemistry", "sim.pack", "text",
     ),
     "columns": (),

@@ -9,6 +9,11 @@ from orchestrator.config.policy import Band, Finish, Pack, PrechargeRule
 from orchestrator.config.yaml.tree import Entries, Items, Node, Scalar
 from orchestrator.keys import Range
 
+IN_AMPERES = "a policy is written in amperes now"
+#: A charge to here was no target of its own: it was one sign of a full pack.
+_ALL = "100"
+#: The signs of a full pack, with their keys below `full:`.
+_SIGNS = {"soc_pct": "soc_pct", "taper": "taper", "charger_full": "charger"}
 _STEP = re.compile(r"[0-4]", re.ASCII)
 Steps = tuple[float, ...]
 Values = Mapping[str, object]
@@ -57,40 +62,61 @@ def _steps(node: Node) -> Iterator[str]:
 
 def _row(y: Yesterday, node: Node) -> str:
     if not isinstance(node, Scalar) or not _STEP.fullmatch(node.text):
-        return "a policy speaks of amperes today: write max_a"
+        return f"{IN_AMPERES}: write max_a"
     step = int(node.text)
     if amps := y.amps(step):
-        return f"a policy speaks of amperes today: write max_a: {amps} (step {step + 1} of this station's charger)"
+        return f"{IN_AMPERES}: write max_a: {amps} (step {step + 1} of this station's charger)"
     return (
-        f"a policy speaks of amperes today: write max_a with those of step {step + 1} of 5, the charger's "
-        f"steps_a[{step}]; `orchestrator check STATION` works them out"
+        f"{IN_AMPERES}: write max_a with the amperes of the charger's step {step + 1} (of 5); "
+        "`orchestrator check STATION` tells them"
     )
 
 
-def _target(_y: Yesterday, node: Node) -> str:
-    text = node.text if isinstance(node, Scalar) else "100"
-    if text == "100":
-        return "write full: {soc_pct: 100} where the BMU's SOC is to end the charge, else leave it out"
-    return f"write target_soc_pct: {text}"
+def _target(y: Yesterday, node: Node) -> str:
+    text = node.text if isinstance(node, Scalar) else _ALL
+    return _full(y, node) if text == _ALL else f"write target_soc_pct: {text}"
 
 
-def _taper(_y: Yesterday, node: Node) -> str:
-    if not isinstance(node, Entries):
+def _full(y: Yesterday, node: Node) -> str:
+    """One `full:` for all signs in the file, told at the first of them: a second `full:` would be refused."""
+    signs = list(_signs(y.tree))
+    if not signs:
         return "write it below `full:`"
-    inner = ", ".join(f"{name.text}: {value.text}" for name, value in node.entries if isinstance(value, Scalar))
-    return f"write it below `full:`, full: {{taper: {{{inner}}}}}"
+    if node is not signs[0][0]:
+        return "goes into that one `full:`"
+    whole = f"write full: {{{', '.join(text for _, text in signs)}}}"
+    if len(signs) > 1:
+        whole += ", one key for all of these"
+    trusts = "; leave soc_pct out of it if the BMU's SOC is not to end the charge"
+    return whole + (trusts if any(text.startswith("soc_pct") for _, text in signs) else "")
 
 
-def _charger(_y: Yesterday, node: Node) -> str:
-    text = node.text if isinstance(node, Scalar) else "true"
-    return f"write it below `full:`, full: {{charger: {text}}}"
+def _signs(tree: Node | None) -> Iterator[tuple[Node, str]]:
+    """Every sign of a full pack in the old `finish`, as it is written below `full:`."""
+    for name, node in _entries(_get(tree, "finish")):
+        if name in _SIGNS and not (name == "soc_pct" and isinstance(node, Scalar) and node.text != _ALL):
+            yield node, f"{_SIGNS[name]}: {_written(node)}"
+
+
+def _written(node: Node) -> str:
+    if isinstance(node, Scalar):
+        return node.text
+    return f"{{{', '.join(f'{name}: {_written(value)}' for name, value in _entries(node))}}}"
+
+
+def _entries(node: Node | None) -> Iterator[tuple[str, Node]]:
+    yield from ((name.text, value) for name, value in node.entries) if isinstance(node, Entries) else ()
+
+
+def _get(node: Node | None, key: str) -> Node | None:
+    return dict(_entries(node)).get(key)
 
 
 _RETIRED: Mapping[tuple[type, str], Callable[[Yesterday, Node], str]] = {
     (Band, "step"): _row,
     (Finish, "soc_pct"): _target,
-    (Finish, "taper"): _taper,
-    (Finish, "charger_full"): _charger,
+    (Finish, "taper"): _full,
+    (Finish, "charger_full"): _full,
 }
 
 
@@ -106,12 +132,14 @@ def _chemistry(_y: Yesterday, values: Values) -> str:
 def _current(y: Yesterday, _values: Values) -> str:
     if y.highest is None or not (amps := y.amps(y.highest)):
         return ""
-    return f"with the step {y.highest + 1} of yesterday write current_a: {amps}, if the data sheet allows as much"
+    return (
+        f"the file's highest step, {y.highest + 1}, is {amps} A: write current_a: {amps}, if the data sheet allows it"
+    )
 
 
 def _precharge(y: Yesterday, _values: Values) -> str:
     amps = y.amps(0)
-    return f"with this station's charger write max_a: {amps}, its lowest step" if amps else ""
+    return f"write max_a: {amps}, the lowest step of this station's charger" if amps else ""
 
 
 _NEW: Mapping[tuple[type, str], Callable[[Yesterday, Values], str]] = {
@@ -121,4 +149,4 @@ _NEW: Mapping[tuple[type, str], Callable[[Yesterday, Values], str]] = {
 }
 
 #: For a table that was a list in the older format, and is now a group with `rows`.
-ROWS = "a table has its rows below `rows:` today: write {name}: {{rows: [{{from: …, to: …}}, …]}}"
+ROWS = "a table now has its rows below `rows:`: write {name}: {{rows: [{{from: …, to: …}}, …]}}"

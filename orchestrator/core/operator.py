@@ -93,8 +93,9 @@ def _reset(memory: Memory, now_s: float, bay: str) -> Heard:
     cleared = [name for name, fault in before.items() if fault.latched and name not in faults]
     resets = tuple(reset for reset in known.resets if now_s - reset[0] < RESETS_S)
     resets += tuple((now_s, name) for name in cleared)
-    # in any state, even while the stop is being verified: the way on is a start
-    return Heard(changed(known, hold=RESET, resets=resets), faults)
+    # in any state, even while the stop is being verified: the way on is a start, which ends any other hold as well
+    hold = RESET if known.hold is None or known.hold in OWN else known.hold
+    return Heard(changed(known, hold=hold, resets=resets), faults)
 
 
 def _refusals(memory: Memory, now_s: float, bay: str, request: Request) -> list[Cause]:

@@ -7,10 +7,12 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import full_due, goes_on, target
 from orchestrator.core.machine import Trigger
+from orchestrator.core.operator import OWN
 from orchestrator.core.outofcontrol import problem
 from orchestrator.core.parts import changed
 from orchestrator.core.states import DONE
 from orchestrator.model import ActiveFault, Cause, Effect, State
+from orchestrator.model.cause import together
 
 Faults = tuple[ActiveFault, ...]
 Found = tuple[Trigger, Cause] | None
@@ -30,7 +32,7 @@ def _trips(f: Facts, faults: Faults) -> Found:
     worst = faults[0] if faults else None
     if worst is None or worst.effect is not Effect.TRIP or (_lost(f) and f.memory.state is not State.TRIPPED):
         return None
-    return Trigger.TRIP, worst.told
+    return Trigger.TRIP, _told(f, worst)
 
 
 def _lost(f: Facts) -> bool:
@@ -41,9 +43,15 @@ def _loses(f: Facts, _faults: Faults) -> Found:
     return (Trigger.LOSE, offline(f)) if _lost(f) else None
 
 
-def _waits(_f: Facts, faults: Faults) -> Found:
+def _waits(f: Facts, faults: Faults) -> Found:
     waits = next((x for x in faults if ROW[x.id].clear is Clear.OPERATOR), None)
-    return (Trigger.HOLD, waits.told) if waits is not None else None
+    return (Trigger.HOLD, _told(f, waits)) if waits is not None else None
+
+
+def _told(f: Facts, fault: ActiveFault) -> Cause:
+    """The fault, and a hold that no operator has caused: what was wired where can be why the fault is here."""
+    hold = f.memory.operator.hold
+    return fault.told if hold is None or hold in OWN else together([fault.told, hold])
 
 
 def _holds(f: Facts, _faults: Faults) -> Found:

@@ -6,7 +6,7 @@ import time
 
 from orchestrator.demo.screen import Lines, Picture, Screen
 from orchestrator.demo.stage import Stage
-from orchestrator.demo.story import SHOWN_BY_A_STOP, Story
+from orchestrator.demo.story import SHOWN_BY_A_STOP, SINCE, Story
 from orchestrator.errors import OrchestratorError
 from orchestrator.sim.faults import FAULTS
 
@@ -80,7 +80,8 @@ def _sum_up(stage: Stage, story: Story) -> None:
         print(f"It stopped because: {story.stopped_by}")
     if story.fault and truth["injected_s"] is not None and truth["first_stop_s"] is not None:
         after_s = truth["first_stop_s"] - truth["injected_s"]
-        print(f"The first stop frame reached the charger {after_s:.3f} s after the fault began.")
+        since = SINCE.get(story.fault, "the fault began")
+        print(f"The first stop frame reached the charger {after_s:.3f} s after {since}.")
     print(f"State {story.state}. The emulated charger: operation {truth['operation']}, {truth['current_a']:.2f} A.")
     if not story.well:
         print("This demo did not end as it should.", file=sys.stderr)

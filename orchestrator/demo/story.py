@@ -10,6 +10,11 @@ from orchestrator.show import step_of
 STAGES: Mapping[str, str] = {"precharge_no_rise": "PRECHARGE_PULSE", "rogue_run": "FULL"}
 #: Faults that show only when somebody stops the bay.
 SHOWN_BY_A_STOP = frozenset({"ignore_stop"})
+#: Faults that come slowly: from when their first stop is counted; the others are there at once.
+SINCE = {
+    "over_temperature": "the pack began to heat up (its bound lies some seconds later)",
+    "under_temperature": "the pack began to cool down (its bound lies some seconds later)",
+}
 #: How long after entering that state the fault is injected.
 INJECT_AFTER_S = 4.0
 #: How long the bay is watched after it has stopped.

@@ -180,7 +180,8 @@ class EmergencyStop:
         """Report the results, what to do first; returns the exit status."""
         names = {port: f"{bay} ({port})" if (bay := self._bays[port]) else port for port in whys}
         running = [names[port] for port, why in whys.items() if why not in ("", HELD)]
-        lines = [f"CUT THE MAINS of {', '.join(running)}: nothing proves that they stand by"] if running else []
+        they = "it stands" if len(running) == 1 else "they stand"
+        lines = [f"CUT THE MAINS of {', '.join(running)}: nothing proves that {they} by"] if running else []
         lines += [f"{names[port]}: {why or 'standby verified'}" for port, why in whys.items()]
         became = self._opened.became
         lines += [f"contactor on {one[0]} line {one[1]}: {became[one]}" for one in self._contactors if one in became]

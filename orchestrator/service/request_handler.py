@@ -51,7 +51,7 @@ class RequestHandler:
             names, port = request.get("bays"), request.get("port")
             if verb == Request.RESET and isinstance(port, str):
                 return self._drop(port)
-            bays = self._bays if names is None else [self._named(name) for name in _names(names)]
+            bays = self._bays if names is None else [self._named(name, verb) for name in _names(names)]
             return self._ask(list(dict.fromkeys(bays)), Request(verb))
         raise RequestError(Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", *map(str, Request))))
 
@@ -71,12 +71,13 @@ class RequestHandler:
 
         return results
 
-    def _named(self, name: object) -> BayRunner:
+    def _named(self, name: object, verb: str = "") -> BayRunner:
         for bay in self._bays:
             if bay.name == name:
                 return bay
         known = tuple(bay.name for bay in self._bays)
-        raise RequestError(Cause.of("bay_unknown", bay=f"{name!s:.80}", bays=known))
+        unknown = Cause.of("bay_unknown", bay=f"{name!s:.80}", bays=known)
+        raise RequestError(unknown.with_(then=Cause.of("done_nowhere", verb=verb)) if verb else unknown)
 
     def _ask(self, bays: Sequence[BayRunner], request: Request) -> Later:
         """Pass the request to each bay; their answers come later, "" means yes."""

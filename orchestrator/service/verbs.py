@@ -33,7 +33,7 @@ WATCH_S = 1.0
 def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """`run`, `status` and the requests."""
     run = verbs.add_parser("run", help="run the service for a station until told to end")
-    run.add_argument("station", nargs="?", default="station.yaml", help="the station file (default: %(default)s)")
+    run.add_argument("station", nargs="?", help="the station file (default: station.yaml)")
     run.set_defaults(run=_run)
     status = verbs.add_parser("status", help="show what every bay is doing, and why")
     status.add_argument("bay", nargs="?", help="only this bay")
@@ -62,7 +62,11 @@ def _add_socket(parser: argparse.ArgumentParser) -> None:
 def _run(arguments: argparse.Namespace) -> int:
     from orchestrator.lastresort.guardian import guard
 
-    return guard([arguments.station])
+    if arguments.station is None and not Path("station.yaml").exists():
+        raise UsageError(
+            "run: there is no station.yaml in this directory: name the station file, orchestrator run FILE"
+        )
+    return guard([arguments.station or "station.yaml"])
 
 
 def _status(arguments: argparse.Namespace) -> int:
@@ -91,7 +95,8 @@ def _status(arguments: argparse.Namespace) -> int:
 
 
 def _show_status(document: dict[str, object], *, as_json: bool, clear: bool) -> None:
-    from orchestrator.show import own_language, own_width, page
+    from orchestrator.columns import own_width
+    from orchestrator.show import own_language, page
 
     if as_json:
         print(json.dumps(document, ensure_ascii=False), flush=True)
@@ -109,8 +114,12 @@ def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.text.document import language_of_answer, refusals
 
     port = getattr(arguments, "port", None)
-    if bool(arguments.bay) + arguments.all + (port is not None) != 1:
-        raise UsageError(f"{arguments.verb}: name bays, or --all{', or --port' if arguments.verb == 'reset' else ''}")
+    given = bool(arguments.bay) + arguments.all + (port is not None)
+    if given != 1:
+        raise UsageError(
+            f"{arguments.verb}: name bays, or --all{', or --port' if arguments.verb == 'reset' else ''}"
+            f"{', not more than one of these' if given else ''}"
+        )
     bays, path = None if arguments.all else arguments.bay, find_socket(arguments.socket)
     request = {"verb": arguments.verb, "bays": bays} | ({} if port is None else {"port": os.path.abspath(port)})  # noqa: PTH100 - not resolved
     try:

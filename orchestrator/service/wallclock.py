@@ -1,15 +1,12 @@
-"""The time of day of what the core says in seconds of the monotonic clock. Pure: both clocks are read elsewhere.
-
-Such moments are parameters called `…_t_s`, at any depth; told to people and programs outside they are called `…_at`.
-"""
+"""The time of day of what the core says in seconds of the monotonic clock. Pure: both clocks are read elsewhere."""
 
 from dataclasses import dataclass
-from math import ceil, isfinite
+from math import ceil
 from time import localtime, strftime
 
 from orchestrator.model import Cause
+from orchestrator.text.moments import with_moments
 
-MOMENT, TIME_OF_DAY = "_t_s", "_at"
 #: What is to come is told in minutes, and never too early.
 COMING, MINUTE_S, SOON_S = "until", 60.0, 120.0
 
@@ -27,10 +24,7 @@ class WallClock:
 
     def told(self, cause: Cause | None) -> Cause | None:
         """The cause with its moments as the time of day, here."""
-        if cause is None:
-            return None
-        pairs = tuple(self._pair(name, value) for name, value in cause.params)
-        return Cause(cause.id, pairs, cause.key, cause.place, cause.advice)
+        return cause and with_moments(cause, self._told)
 
     def time_of_day(self, t_s: float, *, coming: bool = False) -> str:
         """HH:MM:SS, of another day its date and HH:MM; of what is `coming`, and not soon, HH:MM, rounded up."""
@@ -42,13 +36,5 @@ class WallClock:
             return strftime("%Y-%m-%d %H:%M", then)
         return strftime("%H:%M" if coming else "%H:%M:%S", then)
 
-    def _pair(self, name: str, value: object) -> tuple[str, object]:
-        if name.endswith(MOMENT) and isinstance(value, int | float) and isfinite(value):
-            name = name.removesuffix(MOMENT)
-            return f"{name}{TIME_OF_DAY}", self.time_of_day(value, coming=name == COMING)
-        return name, self._value(value)
-
-    def _value(self, value: object) -> object:
-        if isinstance(value, Cause):
-            return self.told(value)
-        return tuple(map(self._value, value)) if isinstance(value, tuple) else value
+    def _told(self, name: str, t_s: float) -> str:
+        return self.time_of_day(t_s, coming=name == COMING)

@@ -38,13 +38,12 @@ from orchestrator.text.ko.particles import resolved
 from orchestrator.text.ko.service import TEXTS as KO_SERVICE
 from orchestrator.text.ko.words import FRAMES as KO_FRAMES
 from orchestrator.text.ko.words import WORDS as KO_WORDS
+from orchestrator.text.moments import MOMENT, TIME_OF_DAY
 
 #: The effect of a tripping fault, as a cause carries it: its sentence begins with what to do.
 TRIP = "TRIP"
 #: The present and the past form in a template: {reports|reported}.
 TENSES = re.compile(r"\{([^{}|]*)\|([^{}|]*)\}")
-#: How the name of a moment ends before it is the time of day, and in a template.
-MOMENT, TIME_OF_DAY = "_t_s", "_at"
 #: Formats that are not number formats.
 JOINS = {"": "list", "word": "list", "and": "and", "then": "then"}
 #: No sentence is longer, whatever its parameters are.

@@ -4,15 +4,17 @@ Each imports its dependencies when it runs: plotting and the like are extras, wh
 """
 
 import argparse
+import shutil
 import sys
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from types import ModuleType
 
 from orchestrator.errors import OrchestratorError, UsageError
 
+#: A computation that takes longer shows its progress, this often.
+PROGRESS_S = 1.0
 PICTURES = ("mermaid", "svg", "png")
 
 
@@ -53,14 +55,15 @@ def prove_all(files: Sequence[str], jobs: int | None) -> int:
     held = True
     for file in files:
         for names, bay in bays_in(file):
-            begin_s = time.monotonic()
-            proof = prove(Rules.of(bay), partial(_progress("{:,} steps"), names), jobs)
+            begin_s, tell = time.monotonic(), progress(f"{names}: ")
+            proof = prove(Rules.of(bay), tell, jobs)
+            tell("")
             for found in proof.counterexamples:
                 print(f"{names}: {found}\n", file=sys.stderr)
             came = f"{len(proof.counterexamples)} BROKEN" if proof.counterexamples else "all hold"
             print(
-                f"{names}: {proof.properties} properties, {came}; {proof.memories} situations, {proof.steps:,} steps, "
-                f"{time.monotonic() - begin_s:.0f} s",
+                f"{names}: {proof.properties} properties, {came}; {proof.memories} situations, "
+                f"{proof.steps:,} decisions, {time.monotonic() - begin_s:.0f} s",
                 flush=True,
             )
             held = held and not proof.counterexamples
@@ -68,29 +71,30 @@ def prove_all(files: Sequence[str], jobs: int | None) -> int:
 
 
 def _simulate(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import own_width
     from orchestrator.workbench.simulate.verb import as_table, play
 
     if arguments.sweep:
         return _sweep(arguments)
-    runs = play(arguments.policy, arguments.scenario, _progress())
-    print(as_table(runs))
+    runs = play(arguments.policy, arguments.scenario, _share())
+    print(as_table(runs, own_width()))
     if arguments.out is not None:
         print("", *_present().save(runs, arguments.out), sep="\n")
     return 0
 
 
 def _sweep(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import own_width
     from orchestrator.config.load import load_scenario
     from orchestrator.workbench.processes import cores
-    from orchestrator.workbench.simulate.figures import aligned
-    from orchestrator.workbench.simulate.sweep import axis, cluster, played, rows
+    from orchestrator.workbench.simulate.sweep import as_table, axis, cluster, played
 
     if len(arguments.policy) != 1:
         raise UsageError("--sweep: name one policy")
     axes, scenario = [axis(text) for text in arguments.sweep], load_scenario(arguments.scenario)
     with cluster(arguments.dask) if arguments.dask else cores(arguments.jobs) as pool:
-        done = played(arguments.policy[0], scenario, axes, pool, _progress())
-    print(aligned(rows(done)))
+        done = played(arguments.policy[0], scenario, axes, pool, _share())
+    print(as_table(done, own_width()))
     if arguments.out is not None:
         print("", *_present().save_sweep(done, arguments.out), sep="\n")
     return 0 if any(point.figures for point in done.points) else 1
@@ -104,15 +108,25 @@ def _present() -> ModuleType:
     return present
 
 
-def _progress(form: str = "{:.0%}") -> Callable[[str, float], None]:
-    """Show progress on a terminal once a computation takes longer than a second."""
-    begin_s = time.monotonic()
+def _share() -> Callable[[str, float], None]:
+    """Progress as a share of the whole."""
+    tell = progress()
+    return lambda what, share: tell(f"{what}: {share:.0%}" if share < 1 else "")
 
-    def say(what: str, share: float) -> None:
-        if time.monotonic() - begin_s > 1 and sys.stderr.isatty():
-            print(f"\r\x1b[K{what}: {form.format(share)}", end="\r", file=sys.stderr, flush=True)
 
-    return say
+def progress(head: str = "") -> Callable[[str], None]:
+    """One line on a terminal, rewritten as a computation goes on, once it takes longer than a second; "" erases it."""
+    told_s = time.monotonic()
+
+    def tell(text: str) -> None:
+        nonlocal told_s
+        if not sys.stderr.isatty() or (text and time.monotonic() - told_s < PROGRESS_S):
+            return
+        told_s = time.monotonic()
+        room = shutil.get_terminal_size().columns - 1 - len(text)  # a line that wraps cannot be rewritten
+        print(f"\r\x1b[K{head[:room] if text else ''}{text}", end="", file=sys.stderr, flush=True)
+
+    return tell
 
 
 def _replay(arguments: argparse.Namespace) -> int:

@@ -1,5 +1,6 @@
 """Every file in broken/ and, beside it, the exact findings expected."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -36,3 +37,15 @@ def test_every_expectation_has_its_file() -> None:
 def test_a_good_file_has_no_findings(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(HERE / "good")
     assert check([name]) == []
+
+
+def test_what_is_to_be_written_for_an_old_finish_is_accepted_literally(tmp_path: Path) -> None:
+    old = (HERE / "broken" / "policy-of-yesterday.yaml").read_text(encoding="utf-8")
+    told = (HERE / "broken" / "policy-of-yesterday.txt").read_text(encoding="utf-8")
+    (full,) = re.findall(r"write (full: \{.*\}), one key", told)
+    lines = [
+        line for line in old.splitlines() if not line.startswith(("  soc_pct: 100", "  taper:", "  charger_full:"))
+    ]
+    policy = tmp_path / "policy.yaml"
+    policy.write_text("\n".join(lines).replace("finish:", f"finish:\n  {full}"), encoding="utf-8")
+    assert not [finding.text for finding in check([str(policy)]) if "finish" in finding.text]

@@ -16,7 +16,7 @@ from orchestrator.core.memory import FaultMemory, Memory, value_of
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.persisted import COUNTERS_S, UNFINISHED, Persisted, PersistedFault, from_first_format
 from orchestrator.core.states import ENERGISED, MAY_RUN
-from orchestrator.model import STOP, Action, Alarm, ChargerLink, Request, Session, State
+from orchestrator.model import STOP, Action, Alarm, Cause, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle
 from tests.core.fault_scenes import SCENES
 from tests.core.said import cause, reason_of, say
@@ -105,6 +105,27 @@ def test_a_persons_word_outlives_the_service(request_: Request) -> None:
         assert not any(decision.state in ENERGISED for decision in world.decisions)
     assert world.memory.operator.hold == (STOPPED if request_ is Request.STOP else None)
     assert world.memory.operator.paused is (request_ is Request.PAUSE)
+    assert world.ask(Request.START) == ""
+    world.until(State.CHARGING, 10)
+
+
+MOVED = Cause.of("bay_moved_port", bay="bay-1", old_port="/dev/old", port="/dev/ttyX")
+
+
+@pytest.mark.parametrize("name", ["hot_trip", "emergency"])
+def test_what_was_wired_where_is_told_with_a_fault_and_after_its_reset(name: str) -> None:
+    world = charging()
+    fault = PersistedFault(cause("seen"), latched=name == "hot_trip", raised=60.0)
+    restarted(world, written=Persisted(hold=MOVED, faults={name: fault}))
+    world.run(30)
+    assert world.decision.state is (State.TRIPPED if name == "hot_trip" else State.HELD)
+    assert reason_of(world.decision).endswith(say(MOVED))
+    assert ("seen" if name == "hot_trip" else "found running") in reason_of(world.decision)
+    if name == "hot_trip":
+        assert world.ask(Request.RESET) == ""
+        world.run(5)
+        assert world.decision.state is State.HELD
+        assert reason_of(world.decision).startswith(say(MOVED))
     assert world.ask(Request.START) == ""
     world.until(State.CHARGING, 10)
 

@@ -15,8 +15,8 @@ both. A program compares `id` and `key`, never the text: figures change all the 
 
 ```json
 {"id": "over_temperature", "params": {"pack_c": 45.2, "limit_c": 45, "again_c": 40.0, "effect": "PAUSE"},
- "key": "pack.temperature_c", "place": "policies/li-ion-48v.yaml:15", "advice": "over_temperature",
- "text": "the pack has 45.2 °C, the limit is 45 °C (policies/li-ion-48v.yaml:15); …"}
+ "key": "pack.temperature_c", "place": "policies/li-ion-48v.yaml:21", "advice": "over_temperature",
+ "text": "the pack has 45.2 °C, the limit is 45 °C (policies/li-ion-48v.yaml:21); …"}
 ```
 
 | field | what it is |
@@ -65,7 +65,7 @@ def _params(template: str) -> Iterator[str]:
 
 def _shown(template: str) -> str:
     """With the names of the parameters only; where the place stands, nothing."""
-    parts = Formatter().parse(template)
+    parts = Formatter().parse(template.replace("\n", "<br>"))  # a line break would end the table
     return "".join(text + (f"{{{name}}}" if name not in (None, "at") else "") for text, name, _, _ in parts)
 
 

@@ -301,7 +301,7 @@ def test_a_current_that_only_the_bmu_sees_is_told_first(tmp_path: Path) -> None:
             done = estop("--port", bench.name, "--socket", str(tmp_path / "s"), cwd=tmp_path)
         assert done.returncode == 1
         assert done.stdout.splitlines() == [
-            f"CUT THE MAINS of {bench.name}: nothing proves that they stand by",
+            f"CUT THE MAINS of {bench.name}: nothing proves that it stands by",
             f"{bench.name}: NOT stopped: the charger says 0.0 A, the BMU sees 14.0 A",
         ]
 
@@ -345,7 +345,7 @@ sys.exit(main(["--port", *sys.argv[1:]]))
         assert stop_s is not None
         assert stop_s - began_s < 1.0
         assert done.stdout.splitlines() == [
-            f"CUT THE MAINS of {pty.path}: nothing proves that they stand by",
+            f"CUT THE MAINS of {pty.path}: nothing proves that it stands by",
             f"{pty.path}: the port's driver hangs",
             f"{bench.name}: standby verified",
         ]

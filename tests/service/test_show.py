@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.columns import width_of
 from orchestrator.model import Cause
-from orchestrator.show import figure, page, stands_by, strays, table, what_to_do
+from orchestrator.show import HEAD, figure, page, stands_by, strays, table, what_to_do
 from orchestrator.text.catalogue import fields
 
 
@@ -274,6 +274,30 @@ def test_on_a_narrow_screen_the_reason_stands_below_and_commands_stay_whole() ->
 def test_korean_is_as_wide_as_a_terminal_shows_it() -> None:
     told = table([bay(reason="팩 온도가 높습니다 " * 9)], width=60)
     assert max(len(line) for line in told.splitlines()[2:]) < 45
+
+
+@pytest.mark.parametrize("old", [["soc_pct"], ["soc_pct", "voltage_v"], ["soc_pct", "voltage_v", "temperature_c"]])
+def test_a_wide_letter_before_a_reason_takes_nothing_out_of_it(old: list[str]) -> None:
+    reason = " ".join(["전압이 47.0 V가 아니라 47.9 V이므로 기다립니다"] * 3)
+    battery = {"soc_pct": 54.6, "voltage_v": 48.1, "temperature_c": 8.4, "age_s": {}, "old": old}
+    for width in range(130, 221):
+        head, *lines = table([bay(reason=reason, battery=battery)], "ko", width).splitlines()
+        first, *more = lines[:-1]
+        column = width_of(head[: head.index("WHY")])
+        start = next(number for number in range(len(first)) if width_of(first[:number]) == column)
+        assert " ".join([first[start:], *map(str.strip, more)]) == reason, width
+
+
+@pytest.mark.parametrize("language", ["en", "ko"])
+@pytest.mark.parametrize("width", [60, 70, 80])
+def test_old_values_make_no_line_wider_than_the_screen(width: int, language: str) -> None:
+    battery = {"soc_pct": 54.6, "voltage_v": 48.1, "temperature_c": 8.4, "age_s": {}, "old": ["soc_pct", "voltage_v"]}
+    told = bay(charger={"current_a": 14.0, "old": True, "age_s": 46.0}, battery=battery)
+    lines = table([told, bay(name="bay-2")], language, width).splitlines()
+    assert max(map(width_of, lines)) <= width
+    assert " ".join(lines[:2]).split()[: len(HEAD) - 1] == list(HEAD[:-1])
+    steps = [width_of(line[: line.index(step)]) for line in lines for step in ("STEP", "2 (5.0 A)  ") if step in line]
+    assert len(set(steps)) == 1
 
 
 def test_alarms_are_folded_too() -> None:

@@ -6,7 +6,8 @@ from functools import cache
 from pathlib import Path
 from string import Formatter
 
-from orchestrator.text.catalogue import LANGUAGES, MOMENT, TIME_OF_DAY
+from orchestrator.text.catalogue import LANGUAGES
+from orchestrator.text.moments import MOMENT, TIME_OF_DAY
 
 ROOT = Path(__file__).resolve().parents[2] / "orchestrator"
 TEXTS = LANGUAGES["en"].texts

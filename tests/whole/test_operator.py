@@ -156,7 +156,10 @@ def test_wrong_use_is_told(station: Station) -> None:
     _, service = station
     nobody = service.cli("start", "bay-9")
     assert nobody.returncode == 1
-    assert nobody.stderr == "orchestrator: no bay 'bay-9' here: bay-1, bay-2, bay-3, bay-4\n"
+    assert (
+        nobody.stderr
+        == "orchestrator: no bay 'bay-9' here: bay-1, bay-2, bay-3, bay-4; start was carried out at no bay\n"
+    )
     assert service.cli("status", "bay-9").returncode == 1
     assert service.cli("start").returncode == 2
     assert service.cli("start", "bay-1", "--all").returncode == 2

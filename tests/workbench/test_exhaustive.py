@@ -1,5 +1,7 @@
 """`check --exhaustive`: its findings on policies that break something, and on one that does not."""
 
+import os
+import sys
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,11 +13,12 @@ from orchestrator.config.load import load_policy
 from orchestrator.config.shipped import shipped_names
 from orchestrator.core.rules import Rules
 from orchestrator.model import State
-from orchestrator.workbench import processes
+from orchestrator.workbench import processes, verbs
 from orchestrator.workbench.prove import exhaustive
+from orchestrator.workbench.prove.endings import ENDINGS
 from orchestrator.workbench.prove.exhaustive import bay_of, bays_in, here
 from orchestrator.workbench.prove.explore import Explorer
-from orchestrator.workbench.prove.lasting import reaches
+from orchestrator.workbench.prove.lasting import reaches, settles
 from tests.proof.exploring import small, walk_on
 
 ROOT = Path(__file__).parent
@@ -24,18 +27,18 @@ BROKEN = {
     "odd/narrow": (
         "charges",
         "→ SUSPENDED: the pack has 22.0 °C, the limit is 24 °C (narrow.yaml:2); it charges again below 19 °C; 24.1 °C "
-        "at 1001 s; let it cool down; goes on by itself 10 s after it is gone; no command",
+        "at t = 0.75 s; let it cool down; goes on by itself 10 s after it is gone; no command",
     ),
     "broken/volts": (
         "charges, as measured",
         "→ SUSPENDED: the charger reads 47.95 V, the BMU 47.45 V: not the same battery, or a bad connection; "
-        "since 1032 s; check that this BMU belongs to this charger's battery; goes on by itself 1 s after it is gone; "
-        "no command",
+        "since t = 32.00 s; check that this BMU belongs to this charger's battery; goes on by itself 1 s after it is "
+        "gone; no command",
     ),
     "broken/amps": (
         "charges, as measured",
         "→ TRIPPED: check for loads on the battery and for a wrong node id, then reset – the charger reads 0.00 A, "
-        "the BMU 0.50 A; 14.00 A and 14.50 A at 1039 s; reset is refused while it lasts; no command",
+        "the BMU 0.50 A; 14.00 A and 14.50 A at t = 38.75 s; reset is refused while it lasts; no command",
     ),
 }  # fmt: skip
 
@@ -82,3 +85,35 @@ def test_the_command_explores_on_every_core(
     assert said.startswith(f"{ROOT}/broken/automatic.yaml, bay-1: 32 properties, 2 BROKEN; ")
     assert "bay-1: charges: a healthy battery is charged" in told
     assert "charges, as measured" in told
+    assert "decisions explored" not in told  # progress is for terminals
+
+
+def test_every_part_of_the_search_says_how_far_it_is() -> None:
+    told: list[str] = []
+    walk = walk_on(small(Rules.of(bay_of(load_policy("li-ion-48v")))))
+    explorer = Explorer(walk, here(walk), told.append)
+    explorer.run(most=5)
+    assert told[0].endswith(" decisions explored")
+    told.clear()
+    reaches(explorer, ENDINGS[:2])
+    assert told == ["1 of 2 endings", "2 of 2 endings"]
+    told.clear()
+    settles(explorer, explorer.nodes[:1])
+    assert told == [f"{number} of {len(told)} searches for livelocks" for number in range(1, len(told) + 1)]
+    assert told
+
+
+def test_progress_is_one_line_of_a_terminal_rewritten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verbs, "PROGRESS_S", 0.0)
+    monkeypatch.setenv("COLUMNS", "20")
+    ours, theirs = os.openpty()
+    with os.fdopen(theirs, "w", encoding="utf-8") as terminal:
+        monkeypatch.setattr(sys, "stderr", terminal)
+        tell = verbs.progress("a/very/long/name/of/a/file: ")
+        tell("5 decisions")
+        tell("")
+        expected, shown = b"\r\x1b[Ka/very/l5 decisions\r\x1b[K", b""
+        while len(shown) < len(expected):
+            shown += os.read(ours, 1000)
+    os.close(ours)
+    assert shown == expected

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import pytest
 
+from orchestrator.columns import aligned, width_of
 from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Visit
 from orchestrator.model import Cause, State
 from orchestrator.workbench.simulate.compare import differences
-from orchestrator.workbench.simulate.figures import aligned, clock, clock_s, figures, table
+from orchestrator.workbench.simulate.figures import clock, compared, figures, table
 from orchestrator.workbench.simulate.simulation import Run, simulate
-from orchestrator.workbench.simulate.trail import Moment, Span, Trail, bounds
+from orchestrator.workbench.simulate.trail import Moment, Span, Trail, bounds, clock_s
 from tests.workbench.scenarios import battery, scenario
 
 POLICY = load_policy("li-ion-48v")
@@ -87,8 +88,46 @@ def test_a_column_for_each_policy_and_a_row_for_each_state_that_lasts() -> None:
     assert len({line.index("other") for line in [aligned([head, *rows]).splitlines()[0]]}) == 1
 
 
+def test_policies_of_one_name_are_told_apart_by_their_files() -> None:
+    one = run([], [span(0, 4, State.IDLE)])
+    copied = replace(POLICY, source=replace(POLICY.source, file="/home/me/copy.yaml"))
+    other = replace(POLICY, policy="other")
+    assert compared([one, replace(one, policy=copied), replace(one, policy=other)])[0] == [
+        "", "li-ion-48v (policies/li-ion-48v.yaml)", "li-ion-48v (/home/me/copy.yaml)", "other",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [60, 80, 100])
+def test_a_table_fits_the_terminal(width: int) -> None:
+    one = figures(run([], [span(0, 4, State.CHARGING, None, "over_temperature", "status_limit", "hot_pack")]))
+    rows = table([replace(one, policy=f"policy-{number}") for number in range(6)])
+    assert max(map(width_of, aligned(rows).splitlines())) > 100
+    blocks = aligned(rows, width).split("\n\n")
+    assert all(width_of(line) <= width for block in blocks for line in block.splitlines())
+    assert " ".join(block.splitlines()[0] for block in blocks).split() == rows[0][1:]
+    assert [block.count("time to full") for block in blocks] == [1] * len(blocks)
+    assert "".join(blocks).count("hot_pack ×1") == 6
+    assert aligned(rows[:3], 1000) == aligned(rows[:3])
+
+
+def test_a_figure_keeps_its_unit_where_a_cell_is_folded() -> None:
+    text = aligned([["", "key.of.something[2].elsewhere"], ["charged to the end", "37.8 Ah, 1894 Wh and 12.5 Ah"]], 44)
+    assert [line.strip() for line in text.splitlines()] == [
+        "key.of.something[2].",
+        "elsewhere",
+        "charged to the end  37.8 Ah, 1894 Wh and",
+        "12.5 Ah",
+    ]
+
+
 def test_clocks() -> None:
     assert (clock(2.0833), clock(0.999), clock_s(2.0853)) == ("2:05", "1:00", "2:05:07")
+
+
+def test_moments_in_a_reason_are_on_the_clock_of_the_simulation() -> None:
+    told = Span(8.27 * 3600, 9 * 3600, State.HELD, None, None, Cause.of("gone", gone_t_s=29766.2)).why
+    assert "8:16:06" in told
+    assert "29766" not in told
 
 
 def test_rules_are_gathered_whatever_was_measured() -> None:

@@ -14,7 +14,18 @@ from orchestrator.workbench.draw.present import save_sweep
 from orchestrator.workbench.processes import cores
 from orchestrator.workbench.simulate.figures import Figures
 from orchestrator.workbench.simulate.simulation import UnsuitableError
-from orchestrator.workbench.simulate.sweep import Axis, ClusterError, Point, Sweep, axis, best, cluster, played, rows
+from orchestrator.workbench.simulate.sweep import (
+    Axis,
+    ClusterError,
+    Point,
+    Sweep,
+    as_table,
+    axis,
+    best,
+    cluster,
+    played,
+    rows,
+)
 
 FINISH = Axis(("finish.target_soc_pct",), ("80", "97", "100"))
 DEEP = load_scenario("deep-discharge")
@@ -49,7 +60,9 @@ def test_what_the_policy_may_not_have_is_refused_with_its_line(swept: Sweep) -> 
     refused = [point for point in swept.points if point.values[0] == "80"]
     assert all(point.figures is None for point in refused)
     assert refused[0].refused.startswith("policies/li-ion-48v.yaml:26:18: error: start.soc_below_pct: 98 % is above")
-    assert any("refused" in cell for row in rows(swept) for cell in row)
+    assert [row[2] for row in rows(swept)[1:3]] == ["refused: 1", "refused: 1"]
+    assert as_table(swept).splitlines()[len(rows(swept))] == f"refused: 1: {refused[0].refused}"
+    assert all(len(line) <= 60 for line in as_table(swept, 60).splitlines())
 
 
 def test_a_table_has_all_points_below_its_head(swept: Sweep) -> None:

@@ -14,7 +14,7 @@ from typing import Any, Union, get_args, get_origin
 
 from orchestrator.config.yaml import scalars
 from orchestrator.config.yaml.scalars import UnfitError
-from orchestrator.config.yaml.schema import INVALID, Slot, join, slots
+from orchestrator.config.yaml.schema import INVALID, Slot, join, slots, told_keys
 from orchestrator.config.yaml.tree import Entries, Items, Mark, Node, Refused, Scalar
 from orchestrator.config.yaml.unknown import unknown_key
 from orchestrator.config.yesterday import ROWS, Yesterday
@@ -181,7 +181,7 @@ class Reader:
             self._items(node, get_args(rows.hint)[0], join(path, rows.name), rows.key)
             return INVALID
         if not isinstance(node, Entries):
-            self.report(path, f"needs the keys {', '.join(known)}, indented below it")
+            self.report(path, f"needs {told_keys(known.values())}, indented below it")
             return INVALID
         given = {name.text for name, _ in node.entries}
         values: dict[str, object] = {}

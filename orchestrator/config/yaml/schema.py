@@ -1,7 +1,7 @@
 """The shape of a record's YAML: its keys, read once from the dataclass."""
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, is_dataclass
 from functools import cache
 from typing import Any, Final, get_args, get_type_hints
@@ -63,3 +63,14 @@ def _types(hint: Any) -> Iterator[type]:  # noqa: ANN401 - any type expression
 def join(path: str, name: str) -> str:
     """The dotted path of a key below `path`."""
     return f"{path}.{name}" if path else name
+
+
+def told_keys(known: Iterable[Slot]) -> str:
+    """The keys of a record, those that must be there first."""
+    required: list[str] = []
+    optional: list[str] = []
+    for slot in known:
+        (required if slot.default is INVALID else optional).append(slot.name)
+    told = [f"the key{'s' * (len(required) > 1)} {', '.join(required)}"] if required else []
+    more = "if wanted " if required else "any of the keys "
+    return ", and ".join([*told, *([f"{more}{', '.join(optional)}"] if optional else [])])

@@ -183,11 +183,12 @@ class _Composer:
 
     def _pairs(self, children: list[Node]) -> Iterator[tuple[Scalar, Node]]:
         seen: dict[str, Mark] = {}
+        before: Node | None = None
         for name, value in zip(children[::2], children[1::2], strict=True):
             if not isinstance(name, Scalar):
                 if not isinstance(name, Refused):
                     self.refuse(name.mark, "a list or a mapping cannot be a key")
-            elif problem := _unfit_key(name):
+            elif problem := _decimal_comma(before, name) or _unfit_key(name):
                 self.refuse(name.mark, problem)
             elif name.text in seen:
                 first = seen[name.text]
@@ -195,9 +196,19 @@ class _Composer:
             else:
                 seen[name.text] = name.mark
                 yield name, value
+            before = value
 
 
+_COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
 _NOT_TEXT = re.compile(r"~|null|true|false|yes|no|on|off|y|n|[-+]?[.\d][\d_.,:]*(e[-+]?\d+)?|0x[\da-f]+", re.IGNORECASE)
+
+
+def _decimal_comma(before: Node | None, name: Scalar) -> str:
+    """What to write for `{max_a: 8,5}`, where 5 is read as the next key; "" if this is something else."""
+    if not isinstance(before, Scalar) or not (before.plain and name.plain) or before.mark.line != name.mark.line:
+        return ""
+    parts = f"{before.text},{name.text}"
+    return f"use a decimal point: {parts.replace(',', '.')}, not {parts}" if _COMMA.fullmatch(parts) else ""
 
 
 def _unfit_key(name: Scalar) -> str:

@@ -28,7 +28,7 @@ TEXTS: Mapping[str, str] = {
     "journal_failed": "the journal cannot be written: {error:word}: {file}",
     "journal_again": "the journal is being written again",
     # its output on standard error
-    "service_begins": "{station}: {bays} bays, control socket {socket}",
+    "service_begins": "{station}: bays: {bays}, control socket {socket}",
     "lines_left_out": "({lines} lines are left out here: nobody has read them in time)",
     "bay_begins": "{bay}: {state}: {reason}",
     "bay_goes": "{bay}: {before} → {state}: {reason}",
@@ -67,6 +67,7 @@ TEXTS: Mapping[str, str] = {
     "bay_refused": "{bay}: {why}",
     "not_seen_to_stop": "{bay}: NOT verified, run `orchestrator estop`: {error}",
     "bay_unknown": "no bay '{bay}' here: {bays}",
+    "done_nowhere": "{verb} was carried out at no bay",
     "verb_unknown": "unknown verb {verb}: {verbs}",
     "bays_no_list": "'bays' is a list of names, or null for all",
     "request_too_long": "a request is one line of at most {limit} bytes",

@@ -6,9 +6,9 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader
 
 from orchestrator.workbench.draw.plot import colour, says, svg, when
-from orchestrator.workbench.simulate.figures import clock_s, figures, table
+from orchestrator.workbench.simulate.figures import compared, titles
 from orchestrator.workbench.simulate.simulation import Run
-from orchestrator.workbench.simulate.trail import Moment, bounds
+from orchestrator.workbench.simulate.trail import Moment, bounds, clock_s
 
 #: Moments kept per policy for the values shown under the pointer.
 MAX_MOMENTS = 1500
@@ -19,26 +19,28 @@ def save_page(runs: Sequence[Run], path: Path) -> None:
     environment = Environment(
         loader=PackageLoader("orchestrator.workbench.draw", "."), autoescape=True, trim_blocks=True
     )
-    drawing = svg(runs)
+    drawing, (head, *rows) = svg(runs), compared(runs)
     path.write_text(
         environment.get_template("page.html").render(
             scenario=runs[0].scenario,
             drawing=drawing,
-            head=table([figures(run) for run in runs])[0],
-            rows=[(row, len(set(row[1:])) > 1) for row in table([figures(run) for run in runs])[1:]],
-            policies=[_policy(run, number) for number, run in enumerate(runs)],
+            head=head,
+            rows=[(row, len(set(row[1:])) > 1) for row in rows],
+            policies=[
+                _policy(run, title, number) for number, (run, title) in enumerate(zip(runs, titles(runs), strict=True))
+            ],
             hours=runs[0].scenario.hours,
         ),
         encoding="utf-8",
     )
 
 
-def _policy(run: Run, number: int) -> dict[str, object]:
+def _policy(run: Run, title: str, number: int) -> dict[str, object]:
     """The page's data about one policy."""
     moments = run.trail.moments
     every = -(-len(moments) // MAX_MOMENTS)
     return {
-        "name": run.policy.policy,
+        "name": title,
         "file": run.policy.source.file,
         "colour": colour(number),
         "rules": [(bound.number, when(bound), says(bound.spans[0])) for bound in bounds(run.trail.spans)],

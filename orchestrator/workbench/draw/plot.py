@@ -15,9 +15,9 @@ from matplotlib.lines import Line2D
 
 from orchestrator.model import State
 from orchestrator.workbench.simulate.compare import differences
-from orchestrator.workbench.simulate.figures import clock_s
+from orchestrator.workbench.simulate.figures import titles
 from orchestrator.workbench.simulate.simulation import Run
-from orchestrator.workbench.simulate.trail import Bound, Moment, Span, bounds
+from orchestrator.workbench.simulate.trail import Bound, Moment, Span, bounds, clock_s
 
 #: One colour per policy, safe for colour-blind readers (Okabe and Ito); further policies repeat them with other dashes.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
@@ -135,8 +135,8 @@ def colour(number: int) -> str:
 
 def _legend(figure: Figure, runs: Sequence[Run], top: float) -> None:
     handles = [
-        Line2D([], [], color=_look(number)[0], linestyle=_look(number)[1], label=f"{run.policy.policy}")
-        for number, run in enumerate(runs)
+        Line2D([], [], color=_look(number)[0], linestyle=_look(number)[1], label=title)
+        for number, title in enumerate(titles(runs))
     ]
     handles.append(Line2D([], [], color="#999999", linewidth=0.9, linestyle="--", label="surroundings"))
     if len(runs) > 1:
@@ -189,8 +189,8 @@ def _rules(
     figure: Figure, runs: Sequence[Run], told: Sequence[Sequence[Bound]], height_in: float, rules_in: float
 ) -> None:
     y_in = rules_in
-    for number, (run, rules) in enumerate(zip(runs, told, strict=True)):
-        title = f"{run.policy.policy}: what bound it, and where that stands"
+    for number, (name, rules) in enumerate(zip(titles(runs), told, strict=True)):
+        title = f"{name}: what bound it, and where that stands"
         figure.text(0.055, y_in / height_in, title, size=9, weight="bold", va="top", color=_look(number)[0])
         for line, bound in enumerate(rules, start=1):
             text = f"{bound.number}   {when(bound)}   {says(bound.spans[0])}"

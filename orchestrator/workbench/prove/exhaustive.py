@@ -39,10 +39,10 @@ class Proof:
     properties: int = len(PROPERTIES) + len(ENDINGS) + 2  #: and: no exception, no livelock
 
 
-def prove(rules: Rules, watch: Callable[[int], None], jobs: int | None = None) -> Proof:
+def prove(rules: Rules, watch: Callable[[str], None], jobs: int | None = None) -> Proof:
     """Try every class of inputs cut by the bay's policy and limits, in every order.
 
-    `jobs` is the number of processes; None: one per core. `watch` is called regularly with the number of decisions.
+    `jobs` is the number of processes; None: one per core. `watch` is called regularly with what has been done so far.
     """
     with cores(jobs, _begin, rules) as pool:
         explorer = Explorer(walk_of(rules), partial(_on, pool), watch)

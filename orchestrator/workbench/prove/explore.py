@@ -154,7 +154,7 @@ class Explorer:
 
     walk: Walk
     each: Each
-    watch: Callable[[int], None] = lambda _: None  #: called regularly with the number of decisions so far
+    watch: Callable[[str], None] = lambda _: None  #: called regularly with what has been done so far
     nodes: list[Node] = field(default_factory=list)
     steps: int = 0
     found: dict[str, Counterexample] = field(default_factory=dict)
@@ -185,7 +185,7 @@ class Explorer:
 
     def _learn(self, node: Node, expanded: Expanded, seen: set[object]) -> Iterator[Node]:
         self.steps += expanded.steps
-        self.watch(self.steps)
+        self.watch(f"{self.steps:,} decisions explored")
         self.changes |= expanded.changes
         self.soon[self.walk.gist(node.place.memory)] = expanded.soon
         for name, text, move in expanded.broken:

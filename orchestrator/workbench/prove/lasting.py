@@ -5,7 +5,6 @@ there is none. To change for ever without news from outside is a livelock.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain
 from math import inf
 
 from orchestrator.workbench.prove.endings import ENDINGS, Ending
@@ -31,7 +30,7 @@ def reaches(explorer: Explorer, endings: Sequence[Ending] = ENDINGS) -> None:
     batteries = {battery for _, battery in explorer.walk.inputs.constants()}
     places = [node.place for node in explorer.nodes]
     jobs = [(ENDINGS.index(ending), places) for ending in endings if ending.battery in batteries]
-    _keep(explorer, explorer.nodes, explorer.each(_missed, jobs))
+    _keep(explorer, explorer.nodes, explorer.each(_missed, jobs), f"of {len(jobs)} endings")
 
 
 def settles(explorer: Explorer, some: Iterable[Node] | None = None) -> None:
@@ -44,12 +43,14 @@ def settles(explorer: Explorer, some: Iterable[Node] | None = None) -> None:
         ([(*one, [known.get(one) for known in soon]) for one in constants[at : at + TOGETHER]], places)
         for at in range(0, len(constants), TOGETHER)
     ]
-    _keep(explorer, nodes, explorer.each(_endless, jobs))
+    _keep(explorer, nodes, explorer.each(_endless, jobs), f"of {len(jobs)} searches for livelocks")
 
 
-def _keep(explorer: Explorer, nodes: Sequence[Node], found: Iterable[Sequence[Broken]]) -> None:
-    for name, text, number, moves in chain.from_iterable(found):
-        explorer.find(name, text, nodes[number], moves)
+def _keep(explorer: Explorer, nodes: Sequence[Node], found: Iterable[Sequence[Broken]], whole: str) -> None:
+    for done, broken in enumerate(found, start=1):
+        for name, text, number, moves in broken:
+            explorer.find(name, text, nodes[number], moves)
+        explorer.watch(f"{done} {whole}")
 
 
 def _missed(walk: Walk, which: int, places: Sequence[Place]) -> list[Broken]:

@@ -7,6 +7,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.model import Action, Cause, Decision, Measurement, Request, Snapshot
 from orchestrator.text.catalogue import say
+from orchestrator.text.moments import with_moments
 
 #: Where time begins in a story; not 0, so that "never" cannot be mistaken for a time.
 BEGIN_S = 1000.0
@@ -73,11 +74,16 @@ class Counterexample:
 
 def _told(taken: Taken) -> str:
     """One decision as text; equal consecutive ones are shown once."""
-    answer = f"; answer: {say(taken.decision.answer)}" if taken.decision.answer else ""
+    answer = f"; answer: {_said(taken.decision.answer)}" if taken.decision.answer else ""
     return (
         f"{taken.move}\n      {_values(taken.snapshot)}\n"
-        f"      → {taken.decision.state}: {say(taken.decision.cause)}; {_order(taken.decision)}{answer}"
+        f"      → {taken.decision.state}: {_said(taken.decision.cause)}; {_order(taken.decision)}{answer}"
     )
+
+
+def _said(cause: Cause) -> str:
+    """The sentence, with its moments on the story's clock."""
+    return say(with_moments(cause, lambda _, t_s: f"t = {t_s - BEGIN_S:.2f} s"))
 
 
 def _order(decision: Decision) -> str:

@@ -110,6 +110,10 @@ class _Reader:
         except _OlderError:
             self.broken(path, number, SENTENCES)
             return
+        except (json.JSONDecodeError, KeyError) as error:
+            wrong = f"it has no {error}" if isinstance(error, KeyError) else "it is not JSON"
+            self.broken(path, number, f"this is no line of a journal: {wrong}")
+            return
         except (BaseValidationError, LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:
             self.broken(path, number, f"this is no line of a journal: {error!r:.200}")
             return

@@ -25,8 +25,17 @@ def replay(journals: Iterable[Path], policy: str | None, bays: Iterable[str] = (
     record = read(journals)
     recorded = record.bays
     if record.broken:
-        show(f"{len(record.broken)} lines cannot be read and are passed over, the first: {record.broken[0]}")
+        lines = (
+            "1 line cannot be read and is"
+            if len(record.broken) == 1
+            else f"{len(record.broken)} lines cannot be read and are"
+        )
+        show(f"{lines} passed over, the first: {record.broken[0]}")
     chosen = {name: recorded.get(name, []) for name in bays} or recorded
+    if record.broken and not recorded:
+        raise OrchestratorError(
+            "there is no journal in these files: name a journal's directory, or its snapshots.jsonl"
+        )
     missing = [name for name, steps in chosen.items() if not steps]
     if missing or not chosen:
         raise OrchestratorError(
@@ -56,5 +65,6 @@ def _otherwise(bay: str, steps: list[Recorded], policy: Policy, show: Show) -> i
     for difference in differences:
         show("\n".join((f"{bay}  {next(lines := told(difference))}", *lines)))
     names = {one.rules.policy.policy for one in steps if one.rules is not None}
-    show(f"{bay}: {len(steps)} decisions, {len(differences)} differences ({', '.join(names)} → {policy.policy})")
+    found = f"{len(differences)} difference{'s' * (len(differences) != 1)}"
+    show(f"{bay}: {len(steps)} decisions, {found} ({', '.join(names)} → {policy.policy})")
     return 0

@@ -2,14 +2,14 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 from orchestrator.config.scenario import Cell, Scenario, Visit
 from orchestrator.core.states import ENERGISED
 from orchestrator.model import State
 from orchestrator.workbench.simulate.simulation import Run
-from orchestrator.workbench.simulate.trail import Moment, Span
+from orchestrator.workbench.simulate.trail import Moment, Span, clock_s
 
 #: Above this cell voltage, time counts as time at high voltage, in which cells age fastest.
 HIGH_CELL_V: dict[Cell, float] = {Cell.NMC: 4.10, Cell.LFP: 3.45}
@@ -142,13 +142,15 @@ def table(all_figures: Sequence[Figures]) -> list[list[str]]:
     return rows
 
 
-def clock_s(hours: float) -> str:
-    """Hours, minutes and seconds, `2:05:07`."""
-    seconds = round(hours * 3600)
-    return f"{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
+def titles(runs: Sequence[Run]) -> list[str]:
+    """The policies' names; those of one name with their files."""
+    times = Counter(run.policy.policy for run in runs)
+    return [
+        f"{policy.policy} ({policy.source.file})" if times[policy.policy] > 1 else policy.policy
+        for policy in (run.policy for run in runs)
+    ]
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> str:
-    """The table for a terminal."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows)
+def compared(runs: Sequence[Run]) -> list[list[str]]:
+    """The table of all runs, each under its policy's title."""
+    return table([replace(figures(run), policy=title) for run, title in zip(runs, titles(runs), strict=True)])

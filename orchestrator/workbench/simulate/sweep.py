@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
+from orchestrator.columns import aligned, folded
 from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Scenario
 from orchestrator.errors import OrchestratorError, UsageError
@@ -121,15 +122,26 @@ def cluster(address: str) -> Iterator[Executor]:
         yield client.get_executor()  # type: ignore[no-untyped-call]  # as above
 
 
+def as_table(sweep: Sweep, width: int = 0) -> str:
+    """All points, for a terminal of this width (0: unlimited), and below why values were refused."""
+    errors = [folded(f"refused: {number}: {error}", width) for number, error in enumerate(refusals(sweep), start=1)]
+    return "\n".join([aligned(rows(sweep), width, len(sweep.axes)), *errors])
+
+
 def rows(sweep: Sweep) -> list[list[str]]:
     """A row per point, a column per axis and figure; the first row has the headings."""
-    head = [*(one.name for one in sweep.axes), *(name for name, _ in ROWS)]
-    return [head, *([*point.values, *_told(point)] for point in sweep.points)]
+    head, told = [*(one.name for one in sweep.axes), *(name for name, _ in ROWS)], refusals(sweep)
+    return [head, *([*point.values, *_told(point, told)] for point in sweep.points)]
 
 
-def _told(point: Point) -> list[str]:
+def refusals(sweep: Sweep) -> list[str]:
+    """The errors for refused values, each once; the table has their numbers, from 1."""
+    return list(dict.fromkeys(point.refused for point in sweep.points if point.figures is None))
+
+
+def _told(point: Point, told: Sequence[str]) -> list[str]:
     if point.figures is None:
-        return [f"refused: {point.refused}", *[""] * (len(ROWS) - 1)]
+        return [f"refused: {told.index(point.refused) + 1}", *[""] * (len(ROWS) - 1)]
     return [tell(point.figures) for _, tell in ROWS]
 
 

@@ -6,7 +6,14 @@ from typing import NamedTuple
 
 from orchestrator.model import Cause, Decision, State
 from orchestrator.text.catalogue import say
+from orchestrator.text.moments import with_moments
 from orchestrator.workbench.simulate.plant import Plant
+
+
+def clock_s(hours: float) -> str:
+    """Hours, minutes and seconds, `2:05:07`."""
+    seconds = round(hours * 3600)
+    return f"{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 
 
 class Moment(NamedTuple):
@@ -41,8 +48,8 @@ class Span:
 
     @property
     def why(self) -> str:
-        """The cause in words, with the rule's line in the policy."""
-        return say(self.cause)
+        """The cause in words, with the rule's line in the policy; moments as hours, minutes and seconds."""
+        return say(with_moments(self.cause, lambda _, t_s: clock_s(t_s / 3600)))
 
     @property
     def rule(self) -> tuple[State, int | None, str, str]:

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from orchestrator.columns import aligned
 from orchestrator.config.load import load_policy, load_scenario
-from orchestrator.workbench.simulate.figures import aligned, figures, table
+from orchestrator.workbench.simulate.figures import compared
 from orchestrator.workbench.simulate.simulation import Run, simulate
 
 
@@ -19,6 +20,6 @@ def play(policies: Sequence[str], scenario: str, watch: Callable[[str, float], N
     return [simulate(policy, what_happens, watch=partial(watch, policy.policy)) for policy in loaded]
 
 
-def as_table(runs: Sequence[Run]) -> str:
-    """All figures, for a terminal."""
-    return aligned(table([figures(run) for run in runs]))
+def as_table(runs: Sequence[Run], width: int = 0) -> str:
+    """All figures, for a terminal of this width; 0: unlimited."""
+    return aligned(compared(runs), width)
