@@ -5,7 +5,6 @@ up after a hold. `core/rows.py` tracks which rows apply.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import chain
 
 from orchestrator.config.amperes import RESOLUTION, highest_step, hysteresis, ranges
@@ -14,7 +13,7 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.memory import Memory
 from orchestrator.core.rows import values
 from orchestrator.core.rules import Bound, Rules
-from orchestrator.model import ActiveFault, Cause, CurrentStep, Decision, Effect, Snapshot
+from orchestrator.model import ActiveFault, Cause, CurrentStep, Effect, Snapshot
 
 # --- how much they allow ----------------------------------------------------------------------------------------------
 
@@ -98,20 +97,12 @@ def limit(f: Facts, bound: Bound) -> Cause:
     return Cause(id_, params, bound.key, _place(f, bound.key))
 
 
-def told(decision: Decision, snapshot: Snapshot, memory: Memory | None, rules: Rules) -> Decision:
-    """The decision for people, with the present values in the rule that limits its current; `memory` is its own.
-
-    A decision keeps the rule as it was when the step was chosen: nothing depends on its figures, and readers are few.
-    """
-    step = decision.step
-    bound = next((one for one in _rows(rules) if step is not None and one.key == step.key), None)
-    if step is None or bound is None or memory is None or memory.last_s is None:
-        return decision
-    rule, cause = limit(Facts.of(memory.last_s, snapshot, memory, rules), bound), decision.cause
-    params = tuple((name, rule if name == "rule" else value) for name, value in cause.params)
-    if cause.id == "charging":
-        cause = replace(cause, params=params)
-    return replace(decision, step=replace(step, rule=rule), cause=cause)
+def present(key: str, snapshot: Snapshot, memory: Memory, rules: Rules) -> Cause | None:
+    """The rule with this key of a table with the present values; None for any other key. `memory` is the newest."""
+    bound = next((one for one in _rows(rules) if one.key == key), None)
+    if bound is None or memory.last_s is None:
+        return None
+    return limit(Facts.of(memory.last_s, snapshot, memory, rules), bound)
 
 
 def _rows(rules: Rules) -> Iterator[Bound]:

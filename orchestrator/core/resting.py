@@ -7,9 +7,9 @@ from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import full_due, goes_on, target
 from orchestrator.core.machine import Trigger
+from orchestrator.core.memory import with_values
 from orchestrator.core.operator import OWN
 from orchestrator.core.outofcontrol import problem
-from orchestrator.core.parts import changed
 from orchestrator.core.states import DONE
 from orchestrator.model import ActiveFault, Cause, Effect, State
 from orchestrator.model.cause import together
@@ -102,7 +102,7 @@ def _barred(f: Facts, faults: Faults) -> Found:
     if worst is None or worst.effect < Effect.NO_START:
         return None
     if f.memory.state in DONE:  # it is told where the bay goes: there it waits to go on
-        waiting = changed(f.memory, state=State.SUSPENDED)
+        waiting = with_values(f.memory, state=State.SUSPENDED)
         worst = active_faults(waiting, f.now_s, f.rules.bay.name, f, at_rest=True)[0]
     return Trigger.SUSPEND, worst.told
 

@@ -9,7 +9,6 @@ from time import monotonic, time
 from orchestrator.config.station import BayConfig
 from orchestrator.core.decide import decide
 from orchestrator.core.failed import carry_on
-from orchestrator.core.limits import told
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.states import ENERGISED, QUIET, SETTLED
@@ -23,7 +22,7 @@ from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
 from orchestrator.service.records import SnapshotRecorder, decision_lines
 from orchestrator.service.starts import Starts
-from orchestrator.service.status import bay_status, contactor_fields
+from orchestrator.service.status import bay_status, contactor_fields, told
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
 

@@ -5,9 +5,13 @@ Values are the newest received, however old: `age_s` gives their age, and values
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from orchestrator.config.station import Station
 from orchestrator.core.facts import CHARGER_STALE_S, FAST_STALE_S, SLOW_STALE_S
+from orchestrator.core.limits import present
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
 from orchestrator.model import (
     ActiveFault,
     Alarm,
@@ -30,6 +34,21 @@ SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
 NAMED = {"current_step": "current_limit"}
 #: The battery's values that are read several times a second; the others once a second.
 FAST = ("voltage_v", "current_a", "status", "temperature_c")
+
+
+def told(decision: Decision, snapshot: Snapshot, memory: Memory | None, rules: Rules) -> Decision:
+    """The decision for people, with the present values in the rule that limits its current.
+
+    A decision keeps that rule as it was when the step was chosen: nothing depends on its figures, and readers are few.
+    """
+    step, cause = decision.step, decision.cause
+    rule = present(step.key, snapshot, memory, rules) if step is not None and memory is not None else None
+    if step is None or rule is None:
+        return decision
+    if cause.id == "charging":
+        params = tuple((name, rule if name == "rule" else value) for name, value in cause.params)
+        cause = replace(cause, params=params)
+    return replace(decision, step=replace(step, rule=rule), cause=cause)
 
 
 def bay_status(

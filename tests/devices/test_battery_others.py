@@ -145,7 +145,7 @@ def test_each_request_explains_one_answer_and_no_more() -> None:
     assert bench.link.implausible == {}
     say(bench, answer(request, FORGED))
     assert (
-        text_of(bench.link.implausible["temperature_c"]) == "temperature_c: two answers to one request, 25.0 and 60.0"
+        text_of(bench.link.implausible["temperature_c"]) == "temperature: two answers to one request, 25.0 and 60.0"
     )
 
 
@@ -337,8 +337,8 @@ def test_where_one_field_of_an_object_is_forged_none_of_it_is_believed() -> None
     request = next_read(bench, VOLTS)
     say(bench, answer(request), answer(request, 0x0940FC18))
     assert {name: text_of(why) for name, why in bench.link.implausible.items()} == {
-        "voltage_v": "voltage_v: two answers to one request, which differ in current_a",
-        "current_a": "current_a: two answers to one request, -0.1 and -10.0",
+        "voltage_v": "pack voltage: two answers to one request, which differ in pack current",
+        "current_a": "pack current: two answers to one request, -0.1 and -10.0",
     }
 
 

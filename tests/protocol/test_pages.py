@@ -56,16 +56,16 @@ def test_a_page_is_of_no_known_time_and_so_never_fresh() -> None:
 @pytest.mark.parametrize(
     ("data", "name", "sentence"),
     [
-        ("70 01 11 27 00 00 00 00", "voltage_v", "voltage_v 100.01 is outside 0 … 100 (raw 0x2711)"),
-        ("70 01 00 00 43 80 00 00", "current_a", "current_a -327.01 is outside -327 … 327 (raw 0x8043)"),
-        ("70 01 00 00 BD 7F 00 00", "current_a", "current_a 327.01 is outside -327 … 327 (raw 0x7FBD)"),
+        ("70 01 11 27 00 00 00 00", "voltage_v", "pack voltage 100.01 is outside 0 … 100 (raw 0x2711)"),
+        ("70 01 00 00 43 80 00 00", "current_a", "pack current -327.01 is outside -327 … 327 (raw 0x8043)"),
+        ("70 01 00 00 BD 7F 00 00", "current_a", "pack current 327.01 is outside -327 … 327 (raw 0x7FBD)"),
         ("70 01 00 00 00 00 80 00", "status", "status 128 is outside 0 … 127 (raw 0x0080)"),
-        ("70 02 00 00 00 00 65 00", "soc_pct", "soc_pct 101 is outside 0 … 100 (raw 0x65)"),
-        ("70 02 00 00 00 00 00 8C", "soh_pct", "soh_pct 140 is outside 0 … 100 (raw 0x8C)"),
-        ("70 03 FF FF 00 00 00 00", "remaining_ah", "remaining_ah 655.35 is outside 0 … 655.34 (raw 0xFFFF)"),
-        ("70 03 00 00 FF FF 00 00", "available_wh", "available_wh 6553.5 is outside 0 … 6553.4 (raw 0xFFFF)"),
-        ("70 03 00 00 00 00 70 FE", "temperature_c", "temperature_c -40 is outside -39.9 … 124.9 (raw 0xFE70)"),
-        ("70 03 00 00 00 00 E2 04", "temperature_c", "temperature_c 125 is outside -39.9 … 124.9 (raw 0x04E2)"),
+        ("70 02 00 00 00 00 65 00", "soc_pct", "SOC 101 is outside 0 … 100 (raw 0x65)"),
+        ("70 02 00 00 00 00 00 8C", "soh_pct", "SOH 140 is outside 0 … 100 (raw 0x8C)"),
+        ("70 03 FF FF 00 00 00 00", "remaining_ah", "remaining charge 655.35 is outside 0 … 655.34 (raw 0xFFFF)"),
+        ("70 03 00 00 FF FF 00 00", "available_wh", "available energy 6553.5 is outside 0 … 6553.4 (raw 0xFFFF)"),
+        ("70 03 00 00 00 00 70 FE", "temperature_c", "temperature -40 is outside -39.9 … 124.9 (raw 0xFE70)"),
+        ("70 03 00 00 00 00 E2 04", "temperature_c", "temperature 125 is outside -39.9 … 124.9 (raw 0x04E2)"),
     ],
 )
 def test_what_cannot_be_is_told(data: str, name: str, sentence: str) -> None:

@@ -41,7 +41,7 @@ def outside(field: str, value: float, low: float, high: float, raw: str) -> Caus
 
 
 def test_what_is_outside_is_said_with_its_raw_bits() -> None:
-    assert say(outside("soc_pct", 255.0, 0, 100, "0xFF")) == "soc_pct 255 is outside 0 … 100 (raw 0xFF)"
+    assert say(outside("soc_pct", 255.0, 0, 100, "0xFF")) == "SOC 255 is outside 0 … 100 (raw 0xFF)"
 
 
 def test_the_documents_sample() -> None:

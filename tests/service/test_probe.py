@@ -128,7 +128,7 @@ def test_a_map_of_ones_own_has_a_column_too(site: Site) -> None:
     (site.directory / "mine.yaml").write_text(own, encoding="utf-8")
     _, shown = site.probe(old=True, change=set_map("./mine.yaml"))
     assert ["value", "tabos", "tabos-lsb", "mine", "(yours)", "older", "protocol"] in map(str.split, shown.splitlines())
-    assert "map mine (yours): temperature_c 200 is outside -39.9 … 124.9 (raw 0x00C8)" in shown
+    assert "map mine (yours): temperature 200 is outside -39.9 … 124.9 (raw 0x00C8)" in shown
     assert "→ the station file says map mine (yours), but tabos fits better" in shown
 
 

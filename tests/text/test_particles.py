@@ -33,6 +33,7 @@ def test_what_is_said_has_its_particles() -> None:
     high = Cause.of("value_outside", field="soc_pct", value=255.0, low=0.0, high=100.0, raw="0xFF")
     assert say(high, "ko") == "SOC 255는 0 … 100 범위를 벗어납니다(원시 값 0xFF)"
     assert say(high) == "SOC 255 is outside 0 … 100 (raw 0xFF)"
+    assert say(high.with_(past=True)) == "SOC 255 was outside 0 … 100 (raw 0xFF)"
 
 
 def test_times_and_places_are_written_as_koreans_do() -> None:

@@ -7,8 +7,8 @@ ADVICE: Mapping[str, str] = {
     "polarity_contradicts": "measure the battery's polarity; if that is right, the charger is defective; then reset",
     "error_stop": "read the error at the charger itself, and switch its mains off and on; once it has left mode 8, reset; if it comes "
     "back, have the charger repaired",
-    "system_stop": "look whether somebody or something switched it off at the charger; if it stays in mode 7, switch its mains off and "
-    "on; then start; if it comes back, have the charger repaired",
+    "system_stop": "look whether somebody or something switched it off at the charger; if it stays in mode 7, switch its "
+    "mains off and on, and if it comes back, have the charger repaired; then start",
     "illegal_value": "a value outside its documented list: check the line and the charger's version",
     "mode_taken_over": "set the charger's rotary switch or the station file, then start",
     "rejected_frame": "this charger does not know our commands: check its model and version, then reset",
