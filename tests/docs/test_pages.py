@@ -3,8 +3,10 @@
 import re
 from pathlib import Path
 
+from orchestrator.config.load import load_policy
 from orchestrator.config.shipped import shipped_names
 from orchestrator.core.faults import FAULTS
+from orchestrator.text.catalogue import LANGUAGES
 from orchestrator.workbench.draw.diagram import diagram, mermaid
 from tests.docs import cause_page
 from tests.docs.catalogue import CATALOGUE
@@ -53,6 +55,24 @@ def test_the_places_that_are_named_are_there() -> None:
     assert len(places) > 10
     missing = [place for place in places if not ((ROOT / "orchestrator" / place).exists() or (ROOT / place).exists())]
     assert missing == []
+
+
+def test_the_lines_of_shipped_policies_that_pages_show_are_those_of_the_keys() -> None:
+    causes, policies = ((DOCS / name).read_text(encoding="utf-8") for name in ("causes.md", "policies.md"))
+    shown = [
+        *(("pack.temperature_c", place) for place in re.findall(r"policies/li-ion-48v.yaml:\d+", causes)),
+        *(("pack.current_a", place) for place in re.findall(r"the pack bears 11.0 A, (policies/\S+:\d+)", policies)),
+    ]
+    assert len(shown) > 2
+    for key, place in shown:
+        name = place.partition(".yaml")[0].removeprefix("policies/")
+        assert load_policy(name).source.at(key) == place
+
+
+def test_every_row_of_the_page_of_causes_is_one_line() -> None:
+    rows = [line for line in cause_page.page().splitlines() if line.startswith("| `")]
+    assert [row for row in rows if not row.endswith(" |")] == []
+    assert len(rows) > len(LANGUAGES["en"].texts)
 
 
 def test_the_page_of_the_simulator_names_every_scenario_that_ships() -> None:

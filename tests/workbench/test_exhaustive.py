@@ -56,6 +56,20 @@ def test_a_broken_policy_gets_its_story(policy: str, monkeypatch: pytest.MonkeyP
     assert last.strip() == ending
 
 
+def test_the_page_of_policies_shows_the_story_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (ROOT.parents[1] / "docs" / "policies.md").read_text(encoding="utf-8")
+    shown = page[page.index("volts.yaml: charges, as measured: ") : page.index("volts.yaml: 32 properties, 1 BROKEN")]
+    monkeypatch.chdir(ROOT / "broken")
+    walk = walk_on(small(Rules.of(bay_of(load_policy("volts.yaml")))))
+    explorer = Explorer(walk, here(walk))
+    explorer.run(most=60)
+    reaches(explorer)
+    told = f"volts.yaml: {explorer.found['charges, as measured']}"
+    lines = [line.strip() for line in shown.splitlines() if line.strip() not in ("", "…")]
+    assert [line.strip() for line in told.splitlines() if line.strip() in lines][-1] == lines[-1]
+    assert [line for line in lines if line not in map(str.strip, told.splitlines())] == []
+
+
 @pytest.mark.parametrize("policy", shipped_names("policies"))
 def test_a_shipped_policy_ends_every_charge_and_wakes_every_pack(policy: str) -> None:
     """Whatever its hold at the top, and wherever its stages of precharge meet."""

@@ -69,7 +69,7 @@ TEXTS: Mapping[str, str] = {
     "bay_refused": "{bay}: {why}",
     "not_seen_to_stop": "{bay}: 대기 상태가 확인되지 않았습니다. `orchestrator estop`을 실행하십시오: {error}",
     "bay_unknown": "'{bay}' 베이가 없습니다: {bays}",
-    "done_nowhere": "어느 베이에서도 {verb}를 실행하지 않았습니다",
+    "done_nowhere": "어느 베이에서도 {verb}을(를) 실행하지 않았습니다",
     "verb_unknown": "알 수 없는 명령입니다: {verb}. 가능한 명령: {verbs}",
     "bays_no_list": "'bays'는 이름의 목록이거나, 전체를 뜻하는 null이어야 합니다",
     "request_too_long": "요청은 최대 {limit}바이트의 한 줄이어야 합니다",
