@@ -14,8 +14,8 @@ from orchestrator.workbench.prove.consent import (
     alarmed,
     held_until_started,
     latched_until_reset,
-    out_of_control_until_it_lasts,
     operator_stops,
+    out_of_control_until_it_lasts,
     tripped_until_reset,
     waits_for_a_start,
 )
