@@ -152,6 +152,7 @@ class Memory:
     since_s: float | None = event(None)  #: when the state was entered; None before the first decision
     last_s: float | None = measured(None)  #: when the last decision was made
     looked_s: float | None = measured(None)  #: when the fault table was last evaluated
+    stalled_s: float | None = event(None)  #: when this service was last found to have stood still
     cause: Cause = measured(Cause("service_started"))
     closed: bool = event(default=False)  #: the contactor is to be closed
     faults: Mapping[str, FaultMemory] = field(default_factory=dict)  #: fault rows that are or were true

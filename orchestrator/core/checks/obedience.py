@@ -29,6 +29,8 @@ NEWS_S = 5.0
 
 def charger_silent(f: Facts) -> Cause | None:
     """FAULTS C23, C25."""
+    if f.stalled:
+        return None
     if f.charger.problem:
         return f.charger.problem
     port = f.rules.bay.charger.port
@@ -150,7 +152,7 @@ def contactor_lost(f: Facts) -> Cause | None:
 
 def _unconfirmed(id_: str, f: Facts, command: str, value: int | None) -> Cause | None:
     waited_s = f.now_s - f.memory.sequence.command_s
-    if waited_s < OBEY_S:
+    if waited_s < OBEY_S or f.stalled:
         return None
     held = Cause.of("held_back", refused=f.charger.refused) if f.charger.refused else None
     return Cause.of(id_, command=command, value=value, waited_s=waited_s, held=held)
