@@ -214,6 +214,19 @@ def test_a_latch_without_a_line_is_stopped_blindly_first(begin: Callable[[], Wor
     world.until(State.TRIPPED, 1.0)
 
 
+@pytest.mark.parametrize("begin", [idle, charging])
+def test_a_stop_that_is_repeated_because_the_bmu_is_lost_says_so(begin: Callable[[], World]) -> None:
+    """Its charger was verified: "is being stopped before anything else" would be untrue, and hide the BMU's reason."""
+    world = begin()
+    world.battery_answers = False
+    world.until(State.OFFLINE, 6)
+    told = [reason_of(world.run(0.25)) for _ in range(12)]
+    assert all("the BMU (node 0x10)" in reason for reason in told), told
+    again = [reason for reason in told if "told to stop once more, since no BMU confirms" in reason]
+    assert again
+    assert again != told, "it ends"
+
+
 # --- the start --------------------------------------------------------------------------------------------------------
 
 

@@ -16,6 +16,7 @@ TEXTS: Mapping[str, str] = {
     # states of a bay without a charge
     "charger_offline": "the charger on {port} does not answer",
     "stopped_first": "the charger is being stopped before anything else",
+    "stopped_again": "{what}; the charger is told to stop once more, since no BMU confirms that no current flows",
     "runs_uncommanded": "the charger runs though it was not commanded to",
     "battery_absent": "no battery",
     "battery_not_heard": "{charger_v:.1f} V at the charger, but {what}",

@@ -16,6 +16,7 @@ TEXTS: Mapping[str, str] = {
     # states of a bay without a charge
     "charger_offline": "{port}의 충전기가 응답하지 않습니다",
     "stopped_first": "다른 무엇보다 먼저 충전기를 정지하고 있습니다",
+    "stopped_again": "{what}. 전류가 흐르지 않음을 BMU로 확인할 수 없으므로 충전기에 정지를 다시 명령합니다",
     "runs_uncommanded": "기동 명령이 없었는데 충전기가 동작합니다",
     "battery_absent": "배터리가 없습니다",
     "battery_not_heard": "충전기에 {charger_v:.1f} V가 있으나 {what}",
