@@ -29,6 +29,9 @@ LIVE: Mapping[str, Callable[[Facts], float | None]] = {
     "bad_pct": lambda f: f.charger.bad_pct,
 }
 
+#: The advice for a fault that this version does not know.
+UNKNOWN = "unknown_fault"
+
 
 def active_faults(
     memory: Memory, now_s: float, bay: str, f: Facts | None = None, *, at_rest: bool = False
@@ -70,9 +73,16 @@ def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cau
         more["past"] = True
     seen = fault.now if fault.now is not None and not row.moment else fault.cause
     advice = row.at_rest if at_rest and row.at_rest else row.id
+    if row.id not in ROW:
+        seen, advice = unknown(row.id, seen), UNKNOWN
     if row.clear is Clear.AUTO and fault.clean_s is not None:  # nothing is left to do
         advice = ""
     return (seen or Cause(row.id)).with_(advice, **more)
+
+
+def unknown(name: str, kept: Cause | None) -> Cause:
+    """A fault that only another version knows, with the evidence that was kept of it."""
+    return Cause.of("fault_of_another_version", fault=name, what=kept.with_(past=True) if kept is not None else None)
 
 
 def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:

@@ -8,6 +8,7 @@ stored as ages, since monotonic clocks start again.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from orchestrator.core.active import unknown
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory, with_values
@@ -125,16 +126,17 @@ class Persisted:
 
     def memory(self, now_s: float) -> Memory:
         """The memory that the bay begins with."""
-        faults = {name: _fault(fault, now_s) for name, fault in self.faults.items() if name in ROW}
+        known = {name: one for name, one in self.faults.items() if name in ROW or one.latched or one.raised is None}
+        faults = {name: _fault(fault, now_s) for name, fault in known.items()}
         if self.running:
             faults["found_running"] = FaultMemory(raised_s=now_s, cause=UNFINISHED)
-        unknown = [one.cause or _unknown(name) for name, one in self.faults.items() if name not in ROW]
+        others = [unknown(name, one.cause) for name, one in self.faults.items() if name not in known]
         session = self.session
         out_s = None if self.uncontrollable is None else now_s - self.uncontrollable
         return with_values(
             Memory() if out_s is None else Memory(state=State.UNCONTROLLABLE),
             stopping_s=out_s,
-            hold=self.hold or (together(unknown) if unknown else None),
+            hold=self.hold or (together(others) if others else None),
             paused=self.paused,
             faults=faults,
             resets=tuple((now_s - age_s, name) for age_s, name in self.resets),
@@ -144,10 +146,6 @@ class Persisted:
             unverified=self.running,
             charge=(now_s - self.soc[0], self.soc[1]) if self.soc is not None else (0.0, None),
         )
-
-
-def _unknown(name: str) -> Cause:
-    return Cause.of("fault_of_another_version", fault=name)
 
 
 def _uncontrollable(memory: Memory, now_s: float) -> Age | None:
@@ -177,4 +175,5 @@ def from_first_format(name: str, text: str) -> PersistedFault:
     row = ROW.get(name)
     backoff = row is not None and row.clear is Clear.BACKOFF  # with fewer strikes it would not have been stored
     strikes = (0.0,) * (len(BACKOFF_S) + 1) if backoff else ()
-    return PersistedFault(said(text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes)
+    latched = row is None or row.clear is not Clear.OPERATOR
+    return PersistedFault(said(text), latched, raised=0.0, strikes=strikes)

@@ -17,7 +17,7 @@ from orchestrator.core.operator import STOPPED
 from orchestrator.core.persisted import COUNTERS_S, UNFINISHED, Persisted, PersistedFault, from_first_format
 from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.states import ENERGISED, MAY_RUN
-from orchestrator.model import STOP, Action, Alarm, ChargerLink, Request, Session, State
+from orchestrator.model import STOP, Action, Alarm, Cause, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle
 from tests.core.fault_scenes import SCENES
 from tests.core.said import cause, reason_of, say
@@ -481,21 +481,45 @@ def test_the_gist_changes_with_what_must_be_on_disk_and_not_with_time() -> None:
     assert all(before != after for before, after in pairwise(gists))
 
 
-def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
-    kept = Persisted(faults={"of_tomorrow": PersistedFault(cause("something"), latched=True, raised=1.0)})
-    memory = kept.memory(100.0)
-    assert memory.faults == {}
-    assert memory.operator.hold == cause("something")
+@pytest.mark.parametrize("seen", [cause("something"), Cause.of("rogue_run", charger_a=2.0), None])
+def test_a_latched_fault_that_this_version_does_not_know_stays_until_a_reset(seen: Cause | None) -> None:
+    world = World()
+    for _ in range(2):
+        known = {"of_tomorrow": PersistedFault(seen, latched=True, raised=1.0)}
+        restarted(world, written=Persisted(faults=known))
+        world.until(State.TRIPPED, 5)
+        world.run(60)
+        assert world.is_in(State.TRIPPED)
+        assert world.decision.alarm is Alarm.ATTENTION
+    told = reason_of(world.decision)
+    assert "another version of this software raised 'of_tomorrow', which this one does not know" in told
+    assert "then reset" in told
+    if seen is not None:
+        assert say(seen.with_(past=True)) in told, "in the past tense: nothing here looks for it"
+    assert Persisted.of(world.memory, world.now_s).faults["of_tomorrow"].cause == seen, "for the version that knows it"
+    assert world.ask(Request.START) != ""
+    assert world.ask(Request.RESET) == ""
+    world.until(State.HELD, 3)
+    assert "of_tomorrow" not in world.memory.faults
+    assert world.ask(Request.START) == ""
 
 
-def test_such_a_fault_that_was_kept_without_its_cause_is_named() -> None:
-    memory = Persisted(faults={"of_tomorrow": PersistedFault(None, latched=True, raised=1.0)}).memory(100.0)
+def test_an_unlatched_fault_that_this_version_does_not_know_holds_the_bay() -> None:
+    memory = Persisted(faults={"of_tomorrow": PersistedFault(cause("something"), raised=1.0)}).memory(100.0)
     assert memory.faults == {}
-    assert say(memory.operator.hold) == "of_tomorrow"
+    assert say(memory.operator.hold).startswith("another version of this software raised 'of_tomorrow'")
+    assert say(memory.operator.hold).endswith("something")
+
+
+def test_strikes_of_a_fault_that_this_version_does_not_know_hold_nothing() -> None:
+    world = restarted(World(), written=Persisted(faults={"of_tomorrow": PersistedFault(strikes=(1.0,))}))
+    world.until(State.CHARGING, 10)
+    assert world.memory.faults["of_tomorrow"].strikes
 
 
 @pytest.mark.parametrize(
-    ("name", "latched", "strikes"), [("internal", True, 0), ("system_stop", False, 0), ("implausible", True, 4)]
+    ("name", "latched", "strikes"),
+    [("internal", True, 0), ("of_yesterday", True, 0), ("system_stop", False, 0), ("implausible", True, 4)],
 )
 def test_the_first_format_is_read(name: str, latched: bool, strikes: int) -> None:
     fault = from_first_format(name, "text")

@@ -125,7 +125,7 @@ TEXTS: Mapping[str, str] = {
     "failed_request": "internal error: {error}; this is a defect of the software; the charger is being stopped",
     # left by the previous run
     "unfinished": "the last run of this service ended in mid-charge; its charger was stopped first when it began again",
-    "fault_of_another_version": "{fault}",
+    "fault_of_another_version": "another version of this software raised '{fault}', which this one does not know{what:after}",
     "ended_in_charge": "the last run ended in mid-charge: {why}",
     "stray_ran": "the station file had no bay on {port} while its charger was running",
     "past_unknown": "{bay} on {port} is not in {file}: nobody knows its past",

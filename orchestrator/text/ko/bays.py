@@ -125,7 +125,7 @@ TEXTS: Mapping[str, str] = {
     "failed_request": "내부 에러: {error}. 소프트웨어 결함입니다. 충전기를 정지하고 있습니다",
     # left by the previous run
     "unfinished": "이 서비스의 지난 실행이 충전 중에 끝났습니다. 다시 시작할 때 먼저 충전기를 정지시켰습니다",
-    "fault_of_another_version": "{fault}",
+    "fault_of_another_version": "이 버전이 알지 못하는 고장 '{fault}'이(가) 다른 버전에서 발생했습니다{what:after}",
     "ended_in_charge": "지난 실행이 충전 중에 끝났습니다: {why}",
     "stray_ran": "충전기가 동작하는 동안 스테이션 파일에 {port}의 베이가 없었습니다",
     "past_unknown": "{port}의 {bay}이(가) {file}에 없습니다: 이전 상태를 알 수 없습니다",
