@@ -31,7 +31,7 @@ class FaultMemory:
     latched: bool = False  #: a person must reset it
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
     now: Cause | None = None  #: the evidence at the last look; None: the condition was false
-    unheard: bool = False  #: a device was not heard at the last look, so it may only be unseen
+    unheard: bool = False  #: nothing was heard, or looked for, at the last look, so it may only be unseen
     worst: float | None = None  #: the worst value of its one figure since it was raised, if it has one
 
 

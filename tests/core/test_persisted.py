@@ -494,6 +494,8 @@ def test_a_latched_fault_that_this_version_does_not_know_stays_until_a_reset(see
     told = reason_of(world.decision)
     assert "another version of this software raised 'of_tomorrow', which this one does not know" in told
     assert "then reset" in told
+    assert "not seen since" in told
+    assert "gone since" not in told
     if seen is not None:
         assert say(seen.with_(past=True)) in told, "in the past tense: nothing here looks for it"
     assert Persisted.of(world.memory, world.now_s).faults["of_tomorrow"].cause == seen, "for the version that knows it"
