@@ -37,6 +37,8 @@ SAY_WHAT_TO_DO = frozenset({
     "port_taken", "port_too_many_files", "port_not_rs485", "charger_no_reply", "charger_noise", "charger_complains",
     "charger_late", "bmu_stopped", "bmu_late", "bmu_unreachable",
 })  # fmt: skip
+#: The advice for a fault that this version does not know.
+UNKNOWN = "unknown_fault"
 
 
 def active_faults(
@@ -78,14 +80,21 @@ def evidence(row: FaultRow, fault: FaultMemory, *, at_rest: bool = False) -> Cau
     if fault.clean_s is not None or row.moment:
         more["past"] = True
     seen = fault.now if fault.now is not None and not row.moment else fault.cause
-    seen = seen or Cause(row.id)
-    advice = seen.id if seen.id in OWN_ADVICE else row.id
+    known = seen or Cause(row.id)
+    advice = known.id if known.id in OWN_ADVICE else row.id
     if at_rest and row.at_rest:
         advice = row.at_rest
+    if row.id not in ROW:
+        known, advice = unknown(row.id, seen), UNKNOWN
     nothing_left = row.clear is Clear.AUTO and fault.clean_s is not None
-    if nothing_left or (seen.id in SAY_WHAT_TO_DO and not fault.latched):
+    if nothing_left or (known.id in SAY_WHAT_TO_DO and not fault.latched):
         advice = ""
-    return seen.with_(advice, **more)
+    return known.with_(advice, **more)
+
+
+def unknown(name: str, kept: Cause | None) -> Cause:
+    """A fault that only another version knows, with the evidence that was kept of it."""
+    return Cause.of("fault_of_another_version", fault=name, what=kept.with_(past=True) if kept is not None else None)
 
 
 def times(row: FaultRow, fault: FaultMemory, f: Facts | None = None) -> tuple[tuple[str, Any], ...]:

@@ -6,6 +6,7 @@ facts → history → the operator's request → faults → trigger, if any → 
 from orchestrator.core import latches, limits, rows
 from orchestrator.core.active import active_faults
 from orchestrator.core.alarm import alarm
+from orchestrator.core.checks.ourselves import OVERRUN_S
 from orchestrator.core.contactor import closes
 from orchestrator.core.facts import Facts
 from orchestrator.core.history import charger, entered, session, update_history
@@ -55,6 +56,8 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
     """
     if memory.since_s is None:
         memory = changed(memory, since_s=now_s)
+    if snapshot.late_s > OVERRUN_S:
+        memory = changed(memory, stalled_s=now_s)
     f = Facts.of(now_s, snapshot, memory, rules)
     f = update_history(f, now_s - memory.last_s if memory.last_s is not None else 0.0)
     refusal: Cause | None = None

@@ -31,6 +31,8 @@ CHARGER_STALE_S = 1.5
 FAST_STALE_S = 1.5
 #: The objects read once a second: three readings.
 SLOW_STALE_S = 3.0
+#: If this service stood still, its devices are judged silent only after this long: nobody could have heard them.
+ANSWER_S = FAST_STALE_S
 #: A BMU that answers has reported voltage, current, status or temperature within this time.
 QUIET_S = 0.6
 #: Right after its boot a BMU reports what its memory held, not what it measured.
@@ -139,6 +141,19 @@ class Facts:
         battery = self.snapshot.battery
         often = (battery.voltage_v, battery.current_a, battery.status, battery.temperature_c)
         return self.now_s - max((one.t_s for one in often if one is not None), default=-inf) > QUIET_S
+
+    @property
+    def stalled(self) -> bool:
+        """This service stood still, and the devices have had no time to answer since."""
+        stalled_s = self.memory.stalled_s
+        return stalled_s is not None and self.now_s - stalled_s < ANSWER_S
+
+    @property
+    def unheard(self) -> bool:
+        """A device is not heard, as is to be expected right after a stall."""
+        return self.stalled and (
+            self.silent or self.reading is None or not (self.battery.online and self.charger.online)
+        )
 
     @property
     def just_booted(self) -> bool:

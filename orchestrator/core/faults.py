@@ -198,7 +198,22 @@ FAULTS: tuple[FaultRow, ...] = (
     FaultRow("internal", "G5, P11", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS),
 )  # fmt: skip
 
-ROW = {row.id: row for row in FAULTS}
+
+class _Rows(dict[str, FaultRow]):
+    """The rows by id. One that only another version knows stays latched until a reset; nothing here looks for it."""
+
+    def __missing__(self, name: str) -> FaultRow:
+        return FaultRow(name, "", Effect.TRIP, Clear.RESET, lambda _: None, frozenset(), moment=True)
+
+
+class _Ranks(dict[str, int]):
+    """The ranks by id. Unknown dangers come after the known ones."""
+
+    def __missing__(self, name: str) -> int:
+        return len(self)
+
+
+ROW = _Rows({row.id: row for row in FAULTS})
 
 #: Shown before all other faults with the same effect, the most dangerous first: current that nobody controls, then what
 #: may burn, then what destroys. All others follow in table order.
@@ -208,4 +223,4 @@ DANGERS = (
     "temperature_invalid", "reverse_polarity", "polarity_contradicts", "volts_disagree", "amps_disagree", "back_feed",
     "another_pack", "pairing_not_proved", "bmu_silent", "charger_silent", "over_temperature", "under_temperature",
 )  # fmt: skip
-RANK = {name: rank for rank, name in enumerate(dict.fromkeys((*DANGERS, *ROW)))}
+RANK = _Ranks({name: rank for rank, name in enumerate(dict.fromkeys((*DANGERS, *ROW)))})

@@ -26,7 +26,7 @@ def finished(f: Facts) -> Cause | None:
     rule, by_policy = f.rules.policy.finish, f.rules.by_policy
     if not goes_full(f) and f.soc is not None and f.soc >= rule.target_soc_pct:
         return by_policy("full_soc", "finish.target_soc_pct", soc_pct=f.soc, limit_pct=rule.target_soc_pct)
-    ended = _by_charger(f)
+    ended = ends_hold(f) or _by_charger(f)
     if ended is not None:
         return ended
     session = f.memory.session
@@ -36,6 +36,12 @@ def finished(f: Facts) -> Cause | None:
     if session.held_s < rule.hold_min * 60:
         return None
     return by_policy("full_held", "finish.hold_min", what=full, hold_min=rule.hold_min) if rule.hold_min else full
+
+
+def ends_hold(f: Facts) -> Cause | None:
+    """The sign by which the pack was found full, once the charger ends the hold at the top by itself."""
+    session = f.memory.session
+    return session.full if session is not None and f.full_mode else None
 
 
 def known_full(f: Facts) -> Cause | None:

@@ -132,7 +132,7 @@ def _absent(row: FaultRow, fault: FaultMemory, f: Facts, passed_s: float) -> Fau
     cause = fault.cause
     if row.past is not None and cause is not None and f.memory.state in UNVERIFIED and verified(f):
         cause = row.past(cause, row.for_s + clean_s - fault.raised_s)
-    unheard = f.silent or f.reading is None
+    unheard = f.silent or f.reading is None or row.id not in ROW  # nothing looks for a fault of another version
     return changed(fault, present=False, seen_s=0.0, polls=0.0, clean_s=clean_s, cause=cause, now=None, unheard=unheard)
 
 

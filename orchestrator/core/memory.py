@@ -31,7 +31,7 @@ class FaultMemory:
     latched: bool = False  #: a person must reset it
     strikes: tuple[float, ...] = ()  #: when it was raised within the last hour
     now: Cause | None = None  #: the evidence at the last look; None: the condition was false
-    unheard: bool = False  #: a device was not heard at the last look, so it may only be unseen
+    unheard: bool = False  #: nothing was heard, or looked for, at the last look, so it may only be unseen
     worst: float | None = None  #: the worst value of its one figure since it was raised, if it has one
 
 
@@ -152,6 +152,7 @@ class Memory:
     since_s: float | None = event(None)  #: when the state was entered; None before the first decision
     last_s: float | None = measured(None)  #: when the last decision was made
     looked_s: float | None = measured(None)  #: when the fault table was last evaluated
+    stalled_s: float | None = event(None)  #: when this service was last found to have stood still
     cause: Cause = measured(Cause("service_started"))
     closed: bool = event(default=False)  #: the contactor is to be closed
     faults: Mapping[str, FaultMemory] = field(default_factory=dict)  #: fault rows that are or were true

@@ -7,14 +7,14 @@ proved, does anything prevent a charge, does the battery want one.
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from orchestrator.core.facts import Facts
+from orchestrator.core.facts import ANSWER_S, Facts
 from orchestrator.core.finish import finished, goes_full
 from orchestrator.core.history import battery, stage
 from orchestrator.core.history import session as sessions
 from orchestrator.core.machine import Trigger
 from orchestrator.core.operator import RESET
 from orchestrator.core.outofcontrol import out_of_control
-from orchestrator.core.resting import ending, held, offline, resting_place
+from orchestrator.core.resting import absent, ending, held, offline, resting_place
 from orchestrator.core.safestop import LOST_S, gives_up, verified
 from orchestrator.core.states import ENERGISED, SETTLED, STARTABLE
 from orchestrator.core.witnesses.standby import current_without_order
@@ -123,6 +123,8 @@ def _precharging(f: Facts) -> Next:
 def _stopping(f: Facts, faults: Faults) -> Next:
     state, memory = f.memory.state, f.memory
     if verified(f):
+        if f.unheard and f.state_s < ANSWER_S:
+            return Next(None, memory.cause)
         return _rest(f, faults)
     if gives_up(f):
         return Next(Trigger.GIVE_UP, out_of_control(f))
@@ -135,16 +137,25 @@ def _stopping(f: Facts, faults: Faults) -> Next:
 
 def _resting(f: Facts, faults: Faults) -> Next:
     fresh = next((x for x in faults if x.since_s == f.now_s and x.effect >= Effect.STOP), None)
-    if fresh is not None and f.charger.online:
+    if fresh is not None and (f.charger.online or f.stalled):
         return Next(Trigger.STOP, fresh.cause)
     if f.runs:
         return Next(Trigger.STOP, Cause("runs_uncommanded"))
     if f.unordered:
         return Next(Trigger.STOP, current_without_order(f) or f.memory.cause)
     if f.memory.state is State.OFFLINE and not f.stopped:
-        answers = f.charger.online and f.reading is not None
-        return Next(None, Cause("stopped_first") if answers else offline(f))
+        return Next(None, _stopped_first(f))
+    if f.unheard and f.memory.state is not State.OFFLINE:
+        return Next(None, f.memory.cause)
     return _rest(f, faults)
+
+
+def _stopped_first(f: Facts) -> Cause:
+    """Why a bay waits that has lost a device: until its charger is proved to stand by, whatever it was before."""
+    if not f.charger.online or f.reading is None:
+        return offline(f)
+    without = absent(f)
+    return Cause.of("stopped_again", what=without[1]) if without is not None else Cause("stopped_first")
 
 
 def _rest(f: Facts, faults: Faults) -> Next:

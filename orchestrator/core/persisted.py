@@ -1,18 +1,19 @@
 """What of a bay's memory survives a restart, and the memory that a restart begins with. Pure: no disk, no clock.
 
 A restart is neither a reset nor a start, and it forgets no limit: everything latched, held, counted or raised
-continues. A charger that may have been running waits for a person. Times are stored as ages, since monotonic clocks
-start again.
+continues. A charger that may have been running waits for a person, and one that was out of control still is. Times are
+stored as ages, since monotonic clocks start again.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from orchestrator.core.active import unknown
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory, with_values
 from orchestrator.core.states import MAY_RUN
-from orchestrator.model import Cause, Session
+from orchestrator.model import Cause, Session, State
 from orchestrator.model.cause import said, together
 
 #: Mere counters are written this often while nothing else changes.
@@ -38,6 +39,7 @@ class Persisted:
     """The persisted state of one bay."""
 
     running: bool = False  #: the charger may be running: it was told to, and was not verified in standby since
+    uncontrollable: Age | None = None  #: how long a charger out of control has not obeyed its stop; None: it is not
     hold: Cause | None = None  #: why a person must start; as in the core's memory
     paused: bool = False
     faults: Mapping[str, PersistedFault] = field(default_factory=dict)
@@ -65,6 +67,7 @@ class Persisted:
         session = memory.session
         return cls(
             running=memory.state in MAY_RUN or memory.stage.intends or memory.stop.unverified,
+            uncontrollable=_uncontrollable(memory, now_s),
             hold=memory.operator.hold,
             paused=memory.operator.paused,
             faults=faults,
@@ -82,12 +85,14 @@ class Persisted:
             (name, fault.latched, fault.raised is not None, len(fault.strikes)) for name, fault in self.faults.items()
         )
         resets = tuple(name for _, name in self.resets)
-        return self.running, self.hold, self.paused, faults, resets, self.session is not None, self.full_pct is None
+        known = (self.uncontrollable is not None, self.session is not None, self.full_pct is None)
+        return self.running, self.hold, self.paused, faults, resets, *known
 
     def aged(self, seconds: float, unseen_s: float | None = None) -> "Persisted":
         """The same state this much later; `unseen_s` if the time without counting differs from that."""
         return replace(
             self,
+            uncontrollable=None if self.uncontrollable is None else self.uncontrollable + seconds,
             faults={
                 name: replace(
                     fault,
@@ -121,14 +126,17 @@ class Persisted:
 
     def memory(self, now_s: float) -> Memory:
         """The memory that the bay begins with."""
-        faults = {name: _fault(fault, now_s) for name, fault in self.faults.items() if name in ROW}
+        known = {name: one for name, one in self.faults.items() if name in ROW or one.latched or one.raised is None}
+        faults = {name: _fault(fault, now_s) for name, fault in known.items()}
         if self.running:
             faults["found_running"] = FaultMemory(raised_s=now_s, cause=UNFINISHED)
-        unknown = [one.cause or _unknown(name) for name, one in self.faults.items() if name not in ROW]
+        others = [unknown(name, one.cause) for name, one in self.faults.items() if name not in known]
         session = self.session
+        out_s = None if self.uncontrollable is None else now_s - self.uncontrollable
         return with_values(
-            Memory(),
-            hold=self.hold or (together(unknown) if unknown else None),
+            Memory() if out_s is None else Memory(state=State.UNCONTROLLABLE),
+            stopping_s=out_s,
+            hold=self.hold or (together(others) if others else None),
             paused=self.paused,
             faults=faults,
             resets=tuple((now_s - age_s, name) for age_s, name in self.resets),
@@ -140,8 +148,12 @@ class Persisted:
         )
 
 
-def _unknown(name: str) -> Cause:
-    return Cause.of("fault_of_another_version", fault=name)
+def _uncontrollable(memory: Memory, now_s: float) -> Age | None:
+    """Since the first stop in vain; only a standby that lasts ends it, however often the service restarts."""
+    if memory.state is not State.UNCONTROLLABLE:
+        return None
+    since_s = memory.stop.stopping_s if memory.stop.stopping_s is not None else memory.since_s
+    return 0.0 if since_s is None else now_s - since_s
 
 
 def _age(t_s: float | None, now_s: float) -> Age | None:
@@ -163,4 +175,5 @@ def from_first_format(name: str, text: str) -> PersistedFault:
     row = ROW.get(name)
     backoff = row is not None and row.clear is Clear.BACKOFF  # with fewer strikes it would not have been stored
     strikes = (0.0,) * (len(BACKOFF_S) + 1) if backoff else ()
-    return PersistedFault(said(text), row is not None and row.clear is not Clear.OPERATOR, raised=0.0, strikes=strikes)
+    latched = row is None or row.clear is not Clear.OPERATOR
+    return PersistedFault(said(text), latched, raised=0.0, strikes=strikes)

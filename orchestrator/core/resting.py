@@ -70,7 +70,8 @@ def _pauses(f: Facts, _faults: Faults) -> Found:
     return (Trigger.SUSPEND, held(f, Cause("operator_pause"))) if f.memory.operator.paused else None
 
 
-def _absent(f: Facts, _faults: Faults) -> Found:
+def absent(f: Facts, _faults: Faults = ()) -> Found:
+    """Where a bay belongs without a battery, or with one that is not heard."""
     if f.battery.online and not f.silent:
         return None
     if f.battery_removed:
@@ -120,7 +121,7 @@ PLACES: tuple[Callable[[Facts, Faults], Found], ...] = (
     _holds,  # nobody and nothing else continues what a person has stopped
     _ends,  # no charge begins that the end of the service would stop; a pause returns after it
     _pauses,  # the operator's pause comes before what the battery wants
-    _absent,  # nothing below can be judged without a battery
+    absent,  # nothing below can be judged without a battery
     _charged,  # a battery that wants nothing waits for nothing, faults or not
     _barred,  # it goes on by itself once nothing prevents a charge
     _remains,  # what the battery wants

@@ -49,6 +49,8 @@ def update(f: Facts, after: State, cause: Cause) -> Stop:
         runs_again = (f.runs or f.unordered) and lasted_s < LASTS_S and stop.stopping_s is not None
         returns, stopping_s = (stop.returns + 1, stop.stopping_s) if runs_again else (0, f.now_s)
         stop = changed(stop, returns=returns, stopping_s=stopping_s)
+    elif after is State.UNCONTROLLABLE and stop.stopping_s is None:  # the start was its first stop
+        stop = changed(stop, stopping_s=f.memory.since_s)
     if after in ENERGISED:
         return changed(stop, unverified=True, stopping_s=None, verified_s=None)
     return changed(stop, stop_cause=cause) if after is State.STOPPING else stop

@@ -106,6 +106,7 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
     fulls = [part.full_pct for part in parts if part.full_pct is not None]
     return Persisted(
         running=any(part.running for part in parts),
+        uncontrollable=max((one for part in parts if (one := part.uncontrollable) is not None), default=None),
         hold=together(list(holds)) if holds else None,
         paused=any(part.paused for part in parts),
         faults=faults,
@@ -144,7 +145,8 @@ def settled(
         if old in pasts or any(old == Place(place.bay) or _renamed(old, place) for place in places):
             continue
         taken_over = entry.persisted.running and any(old.is_port_of(place) for place in places)
-        now.append(replace(entry, persisted=replace(entry.persisted, running=False)) if taken_over else entry)
+        kept = replace(entry.persisted, running=False, uncontrollable=None) if taken_over else entry.persisted
+        now.append(replace(entry, persisted=kept))
     return now
 
 

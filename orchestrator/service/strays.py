@@ -80,6 +80,7 @@ class Strays:
             self._remember(stray, running=False)
         elif stray.verified_s is not None and now_s - stray.verified_s >= WATCHED_S:
             stray.closed = True
+            self._remember(stray, running=False, lasts=True)
             close_all([stray.port.close], 0.0)
 
     def _runs(self, stray: _Stray, reading: ChargerReading) -> None:
@@ -88,10 +89,13 @@ class Strays:
             self._remember(stray, running=True)
         stray.ran_s, stray.stop_s, stray.seen_s, stray.verified_s = reading.t_s, None, None, None
 
-    def _remember(self, stray: _Stray, *, running: bool) -> int:
+    def _remember(self, stray: _Stray, *, running: bool, lasts: bool = False) -> int:
+        """Persist what it does now; `lasts`: its standby is believed."""
         persisted = self._store.past(stray.place)
         why = Cause.of("stray_ran", port=shown(stray.place.port))
-        return self._store.put(stray.place, replace(persisted, running=running, hold=persisted.hold or why))
+        out = None if lasts else persisted.uncontrollable
+        kept = replace(persisted, running=running, uncontrollable=out, hold=persisted.hold or why)
+        return self._store.put(stray.place, kept)
 
     def drop(self, port: str) -> tuple[str, int]:
         """Forget a charger that a person reports gone for good. Returns its name, and the revision that persists that.
@@ -106,7 +110,7 @@ class Strays:
         if stray.port.view[1].online:
             raise RequestError(_cause("stray_answers", stray.place))
         self._strays = [one for one in self._strays if one is not stray]
-        revision = self._remember(stray, running=False)
+        revision = self._remember(stray, running=False, lasts=True)
         self._tell("stray_dropped", stray.place)
         Thread(target=stray.port.close, name="drop", daemon=True).start()  # its driver may be slow
         return str(stray.place), revision

@@ -201,6 +201,10 @@ BATTERY = (
     Edge(battery.soh_low, None, bmu={"soh_pct": None}),
 )  # fmt: skip
 
+NOT_ASKED = (
+    "the charger stopped though it was told to run, and the policy does not take its mode 5 for full "
+    f"({with_full(charger=False).source.at('finish.full.charger')})"
+)
 NOT_FULL = "the charger stopped though it was told to run, and its mode 5 is not taken for full: the current had not " \
            "tapered off and the pack has not reached its end voltage"  # fmt: skip
 UNCONFIRMED = "the charger was told '{}' for {} s and its status does not show it"
@@ -226,7 +230,7 @@ OBEDIENCE = (
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
     Edge(obedience.stopped_by_itself, None, TAPERED, bmu={"soc_pct": 85.0},
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}),
-    Edge(obedience.stopped_by_itself, NOT_FULL, TAPERED, bmu={"soc_pct": 85.0},
+    Edge(obedience.stopped_by_itself, NOT_ASKED, TAPERED, bmu={"soc_pct": 85.0},
          charger={"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL},
          policy=with_full(charger=False)),
     Edge(obedience.stopped_by_itself, NOT_FULL, bmu={"soc_pct": 79.0},

@@ -66,6 +66,35 @@ def test_a_taper_is_one_of_one_step() -> None:
     assert world.is_in(S.CHARGING)
 
 
+def test_a_charger_that_ends_the_hold_of_a_full_pack_ends_the_charge() -> None:
+    """Whatever the policy thinks of the charger's word, the pack was already found full."""
+    for changes in ({"charger": False}, {"needs": Needs.ALL, "charger": False}, {"needs": Needs.ALL, "charger": None}):
+        full_by = replace(POLICY.finish.full, soc_pct=90.0, **changes)
+        world = World(bay(finishing(full=full_by, hold_min=30))).charging()
+        tapering(world)
+        world.run(130)
+        assert world.is_in(S.CHARGING)
+        assert world.memory.session is not None
+        assert world.memory.session.full is not None
+        world.amps, world.values["voltage_v"] = 5.0, 53.0  # nothing looks like the end any more
+        world.run(15)
+        world.shows.update(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED)
+        world.until(S.FULL, 3)
+        assert "stopped_by_itself" not in world.memory.faults
+
+
+def test_a_charger_whose_word_the_policy_does_not_take_is_told_so() -> None:
+    """The current had tapered off at the end voltage: that it had not would be untrue."""
+    world = World(bay(with_full(charger=False, soc_pct=100.0, taper=None))).charging()
+    tapering(world)
+    world.run(20)
+    world.shows.update(charge_mode=ChargeMode.FULL, operation=Operation.STOPPED)
+    world.until(S.HELD, 3)
+    said = reason_of(world.decision)
+    assert "the policy does not take its mode 5 for full (" in said, said
+    assert "taper" not in said
+
+
 def test_all_that_is_needed_must_be_there() -> None:
     world = World(bay(with_full(needs=Needs.ALL))).charging()
     world.values["soc_pct"] = 96.0

@@ -15,6 +15,7 @@ from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory, value_of
 from orchestrator.core.operator import STOPPED
 from orchestrator.core.persisted import COUNTERS_S, UNFINISHED, Persisted, PersistedFault, from_first_format
+from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.states import ENERGISED, MAY_RUN
 from orchestrator.model import STOP, Action, Alarm, Cause, ChargerLink, Request, Session, State
 from tests.core.bays import IN, POLICY, charging, idle
@@ -61,7 +62,7 @@ def test_a_restart_stops_first_and_starts_nothing_that_ran(state: State) -> None
     world.deaf.clear()
     world.tick()
     assert world.decision.command == STOP
-    assert world.is_in(State.STARTING)
+    assert world.is_in(State.UNCONTROLLABLE if state is State.UNCONTROLLABLE else State.STARTING)
     assert (world.decision.alarm is Alarm.DANGER) is ran  # nobody knows yet
     world.run(120)
     assert world.decision.alarm is not Alarm.DANGER
@@ -93,6 +94,43 @@ def test_a_charger_that_may_run_and_is_not_heard_is_an_alarm_over_any_number_of_
     world.deaf.clear()
     world.run(12)
     assert world.decision.alarm is not Alarm.DANGER
+
+
+@pytest.mark.parametrize("after_s", [0.0, 5.0, LASTS_S - 1])
+def test_a_restart_shortens_no_standby_that_must_last(after_s: float) -> None:
+    """A charger that runs again shows standby for seconds, too; the time begins again with each restart."""
+    world = IN[State.UNCONTROLLABLE]()
+    world.deaf.clear()
+    world.run(after_s)
+    for gap_s in (1.0, 3600.0):
+        restarted(world, gap_s)
+        began_s = world.now_s
+        while world.now_s - began_s < LASTS_S - 0.5:
+            world.tick()
+            assert world.is_in(State.UNCONTROLLABLE)
+            assert world.decision.alarm is Alarm.DANGER
+            assert world.decision.command == STOP
+            assert not world.decision.closed
+            assert world.ask(Request.RESET) != ""
+            assert world.ask(Request.START) != ""
+    world.run(3)
+    assert world.state in (State.TRIPPED, State.HELD)
+
+
+def test_a_charger_out_of_control_is_persisted_before_it_is_relied_on() -> None:
+    world = IN[State.UNCONTROLLABLE]()
+    kept = Persisted.of(world.memory, world.now_s)
+    assert replace(kept, uncontrollable=None).gist != kept.gist
+    assert Persisted.of(kept.memory(world.now_s), world.now_s).uncontrollable == kept.uncontrollable
+
+
+def test_the_seconds_out_of_control_count_on_over_a_restart() -> None:
+    world = IN[State.UNCONTROLLABLE]()
+    assert world.memory.stop.stopping_s is not None
+    tried_s = world.now_s - world.memory.stop.stopping_s
+    restarted(world, gap_s=60.0)
+    world.run(1)
+    assert f"has not obeyed the stop for {tried_s + 61:.0f} s" in reason_of(world.decision)
 
 
 @pytest.mark.parametrize("request_", [Request.STOP, Request.PAUSE])
@@ -467,21 +505,47 @@ def test_the_gist_changes_with_what_must_be_on_disk_and_not_with_time() -> None:
     assert all(before != after for before, after in pairwise(gists))
 
 
-def test_a_fault_that_this_version_does_not_know_holds_the_bay() -> None:
-    kept = Persisted(faults={"of_tomorrow": PersistedFault(cause("something"), latched=True, raised=1.0)})
-    memory = kept.memory(100.0)
-    assert memory.faults == {}
-    assert memory.operator.hold == cause("something")
+@pytest.mark.parametrize("seen", [cause("something"), Cause.of("rogue_run", charger_a=2.0), None])
+def test_a_latched_fault_that_this_version_does_not_know_stays_until_a_reset(seen: Cause | None) -> None:
+    world = World()
+    for _ in range(2):
+        known = {"of_tomorrow": PersistedFault(seen, latched=True, raised=1.0)}
+        restarted(world, written=Persisted(faults=known))
+        world.until(State.TRIPPED, 5)
+        world.run(60)
+        assert world.is_in(State.TRIPPED)
+        assert world.decision.alarm is Alarm.ATTENTION
+    told = reason_of(world.decision)
+    assert "another version of this software raised 'of_tomorrow', which this one does not know" in told
+    assert "then reset" in told
+    assert "not seen since" in told
+    assert "gone since" not in told
+    if seen is not None:
+        assert say(seen.with_(past=True)) in told, "in the past tense: nothing here looks for it"
+    assert Persisted.of(world.memory, world.now_s).faults["of_tomorrow"].cause == seen, "for the version that knows it"
+    assert world.ask(Request.START) != ""
+    assert world.ask(Request.RESET) == ""
+    world.until(State.HELD, 3)
+    assert "of_tomorrow" not in world.memory.faults
+    assert world.ask(Request.START) == ""
 
 
-def test_such_a_fault_that_was_kept_without_its_cause_is_named() -> None:
-    memory = Persisted(faults={"of_tomorrow": PersistedFault(None, latched=True, raised=1.0)}).memory(100.0)
+def test_an_unlatched_fault_that_this_version_does_not_know_holds_the_bay() -> None:
+    memory = Persisted(faults={"of_tomorrow": PersistedFault(cause("something"), raised=1.0)}).memory(100.0)
     assert memory.faults == {}
-    assert say(memory.operator.hold) == "of_tomorrow"
+    assert say(memory.operator.hold).startswith("another version of this software raised 'of_tomorrow'")
+    assert say(memory.operator.hold).endswith("something")
+
+
+def test_strikes_of_a_fault_that_this_version_does_not_know_hold_nothing() -> None:
+    world = restarted(World(), written=Persisted(faults={"of_tomorrow": PersistedFault(strikes=(1.0,))}))
+    world.until(State.CHARGING, 10)
+    assert world.memory.faults["of_tomorrow"].strikes
 
 
 @pytest.mark.parametrize(
-    ("name", "latched", "strikes"), [("internal", True, 0), ("system_stop", False, 0), ("implausible", True, 4)]
+    ("name", "latched", "strikes"),
+    [("internal", True, 0), ("of_yesterday", True, 0), ("system_stop", False, 0), ("implausible", True, 4)],
 )
 def test_the_first_format_is_read(name: str, latched: bool, strikes: int) -> None:
     fault = from_first_format(name, "text")

@@ -1,5 +1,6 @@
 """The safe stop: what proves it, what does not, and where every state ends when the charger is silent or deaf."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -213,6 +214,19 @@ def test_a_latch_without_a_line_is_stopped_blindly_first(begin: Callable[[], Wor
     world.until(State.TRIPPED, 1.0)
 
 
+@pytest.mark.parametrize("begin", [idle, charging])
+def test_a_stop_that_is_repeated_because_the_bmu_is_lost_says_so(begin: Callable[[], World]) -> None:
+    """Its charger was verified: "is being stopped before anything else" would be untrue, and hide the BMU's reason."""
+    world = begin()
+    world.battery_answers = False
+    world.until(State.OFFLINE, 6)
+    told = [reason_of(world.run(0.25)) for _ in range(12)]
+    assert all("the BMU (node 0x10)" in reason for reason in told), told
+    again = [reason for reason in told if "told to stop once more, since no BMU confirms" in reason]
+    assert again
+    assert again != told, "it ends"
+
+
 # --- the start --------------------------------------------------------------------------------------------------------
 
 
@@ -235,6 +249,16 @@ def test_a_charger_that_is_not_there_is_no_alarm() -> None:
     world.tick()
     assert world.is_in(State.OFFLINE)
     assert reason_of(world.decision) == "/dev/ttyX: no answer"
+
+
+def test_the_seconds_of_a_stop_in_vain_count_from_the_start() -> None:
+    world = running_at_the_start()
+    world.deaf.add(Action.STOP)
+    world.until(State.UNCONTROLLABLE, 5)
+    tried_s = re.findall(r"for (\d+) s", reason_of(world.decision))
+    for later_s in (1, 2, 3):
+        world.run(1.0)
+        assert re.findall(r"for (\d+) s", reason_of(world.decision)) == [str(int(tried_s[0]) + later_s)]
 
 
 def test_a_charger_that_is_found_late_has_its_time_to_stop() -> None:

@@ -98,6 +98,10 @@ def any_standby_proves(patch: Patch) -> None:
     patch.setattr(Facts, "stopped", property(lambda f: f.standby))
 
 
+def standby_need_not_last(patch: Patch) -> None:
+    patch.setattr("orchestrator.core.safestop.LASTS_S", 0.0)
+
+
 def station_limit_is_forgotten(patch: Patch) -> None:
     patch.setattr(Rules, "of", classmethod(lambda cls, bay, of=Rules.of: replace(of(bay), top_step=4)))
 
@@ -201,6 +205,7 @@ BUGS: dict[str, Callable[[Patch], None]] = {
     "tripped": trip_is_no_latch,
     "latched": latches_wear_off,
     "qualified": nobody_qualifies,
+    "out of control": standby_need_not_last,
     "verified": any_standby_proves,
     "current limit": station_limit_is_forgotten,
     "voltage limit": without("over_voltage"),

@@ -34,7 +34,7 @@ STATUS_LIMITS = (BatteryStatus.LOW_TEMPERATURE, BatteryStatus.DISCHARGE_OVER_CUR
 def bmu_silent(f: Facts) -> Cause | None:
     """FAULTS B1, B5, B19, B21: no values, or a line or node whose values cannot be trusted."""
     silent = f.silent or (not f.present and f.quiet)  # not just one value: nothing arrives any more
-    if (f.battery.online and not silent) or f.just_booted:
+    if (f.battery.online and not silent) or f.just_booted or f.stalled:
         return None
     if f.battery.problem:
         return f.battery.problem
@@ -43,7 +43,7 @@ def bmu_silent(f: Facts) -> Cause | None:
 
 def stale_reading(f: Facts) -> Cause | None:
     """FAULTS B2: it answers, but not with everything that a charge needs."""
-    if f.silent or f.present or (f.quiet and not f.just_booted):  # else it is silent
+    if f.silent or f.present or f.stalled or (f.quiet and not f.just_booted):  # else it is silent
         return None
     return Cause.of("stale_reading", missing=f.missing)
 
@@ -63,7 +63,7 @@ def sdo_aborted(f: Facts) -> Cause | None:
 def heartbeat_lost(f: Facts) -> Cause | None:
     """FAULTS B6. A node that answers is alive, and a poor bus loses two heartbeats in a row several times a day."""
     link, volts = f.battery, f.snapshot.battery.voltage_v
-    if link.heartbeat_s is None or link.heartbeat_t_s is None:
+    if link.heartbeat_s is None or link.heartbeat_t_s is None or f.stalled:
         return None
     age_s = f.now_s - link.heartbeat_t_s
     answered_s = volts.t_s if volts is not None else link.heartbeat_t_s

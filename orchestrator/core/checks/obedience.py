@@ -1,7 +1,7 @@
 """Faults of a charger that does not obey, or does not answer."""
 
 from orchestrator.core.facts import CHARGER_STALE_S, Facts
-from orchestrator.core.finish import early_below_pct, ends_full
+from orchestrator.core.finish import early_below_pct, ends_full, ends_hold
 from orchestrator.core.witnesses.standby import sees_current
 from orchestrator.model import Action, Cause, Operation, State
 
@@ -29,6 +29,8 @@ NEWS_S = 5.0
 
 def charger_silent(f: Facts) -> Cause | None:
     """FAULTS C23, C25."""
+    if f.stalled:
+        return None
     if f.charger.problem:
         return f.charger.problem
     port = f.rules.bay.charger.port
@@ -86,9 +88,11 @@ def stopped_by_itself(f: Facts) -> Cause | None:
         return None
     if not f.full_mode:
         return Cause("stopped_by_itself")
-    if early_full(f) is not None or (f.rules.policy.finish.full.charger is not False and ends_full(f)):
+    if ends_hold(f) is not None or early_full(f) is not None:
         return None
-    return Cause("stopped_not_full")
+    if f.rules.policy.finish.full.charger is False:
+        return f.rules.by_policy("stopped_not_asked", "finish.full.charger")
+    return None if ends_full(f) else Cause("stopped_not_full")
 
 
 def limit_reverted(f: Facts) -> Cause | None:
@@ -148,7 +152,7 @@ def contactor_lost(f: Facts) -> Cause | None:
 
 def _unconfirmed(id_: str, f: Facts, command: str, value: int | None) -> Cause | None:
     waited_s = f.now_s - f.memory.sequence.command_s
-    if waited_s < OBEY_S:
+    if waited_s < OBEY_S or f.stalled:
         return None
     held = Cause.of("held_back", refused=f.charger.refused) if f.charger.refused else None
     return Cause.of(id_, command=command, value=value, waited_s=waited_s, held=held)
@@ -176,7 +180,9 @@ def _steps_in_force(f: Facts, shown: int) -> tuple[int, ...]:
 
 def early_full(f: Facts) -> Cause | None:
     """FAULTS C18."""
-    if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f) or not ends_full(f):
+    if not f.full_mode or f.soc is None or f.soc >= early_below_pct(f) or ends_hold(f) is not None:
+        return None
+    if not ends_full(f):
         return None  # an end that did not look like a full charge was a stop by somebody: `stopped_by_itself`
     return Cause.of("early_full", soc_pct=f.soc)
 

@@ -113,7 +113,8 @@ def _known(f: Facts, known: BatteryHistory) -> BatteryHistory:
         return known
     if known.full_s is None and f.soc is not None:
         known = changed(known, full_s=f.now_s)
-    if known.full_pct is not None and (known.boots != f.battery.boots or not f.battery.online):
+    gone = not (f.battery.online or f.stalled)
+    if known.full_pct is not None and (known.boots != f.battery.boots or gone):
         known = changed(known, full_pct=None)
     if known.boots != f.battery.boots and f.memory.state is not State.STOPPING:
         known = changed(known, boots=f.battery.boots)

@@ -85,6 +85,7 @@ ADVICE: Mapping[str, str] = {
     "time_limit": "inspect pack and policy, then reset",
     "ah_limit": "the pack took more than it holds: inspect it, check the policy's max_ah, then reset",
     "late": "find out what keeps this machine busy",
+    "unknown_fault": "find out what the other version says of it, then reset",
     "overrun": "find out what keeps this machine busy",
     "suspended": "a gateway must not be suspended: switch that off in its operating system",
     "not_persisted": "make space, or mend the disk of the journal's directory",

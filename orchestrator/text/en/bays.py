@@ -16,6 +16,7 @@ TEXTS: Mapping[str, str] = {
     # states of a bay without a charge
     "charger_offline": "the charger on {port} does not answer",
     "stopped_first": "the charger is being stopped before anything else",
+    "stopped_again": "{what}; the charger is told to stop once more, since no BMU confirms that no current flows",
     "runs_uncommanded": "the charger runs though it was not commanded to",
     "battery_absent": "no battery",
     "battery_not_heard": "{charger_v:.1f} V at the charger, but {what}; the bay goes on by itself once the BMU answers",
@@ -132,7 +133,7 @@ TEXTS: Mapping[str, str] = {
     # left by the previous run
     "unfinished": "this service began again after its last run had ended in mid-charge, and had to stop the charger "
     "first",
-    "fault_of_another_version": "{fault}",
+    "fault_of_another_version": "another version of this software raised '{fault}', which this one does not know{what:after}",
     "ended_in_charge": "the last run ended in mid-charge: {why}",
     "stray_ran": "the station file had no bay on {port} while its charger was running",
     "past_unknown": "{bay} on {port} is not in {file}: nobody knows its past",

@@ -36,6 +36,7 @@ TEXTS: Mapping[str, str] = {
     "stopped_by_itself": "the charger stopped though it was told to run",
     "stopped_not_full": "the charger stopped though it was told to run, and its mode 5 {is|was} not taken for full: the "
     "current had not tapered off and the pack {has|had} not reached its end voltage",
+    "stopped_not_asked": "the charger stopped though it was told to run, and the policy does not take its mode 5 for full{at}",
     "setting_not_obeyed": "the charger was told '{command:word} {value}' for {waited_s:.1f} s and its status {does|did} not "
     "show it{held:after}",
     "held_back": "the interlock {holds|held} it back: {refused}",

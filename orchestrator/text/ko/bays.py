@@ -16,6 +16,7 @@ TEXTS: Mapping[str, str] = {
     # states of a bay without a charge
     "charger_offline": "{port}의 충전기가 응답하지 않습니다",
     "stopped_first": "다른 무엇보다 먼저 충전기를 정지하고 있습니다",
+    "stopped_again": "{what}. 전류가 흐르지 않음을 BMU로 확인할 수 없으므로 충전기에 정지를 다시 명령합니다",
     "runs_uncommanded": "기동 명령이 없었는데 충전기가 동작합니다",
     "battery_absent": "배터리가 없습니다",
     "battery_not_heard": "충전기에 {charger_v:.1f} V가 있으나 {what}. BMU가 응답하면 자동으로 재개합니다",
@@ -131,7 +132,7 @@ TEXTS: Mapping[str, str] = {
     "failed_request": "내부 에러: {error}. 소프트웨어 결함입니다. 충전기를 정지하고 있습니다",
     # left by the previous run
     "unfinished": "이 서비스가 충전 중에 끝난 뒤 다시 시작되어, 먼저 충전기를 정지해야 했습니다",
-    "fault_of_another_version": "{fault}",
+    "fault_of_another_version": "이 버전이 알지 못하는 고장 '{fault}'이(가) 다른 버전에서 발생했습니다{what:after}",
     "ended_in_charge": "지난 실행이 충전 중에 끝났습니다: {why}",
     "stray_ran": "충전기가 동작하는 동안 스테이션 파일에 {port}의 베이가 없었습니다",
     "past_unknown": "{port}의 {bay}이(가) {file}에 없습니다: 이전 상태를 알 수 없습니다",

@@ -34,6 +34,7 @@ TEXTS: Mapping[str, str] = {
     "stopped_by_itself": "기동을 명령했는데 충전기가 정지했습니다",
     "stopped_not_full": "기동을 명령했는데 충전기가 정지했습니다. 전류가 줄어들지 않았고 팩이 종료 전압에 도달하지 "
     "않았으므로 모드 5를 충전 완료로 인정하지 {않습니다|않았습니다}",
+    "stopped_not_asked": "기동을 명령했는데 충전기가 정지했습니다. 정책은 모드 5를 충전 완료로 인정하지 않습니다{at}",
     "setting_not_obeyed": "충전기에 '{command:word} {value}' 명령을 {waited_s:.1f}초 동안 보냈으나 상태에 나타나지 "
     "{않습니다|않았습니다}{held:after}",
     "held_back": "인터록이 명령을 막았습니다: {refused}",

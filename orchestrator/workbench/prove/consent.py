@@ -15,6 +15,8 @@ from orchestrator.workbench.prove.story import Taken
 #: Causes that name the command with which it goes on, and those that say why that is refused until when.
 COMMANDS = frozenset({"start_bay", "start_now", "reset_now"})
 NOT_YET = frozenset({"refused_while", "refused_until", "refused_for", "reset_locked", "waits_for_fault"})
+#: A standby after a stop in vain must last this long.
+LASTS_S = 10.0
 
 
 def operator_stops(taken: Taken) -> str | None:
@@ -102,6 +104,17 @@ def a_death_in_mid_charge_holds(taken: Taken) -> str | None:
     if not taken.move.restart or not ran:
         return None
     return None if "found_running" in taken.after.faults else f"{taken.after.state} without a fault that waits"
+
+
+def out_of_control_until_it_lasts(taken: Taken) -> str | None:
+    """UNCONTROLLABLE takes at least the standby that must last, and a restart is not the end of it."""
+    before, after = taken.before, taken.after
+    if before.state is not State.UNCONTROLLABLE or after.state is State.UNCONTROLLABLE:
+        return None
+    if taken.move.restart:
+        return f"left for {after.state} by a restart"
+    lasted_s = taken.now_s - (before.since_s or 0.0)
+    return f"left for {after.state} after {lasted_s:.1f} s" if lasted_s < LASTS_S else None
 
 
 def alarmed(taken: Taken) -> str | None:

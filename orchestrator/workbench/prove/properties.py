@@ -15,6 +15,7 @@ from orchestrator.workbench.prove.consent import (
     held_until_started,
     latched_until_reset,
     operator_stops,
+    out_of_control_until_it_lasts,
     tripped_until_reset,
     waits_for_a_start,
 )
@@ -210,6 +211,7 @@ PROPERTIES: tuple[Property, ...] = (
     Property("temperature limit", "nothing runs outside the station's temperatures", within_temperature),
     Property("standing stop", "the command is stop until standby is verified", unproved_stops),
     Property("alarm", "danger: a charger may be out of control; attention: a fault waits for a person", alarmed),
+    Property("out of control", "only a standby that lasts ends it, over restarts too", out_of_control_until_it_lasts),
     Property("unordered", "uncommanded current is stopped, whatever the charger reports", unordered_current_stops),
     Property("death", "a service that dies in mid-charge waits for a person", a_death_in_mid_charge_holds),
     Property("counters", "no limit starts over with a restart", counts_over_restarts),

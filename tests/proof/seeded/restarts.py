@@ -25,6 +25,13 @@ RESTARTS: tuple[Seed, ...] = (
             "        if False:",
         ),
     ),
+    part(
+        "a restart believes a charger out of control",
+        "restart",
+        "a restart ends the standby that must last, and lowers the alarm",
+        ("tests/core/test_persisted.py",),
+        (f"{CORE}persisted.py", "if memory.state is not State.UNCONTROLLABLE:", "if memory:"),
+    ),
     scene(
         "the open charge is not kept",
         "restart",
