@@ -59,7 +59,9 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
     f = update_history(f, now_s - memory.last_s if memory.last_s is not None else 0.0)
     refusal: Cause | None = None
     if snapshot.request is not None:
-        heard = handle_request(f.memory, snapshot.request, now_s, snapshot.not_persisted, rules.bay.name)
+        heard = handle_request(
+            f.memory, snapshot.request, now_s, snapshot.not_persisted, rules.bay.name, at_rest=stands_by(f)
+        )
         refusal = heard.refusal
         f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
     known = latches.update(f)
