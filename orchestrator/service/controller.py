@@ -15,7 +15,7 @@ import sys
 
 if __name__ == "__main__":
     gc.disable()  # until all is imported: none of it is garbage, and looking for some takes a tenth of that time
-    from orchestrator.service.unforeseen import say_unforeseen
+    from orchestrator.lastresort.unforeseen import say_unforeseen
 
     sys.excepthook = say_unforeseen  # even an import may fail
 

@@ -19,7 +19,8 @@ Station = tuple[PlantProcess, Service]
 #: The controller with a limit on its threads; a limit of the system (TasksMax=, ulimit -u) fails in the same way.
 FEW_THREADS = """
 import sys, threading
-from orchestrator.service import controller, unforeseen
+from orchestrator.lastresort import unforeseen
+from orchestrator.service import controller
 sys.excepthook = unforeseen.say_unforeseen
 left, good = COUNT, threading.Thread.start
 def start(thread):
