@@ -25,6 +25,7 @@ from orchestrator.lastresort.descriptors import raised
 from orchestrator.model import Cause
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.ports import ChargerPorts
+from orchestrator.service.rivals import refuse_shared
 
 #: Open files besides bays and buses: streams, sockets, journal, clients.
 SHARED = 32
@@ -38,6 +39,7 @@ def main(fd: int, station: str) -> int:
         loaded = load_station(station)
         language = loaded.language.value
         check_limit(len(loaded.bays), len(loaded.can))
+        refuse_shared(bay.charger.port for bay in loaded.bays)
         ports = ChargerPorts(loaded, guardian)
         ports.start()
         from orchestrator.service.supervisor import Supervisor  # noqa: PLC0415 - the ports must not wait for this
