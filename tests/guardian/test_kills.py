@@ -245,7 +245,9 @@ def test_a_second_service_stops_nothing(services: Services, tmp_path: Path) -> N
     one.watch()
     second = orchestrator("run", str(one.service.file))
     assert second.returncode == 1
-    assert second.stderr.startswith(f"orchestrator: {one.port}: another service (pid {one.service.controller}) has this")
+    assert second.stderr.startswith(
+        f"orchestrator: {one.port}: another service (pid {one.service.controller}) has this"
+    )
     assert len(second.stderr.splitlines()) == 1
     document = json.loads(one.service.file.read_text())
     document["can"]["can0"] = udp_keys()  # two masters on one BMU are noticed: a separate subject
