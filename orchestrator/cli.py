@@ -122,6 +122,7 @@ def _kinds(text: str) -> tuple[int, int]:
 
 def _check(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import check
+    from orchestrator.config.occupied import occupied
     from orchestrator.devices.bus_load import slow_buses
     from orchestrator.workbench.prove.lint import LINT
 
@@ -130,9 +131,15 @@ def _check(arguments: argparse.Namespace) -> int:
         print(finding, file=sys.stderr)
     if any(finding.severity == "error" for finding in findings):
         return 1
+    errors = 0
     for station in filter(None, map(_station, arguments.file)):
+        for error in occupied(station):
+            errors += 1
+            print(error, file=sys.stderr)
         for warning in slow_buses(station):
             print(warning, file=sys.stderr)
+    if errors:
+        return 1
     return prove_all(arguments.file, arguments.jobs) if arguments.exhaustive else 0
 
 

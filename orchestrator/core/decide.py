@@ -19,6 +19,7 @@ from orchestrator.core.parts import changed
 from orchestrator.core.rules import Rules
 from orchestrator.core.safestop import must_stop, stands_by
 from orchestrator.core.sequence import next_command
+from orchestrator.core.shared import shared
 from orchestrator.core.states import ALIKE, ENERGISED, SESSION_ENDS
 from orchestrator.model import (
     STANDBY,
@@ -31,6 +32,7 @@ from orchestrator.model import (
     Decision,
     Effect,
     Precharge,
+    Request,
     Session,
     Setpoint,
     Snapshot,
@@ -60,11 +62,7 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
         memory = changed(memory, stalled_s=now_s)
     f = Facts.of(now_s, snapshot, memory, rules)
     f = update_history(f, now_s - memory.last_s if memory.last_s is not None else 0.0)
-    refusal: Cause | None = None
-    if snapshot.request is not None:
-        heard = handle_request(f.memory, snapshot.request, now_s, snapshot.not_persisted, rules.bay.name)
-        refusal = heard.refusal
-        f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
+    f, refusal = _requested(f, snapshot.request, snapshot.not_persisted)
     known = latches.update(f)
     if known is not f.memory.faults:
         f = f.with_memory(changed(f.memory, faults=known))
@@ -87,6 +85,19 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
         answer=refusal,
     )
     return decision, memory
+
+
+def _requested(f: Facts, request: Request | None, not_persisted: Cause | None) -> tuple[Facts, Cause | None]:
+    """Carry out the request; returns why it was refused, if it was."""
+    refusal: Cause | None = None
+    if request is not None:
+        heard = handle_request(f.memory, request, f.now_s, not_persisted, f.rules.bay.name, at_rest=stands_by(f))
+        refusal = heard.refusal
+        f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
+    if (hold := shared(f.charger)) is not None:
+        f = f.with_memory(changed(f.memory, operator=changed(f.memory.operator, hold=hold)))
+        refusal = hold if request is Request.START else refusal
+    return f, refusal
 
 
 def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Cause, Session | None]:

@@ -34,17 +34,32 @@ class Heard:
     refusal: Cause | None = None
 
 
-def handle_request(
-    memory: Memory, request: Request, now_s: float, not_persisted: Cause | None = None, bay: str = "BAY"
-) -> Heard:
-    """Carry out the request or refuse it; `bay` is the name for commands.
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a refusal must know to say what to do."""
 
+    bay: str  #: the name for commands
+    at_rest: bool
+
+
+def handle_request(
+    memory: Memory,
+    request: Request,
+    now_s: float,
+    not_persisted: Cause | None = None,
+    bay: str = "BAY",
+    *,
+    at_rest: bool = False,
+) -> Heard:
+    """Carry out the request or refuse it.
+
+    `bay` is the name for commands; `at_rest`: the charger is in standby, verified.
     A request that would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never
     is.
     """
     if not_persisted is not None and request in (Request.START, Request.RESET):
         return _refused(memory, Cause.of("not_done", advice="not_persisted", problem=not_persisted))
-    return VERBS[request](memory, now_s, bay)
+    return VERBS[request](memory, now_s, Told(bay, at_rest))
 
 
 def stopped(known: Operator) -> Operator:
@@ -56,11 +71,11 @@ def _refused(memory: Memory, why: Cause) -> Heard:
     return Heard(memory.operator, memory.faults, why)
 
 
-def _stop(memory: Memory, _now_s: float, _bay: str) -> Heard:
+def _stop(memory: Memory, _now_s: float, _told: Told) -> Heard:
     return Heard(stopped(memory.operator), memory.faults)
 
 
-def _pause(memory: Memory, _now_s: float, _bay: str) -> Heard:
+def _pause(memory: Memory, _now_s: float, _told: Told) -> Heard:
     latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
     if latched:  # a reset leads to a start, which would end the pause
         return _refused(memory, Cause.of("reset_first", faults=latched))
@@ -69,10 +84,10 @@ def _pause(memory: Memory, _now_s: float, _bay: str) -> Heard:
     return Heard(changed(memory.operator, paused=True), memory.faults)
 
 
-def _start(memory: Memory, now_s: float, bay: str) -> Heard:
+def _start(memory: Memory, now_s: float, told: Told) -> Heard:
     if memory.state is State.UNCONTROLLABLE:
         return _refused(memory, OUT_OF_CONTROL)
-    if refusals := _refusals(memory, now_s, bay, Request.START):
+    if refusals := _refusals(memory, now_s, told, Request.START):
         return _refused(memory, together(refusals))
     before, known = memory.faults, memory.operator
     faults, _ = latches.release(before, now_s, by_reset=False)
@@ -81,10 +96,10 @@ def _start(memory: Memory, now_s: float, bay: str) -> Heard:
     return Heard(changed(known, hold=None, paused=False), faults)
 
 
-def _reset(memory: Memory, now_s: float, bay: str) -> Heard:
+def _reset(memory: Memory, now_s: float, told: Told) -> Heard:
     if memory.state is State.UNCONTROLLABLE:
         return _refused(memory, OUT_OF_CONTROL)
-    if refusals := _refusals(memory, now_s, bay, Request.RESET):
+    if refusals := _refusals(memory, now_s, told, Request.RESET):
         return _refused(memory, together(refusals))
     before, known = memory.faults, memory.operator
     faults, _ = latches.release(before, now_s, by_reset=True)
@@ -98,18 +113,24 @@ def _reset(memory: Memory, now_s: float, bay: str) -> Heard:
     return Heard(changed(known, hold=hold, resets=resets), faults)
 
 
-def _refusals(memory: Memory, now_s: float, bay: str, request: Request) -> list[Cause]:
+def _refusals(memory: Memory, now_s: float, told: Told, request: Request) -> list[Cause]:
     """Why the request is refused now, and until when: one cause per fault in the way, with what to do about it."""
     return [
-        Cause.of("refused", fault=name, why=why, what=_what(memory, name), then=_first(memory, now_s, bay, name, why))
+        Cause.of(
+            "refused",
+            fault=name,
+            why=why,
+            what=_what(memory, name, at_rest=told.at_rest),
+            then=_first(memory, now_s, told.bay, name, why),
+        )
         for name in refusing(memory, now_s, request)
         if (why := refused_for(memory, now_s, name, request)) is not None
     ]
 
 
-def _what(memory: Memory, name: str) -> Cause:
+def _what(memory: Memory, name: str, *, at_rest: bool) -> Cause:
     row, fault = ROW[name], memory.faults[name]
-    return evidence(row, fault).with_(**dict(times(row, fault)))
+    return evidence(row, fault, at_rest=at_rest).with_(**dict(times(row, fault)))
 
 
 def _first(memory: Memory, now_s: float, bay: str, name: str, why: Cause) -> Cause | None:
@@ -118,7 +139,7 @@ def _first(memory: Memory, now_s: float, bay: str, name: str, why: Cause) -> Cau
     return None if ends.same_as(why) else ends
 
 
-VERBS: Mapping[Request, Callable[[Memory, float, str], Heard]] = {
+VERBS: Mapping[Request, Callable[[Memory, float, Told], Heard]] = {
     Request.START: _start,
     Request.PAUSE: _pause,
     Request.STOP: _stop,

@@ -78,7 +78,8 @@ class BatteryBus:
         A hung driver (slcan opens a stalled adapter for ever) is abandoned after CLOSE_S.
         """
         self._closing.set()
-        self._thread.join(CLOSE_S)
+        if self._thread.is_alive():
+            self._thread.join(CLOSE_S)
 
     def stalled(self, now_s: float) -> bool:
         """True if the loop hangs or has ended. While the bus is closed, with all nodes offline, it may take longer."""

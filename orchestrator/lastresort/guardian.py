@@ -24,11 +24,13 @@ from collections.abc import Sequence
 from functools import partial
 from types import FrameType
 
-from orchestrator.lastresort.bareport import HELD, drop_port
+from orchestrator.lastresort.bareport import drop_port
 from orchestrator.lastresort.contactors import HANGS, Contactors, aside
 from orchestrator.lastresort.lastopen import open_contactor
-from orchestrator.lastresort.laststop import stop_all
+from orchestrator.lastresort.laststop import LastStop
 from orchestrator.lastresort.notify import Systemd, say
+from orchestrator.lastresort.terminal import has_terminal
+from orchestrator.lastresort.unheld import report, stop_unheld, unheld_ports
 
 #: Messages from the controller: one letter, then a name. PORT carries a port's descriptor, CONTACTOR that of a GPIO
 #: line, or none if the controller has released the line.
@@ -64,19 +66,18 @@ FREEZES = (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 
 
 class Guardian:
-    """Watches one controller, already started, over `link` (SOCK_SEQPACKET)."""
+    """Watches one controller, already started, over `link` (SOCK_SEQPACKET); `station` is its file."""
 
-    def __init__(self, child: int, link: socket.socket) -> None:
-        self._child, self._link = os.pidfd_open(child), link
+    def __init__(self, child: int, link: socket.socket, station: str = "") -> None:
+        self._child, self._link, self._station = os.pidfd_open(child), link, station
         self._ports: dict[str, int | None] = {}  # None: the controller has closed it for now
         self._contactors: dict[str, int] = {}
         self._opened = Contactors()
-        self._done = self._ending = self._ready = False
+        self._done = self._ending = self._ready = self._told = False
         self._excused = False  # since the last heartbeat
         self._deadline_s = time.monotonic() + STARTUP_S
         self._systemd = Systemd()
         self._watchdog_s = 0.0  # when systemd was last told that we are alive
-        self._told = False
 
     def run(self) -> int:
         """Wait for the controller to end; returns its exit status, or ACTED if the guardian stopped the chargers."""
@@ -87,22 +88,29 @@ class Guardian:
         if not has_terminal() and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
             signal.signal(signal.SIGHUP, self._pass_on_reload)
         reason = self._watch()
-        if self._done or not self._ports:
-            self._open(OPEN_S)
-            return self._status(END_S)
-        self._signal(signal.SIGKILL)
-        # Do not wait for a gap: the kernel sends what the dying controller wrote first. If that was half a frame, or
-        # the controller was just writing, the second stop follows 20 ms later.
-        on_stop = partial(self._stopping, reason)
-        whys = stop_all(self._ports, VERIFY_S, watch_s=VERIFY_S, on_stop=on_stop, on_round=self._open)
-        running = [name for name, why in whys.items() if why not in ("", HELD)]
-        if running:
-            say(f"guardian: CUT THE MAINS of the chargers on {', '.join(running)}")
-        for name, why in whys.items():
-            say(f"guardian: {name}: {why or 'standby verified'}")
+        if self._done:
+            return self._close()
+        stopping = LastStop(watch_s=VERIFY_S)
+        if self._ports:
+            # Do not wait for a gap: the kernel sends what the dying controller wrote first. If that was half a frame,
+            # or the controller was just writing, the second stop follows 20 ms later.
+            self._signal(signal.SIGKILL)
+            stopping.stop(self._ports)
+        if self._station and not self._ready and not self._ending:  # it has failed before it had opened every port
+            unheld = unheld_ports(self._station, self._ports)
+            self._ports |= unheld
+            stopping.stop(unheld)
+        if not self._ports:
+            return self._close()
+        report(stopping.finish(VERIFY_S, on_stop=partial(self._stopping, reason), on_round=self._open))
         for name in self._contactors:
             say(f"guardian: contactor {name}: {self._opened.became.get(name, HANGS)}")
-        return self._status(KILLED_S) or ACTED
+        self._status(KILLED_S)
+        return ACTED
+
+    def _close(self) -> int:
+        self._open(OPEN_S)
+        return self._status(END_S)
 
     def _pass_on(self, _number: int, _frame: FrameType | None) -> None:
         """Pass the request on: the controller shuts down in an orderly way, and gets the time for it."""
@@ -191,11 +199,8 @@ class Guardian:
     def _open(self, within_s: float = 0.0) -> None:
         """Open every contactor, independently: chargers that obey have stopped by now."""
         for name in self._contactors:
-            self._opened.open(name, partial(self._open_one, name))
+            self._opened.open(name, partial(open_contactor, self._contactors[name]))
         self._opened.wait(within_s)
-
-    def _open_one(self, name: str) -> str:
-        return open_contactor(self._contactors[name])
 
     def _stopping(self, reason: str) -> None:
         """Called after each round of stops; after the first one, there is time to report."""
@@ -222,21 +227,12 @@ class Guardian:
             return ACTED, "does not die"
         if end.si_code == os.CLD_EXITED:
             return end.si_status, f"has ended with status {end.si_status}"
-        early = self._ending and not self._ports  # SIGTERM ended it before it could handle the signal
+        early = self._ending and not self._ports  # SIGTERM ended it before it could handle it
         return 0 if early else ACTED, f"was ended by {signal.Signals(end.si_status).name}"
 
 
-def has_terminal() -> bool:
-    """Whether we were started from a terminal: we end with it. For a service, SIGHUP means reload."""
-    try:
-        os.close(os.open("/dev/tty", os.O_RDONLY))
-    except OSError:
-        return False
-    return True
-
-
 def guard(arguments: Sequence[str], controller: Sequence[str] = CONTROLLER) -> int:
-    """Start the controller (`arguments` go to its command line) and watch over it; returns the exit status."""
+    """Start the controller (`arguments`: the station file) and watch over it; returns the exit status."""
     for number in FREEZES:
         signal.signal(number, signal.SIG_IGN)  # the controller inherits this
     # Ignored and blocked signals are inherited: we might miss the child's end, or a request for ours.
@@ -245,6 +241,10 @@ def guard(arguments: Sequence[str], controller: Sequence[str] = CONTROLLER) -> i
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     theirs.set_inheritable(True)
     command = [sys.executable, *controller, str(theirs.fileno()), *arguments]
-    child = os.posix_spawn(sys.executable, command, os.environ)
+    try:
+        child = os.posix_spawn(sys.executable, command, os.environ)
+    except OSError as error:
+        stop_unheld(arguments[0], error, VERIFY_S)
+        return ACTED
     theirs.close()
-    return Guardian(child, ours).run()
+    return Guardian(child, ours, arguments[0]).run()

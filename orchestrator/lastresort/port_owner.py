@@ -39,6 +39,12 @@ def holder(port: str, but: Iterable[int] = ()) -> Holder:
     return _best([found for pid in _openers(port) if pid not in besides and (found := _process(pid))])
 
 
+def controller_on(port: str) -> int:
+    """The process that has locked this port, if it is another service's controller; 0 if there is none."""
+    pids = [pid for pid in _lockers(port) if pid != os.getpid()]
+    return next((pid for pid in pids if is_orchestrator(words := _words(pid)) and CONTROLLER in words), 0)
+
+
 def control_sockets(ports: Iterable[str]) -> list[str]:
     """The control socket of every orchestrator that has one of these ports open, each once."""
     return services(ports)[0]

@@ -3,7 +3,7 @@
 import errno
 import os
 
-from orchestrator.lastresort.port_owner import Holder, holder
+from orchestrator.lastresort.port_owner import Holder, controller_on, holder
 from orchestrator.model import Cause
 
 #: An adapter that is not there any more.
@@ -33,10 +33,17 @@ def port_cause(error: BaseException, path: str, *, otherwise: str) -> Cause:
     if number is None:
         return Cause.of(otherwise, port=path, error=str(error))
     id_ = _CAUSES.get(number, otherwise)
+    if id_ == "port_busy" and (pid := controller_on(path)):
+        return of_service(path, pid)
     if id_ == "port_taken":
         found = holder(path, (os.getpid(),))
         return Cause.of(id_, port=path, program=program(found) if found.pid else None)
     return Cause.of(id_, port=path, error=errno.errorcode.get(number, str(number)))
+
+
+def of_service(port: str, pid: int) -> Cause:
+    """Another service has this port: unlike a stop tool it keeps it, and commands the charger."""
+    return Cause.of("port_of_service", port=port, pid=pid)
 
 
 def program(found: Holder) -> Cause:

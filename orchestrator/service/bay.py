@@ -74,8 +74,8 @@ class BayRunner:
 
     @property
     def alarm(self) -> Alarm:
-        """How urgently people must look at it."""
-        return self.decision.alarm if self.decision is not None else Alarm.NONE
+        """How urgently people must look at it. Before the first decision its charger may be out of control."""
+        return self.decision.alarm if self.decision is not None else Alarm.DANGER
 
     @property
     def owes(self) -> bool:
@@ -238,7 +238,7 @@ class BayRunner:
 
     def status(self) -> dict[str, object]:
         """The bay's part of the status document."""
-        decision = self.decision or Decision(State.STARTING, Memory().cause)
+        decision = self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER)
         decision = told(decision, self._snapshot, self._memory, self.policy.rules)
         contactor = self._contactor
         return {

@@ -33,8 +33,8 @@ class Console:
 
     def start(self) -> None:
         """Begin to write."""
-        self._before, sys.stderr = sys.stderr, _Stream(self)
         self._thread.start()
+        self._before, sys.stderr = sys.stderr, _Stream(self)
 
     def say(self, text: str) -> None:
         """Queue one or more lines."""
@@ -51,6 +51,8 @@ class Console:
         self._wake.set()
         if self._thread.is_alive():
             self._thread.join(within_s)
+        elif self._said:  # it could not be started: better here than not at all
+            self._run()
         sys.stderr = self._before
 
     def _run(self) -> None:

@@ -2,8 +2,11 @@
 
 Theory of operation. A charger may be running, so whatever it takes to stop it comes first: the station file, then the
 ports. Everything else is imported while the ports stop their chargers; python-can and canopen, which take longest, by
-the threads that need them (`link/can.py`). An error from there on leaves the chargers to the guardian, which has the
-ports by then.
+the threads that need them (`link/can.py`).
+
+A foreseen error ends it with a sentence; if it has touched no port, it tells the guardian that there is nothing to
+stop. After any other error, be it in an import, the guardian stops the chargers: on the ports that it was given, and on
+all that the station file names.
 """
 
 import gc
@@ -12,6 +15,9 @@ import sys
 
 if __name__ == "__main__":
     gc.disable()  # until all is imported: none of it is garbage, and looking for some takes a tenth of that time
+    from orchestrator.lastresort.unforeseen import say_unforeseen
+
+    sys.excepthook = say_unforeseen  # even an import may fail
 
 from orchestrator.config.load import load_station
 from orchestrator.errors import CauseError, ConfigError, OrchestratorError, StartError
@@ -19,6 +25,7 @@ from orchestrator.lastresort.descriptors import raised
 from orchestrator.model import Cause
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.ports import ChargerPorts
+from orchestrator.service.rivals import refuse_shared
 
 #: Open files besides bays and buses: streams, sockets, journal, clients.
 SHARED = 32
@@ -32,6 +39,7 @@ def main(fd: int, station: str) -> int:
         loaded = load_station(station)
         language = loaded.language.value
         check_limit(len(loaded.bays), len(loaded.can))
+        refuse_shared(bay.charger.port for bay in loaded.bays)
         ports = ChargerPorts(loaded, guardian)
         ports.start()
         from orchestrator.service.supervisor import Supervisor  # noqa: PLC0415 - the ports must not wait for this
@@ -46,6 +54,8 @@ def main(fd: int, station: str) -> int:
         print(f"orchestrator: {say(error.cause, language)}", file=sys.stderr)  # noqa: T201
     except OrchestratorError as error:
         print(f"orchestrator: {error}", file=sys.stderr)  # noqa: T201
+    if not guardian.holds:
+        guardian.done()  # no charger was touched: one that runs may be another service's
     return 1
 
 

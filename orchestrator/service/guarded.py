@@ -28,6 +28,7 @@ class GuardianLink:
         self._lock = threading.Lock()
         self._heard_s: float | None = None
         self._gone: Cause | None = None
+        self.holds = False  #: it has been given a port
 
     def beat(self, now_s: float, *, well: bool) -> Cause | None:
         """Say that every loop has turned, if that is so. Why the guardian cannot be relied on any more."""
@@ -40,6 +41,7 @@ class GuardianLink:
 
     def hold(self, port: str, fd: int) -> None:
         """Give the guardian a duplicate descriptor of an open port."""
+        self.holds = True
         self._send(PORT + port.encode(errors="surrogateescape"), fd)
 
     def drop(self, port: str) -> None:

@@ -61,6 +61,7 @@ class Supervisor:
         self._guardian = guardian
         self._beat_s = 0.0
         self._lost: Cause | None = None  # why the guardian cannot be relied on any more
+        self._unable: Cause | None = None  # why it could not begin
         self._ports, self._wake = ports.all, ports.news
         self._ending: Cause | None = None
         boot, kept = boot_id(), station.journal
@@ -121,7 +122,11 @@ class Supervisor:
         signal.signal(signal.SIGHUP, self._on_hangup)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, REQUESTS)
         try:
-            self._begin()
+            try:
+                self._begin()
+            except (RuntimeError, MemoryError, OSError) as error:  # no thread to be had, say; but the ports have theirs
+                self._unable = Cause.of("unable", error=str(error) or repr(error))
+                self._ending = self._ending or self._unable
             while self._ending is None:
                 self._turn()
             self._say(Cause.of("ending", why=self._ending))
@@ -227,7 +232,7 @@ class Supervisor:
         verdicts += [Cause.of("not_written", problem=not_persisted)] if not_persisted is not None else []
         self._say(Cause.of("ended", verdicts=tuple(verdicts)) if verdicts else Cause("ended_well"))
         self._journal.close()
-        return 1 if verdicts or self._lost else 0
+        return 1 if verdicts or self._lost or self._unable else 0
 
     def _unverified(self) -> list[str | Cause]:
         return [*(bay.name for bay in self._bays if not bay.verified), *self._strays.unverified]

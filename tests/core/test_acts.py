@@ -12,7 +12,7 @@ from orchestrator.core.faults import DANGERS, FAULTS, RANK, ROW, Clear, FaultRow
 from orchestrator.core.latches import BACKOFF_S
 from orchestrator.core.memory import FaultMemory, Memory, with_values
 from orchestrator.core.operator import handle_request
-from orchestrator.model import ActiveFault, Effect, Request, State
+from orchestrator.model import ActiveFault, Cause, Effect, Request, State
 from orchestrator.text.catalogue import LANGUAGES, say
 from tests.core.bays import charging
 from tests.core.said import cause, reason_of
@@ -97,6 +97,16 @@ def test_every_fault_ends_with_an_act_and_the_act_is_true(case: Case) -> None:
             for language in LANGUAGES:
                 assert say(ends, language) in say(answer, language)
                 assert case.row.id in say(answer, language)
+
+
+@every_case
+def test_a_refusal_advises_what_the_status_advises_at_that_moment(case: Case) -> None:
+    for at_rest in (False, True):
+        (fault,) = active_faults(case.memory, NOW_S, "bay-1", at_rest=at_rest)
+        for request in (Request.START, Request.RESET):
+            answer = handle_request(case.memory, request, NOW_S, bay="bay-1", at_rest=at_rest).refusal
+            what = answer.param("what") if answer is not None and answer.id == "refused" else None
+            assert not isinstance(what, Cause) or what.advice == fault.told.advice
 
 
 @every_case

@@ -95,8 +95,8 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("G7", "clock jump, suspended machine", "ages are monotonic: jumps of the wall clock do not matter"),
     Entry("G8", "disk full, log blocked", "charging continues, and `status` says so; a lost list of latched faults, "
           "`service/store.py`, holds every bay"),
-    Entry("G9", "two services", "`link/serial.py` (lock of the port), `service/socketfile.py` (socket), "
-          "`service/store.py` (state): the second ends"),
+    Entry("G9", "two services", "`service/rivals.py` (lock of the port), `service/socketfile.py` (socket), "
+          "`service/store.py` (state): the second ends; a port lost to one later, `core/shared.py`: HELD"),
     Entry("G10", "power lost in mid-charge", "`core/persisted.py`: an interrupted charge is not resumed"),
     Entry("P1", "bad policy", "`config/`: refused with every error's line; `run` does not start"),
     Entry("P2", "policy changed while charging", "reread on SIGHUP, adopted by a bay in standby"),

@@ -16,17 +16,19 @@ PORT = ROOM | {f"lastresort.{name}" for name in ("port_owner", "line_settings", 
 LAST_PORT = PORT | {"protocol", "protocol.standby", "lastresort.lastport"}
 LINE = LAST_PORT | {"lastresort.descriptors", "lastresort.lastline"}
 STOP = LINE | {"lastresort.laststop"}
-ALONE = ("port_owner", "line_settings", "notify", "lastopen", "descriptors", "contactors", "estop_options")
+ALONE = ("port_owner", "line_settings", "notify", "lastopen", "descriptors", "contactors", "estop_options", "terminal")
 #: Module → all product modules imported with it.
 LEAN: dict[str, set[str]] = {
     "protocol.standby": {"", "protocol", "protocol.standby"},
     **{f"lastresort.{name}": ROOM | {f"lastresort.{name}"} for name in ALONE},
+    "lastresort.unheld": STOP | {"lastresort.notify", "lastresort.unheld"},
     "lastresort.bareport": PORT,
     "lastresort.lastport": LAST_PORT,
     "lastresort.lastline": LINE,
     "lastresort.laststop": STOP,
     "lastresort.estop": STOP | {f"lastresort.{name}" for name in ("contactors", "estop_options", "estop")},
-    "lastresort.guardian": STOP | {f"lastresort.{name}" for name in ("contactors", "lastopen", "notify", "guardian")},
+    "lastresort.guardian": STOP
+    | {f"lastresort.{name}" for name in ("contactors", "lastopen", "notify", "terminal", "unheld", "guardian")},
 }
 MODULES = {module.name: module for module in product()}
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from orchestrator.lastresort import running_service
-from orchestrator.lastresort.port_owner import CONTROLLER, UNKNOWN, control_sockets, holder
+from orchestrator.lastresort.port_owner import CONTROLLER, UNKNOWN, control_sockets, controller_on, holder
 from orchestrator.lastresort.running_service import UNTOLD, Services
 from tests.guardian.services import answering, bay
 from tests.link.ptys import plugged
@@ -27,6 +27,13 @@ reader, writer = os.pipe()
 if os.fork():
     os._exit(0)
 os.close(reader)
+print(os.getpid(), flush=True)
+sys.stdin.read()
+"""
+LOCKS = """
+import fcntl, os, sys
+fd = os.open(sys.argv[-1], os.O_RDWR | os.O_NOCTTY)
+fcntl.flock(fd, fcntl.LOCK_EX)
 print(os.getpid(), flush=True)
 sys.stdin.read()
 """
@@ -55,6 +62,17 @@ def test_a_lock_that_was_left_to_another_process_is_that_ones(tmp_path: Path) ->
     """The kernel's list of locks names the process that has ended."""
     with plugged(tmp_path / "port") as pty, program(LEAVES_IT, pty.path) as heir:
         assert holder(pty.path, (os.getpid(),)).pid == heir
+
+
+@pytest.mark.parametrize(
+    ("words", "service"),
+    [(("-m", CONTROLLER), True), (("-m", "orchestrator", "estop"), False), (("-m", "orchestrator", "run"), False)],
+)
+def test_only_a_controller_keeps_its_port(tmp_path: Path, words: tuple[str, ...], *, service: bool) -> None:
+    """An emergency stop, or the last stop of a guardian, lets go of it soon."""
+    with plugged(tmp_path / "port") as pty, program(LOCKS, *words, pty.path) as pid:
+        assert holder(pty.path, (os.getpid(),)).ours
+        assert controller_on(pty.path) == (pid if service else 0)
 
 
 def test_a_port_that_is_gone_has_no_holder(tmp_path: Path) -> None:

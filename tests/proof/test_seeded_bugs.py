@@ -71,21 +71,22 @@ def trip_is_no_latch(patch: Patch) -> None:
 def stop_is_not_heard(patch: Patch) -> None:
     hear = operator.handle_request
 
-    def deaf(memory: Memory, asked: Request, *more: Any) -> Heard:
-        return Heard(memory.operator, memory.faults) if asked is Request.STOP else hear(memory, asked, *more)
+    def deaf(memory: Memory, asked: Request, *more: Any, **named: Any) -> Heard:
+        return Heard(memory.operator, memory.faults) if asked is Request.STOP else hear(memory, asked, *more, **named)
 
     patch.setattr(decide_module, "handle_request", deaf)
 
 
 def reset_starts(patch: Patch) -> None:
     def reset(memory: Memory, now_s: float) -> Heard:
-        return operator._start(with_values(memory, hold=None), now_s, "bay-1")
+        return operator._start(with_values(memory, hold=None), now_s, operator.Told("bay-1", at_rest=False))
 
     hear = operator.handle_request
-    patch.setattr(
-        decide_module, "handle_request",
-        lambda m, asked, now_s, *more: reset(m, now_s) if asked is Request.RESET else hear(m, asked, now_s, *more),
-    )  # fmt: skip
+
+    def resets(memory: Memory, asked: Request, now_s: float, *more: Any, **named: Any) -> Heard:
+        return reset(memory, now_s) if asked is Request.RESET else hear(memory, asked, now_s, *more, **named)
+
+    patch.setattr(decide_module, "handle_request", resets)
 
 
 def nobody_qualifies(patch: Patch) -> None:

@@ -11,7 +11,7 @@ from orchestrator.core.decide import decide
 from orchestrator.core.memory import Memory, with_values
 from orchestrator.core.persisted import Persisted
 from orchestrator.core.rules import Rules
-from orchestrator.model import STOP, Cause, Decision, Request, Snapshot, State
+from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 from orchestrator.model.cause import from_plain
 from orchestrator.service import bay as bay_module
 from orchestrator.service.asked import Asked
@@ -83,6 +83,14 @@ def test_the_bmu_is_watched_closely_from_qualifying_until_the_charger_is_verifie
     assert bench.battery.attended == [False, True]
     bench.until(State.HELD)
     assert bench.battery.attended == [False, True, False]
+
+
+def test_before_its_first_decision_a_bay_may_be_in_danger(bench: Bench) -> None:
+    """What was persisted has not been applied yet: the charger may still be running."""
+    assert bench.bay.decision is None
+    assert (bench.bay.alarm, bench.bay.status()["alarm"]) == (Alarm.DANGER, "danger")
+    bench.step()
+    assert (bench.bay.alarm, bench.bay.status()["alarm"]) == (Alarm.NONE, "none")
 
 
 def test_requests_are_answered_one_a_step_in_their_order(bench: Bench) -> None:

@@ -135,6 +135,8 @@ TEXTS: Mapping[str, str] = {
     "first",
     "fault_of_another_version": "another version of this software raised '{fault}', which this one does not know{what:after}",
     "ended_in_charge": "the last run ended in mid-charge: {why}",
+    "port_was_shared": "another service had {port} (pid {pid}): see what it did, and that it does not come back",
+    "port_was_locked": "a program that cannot be found out had the port: see which it was, and that it does not come back",
     "stray_ran": "the station file had no bay on {port} while its charger was running",
     "past_unknown": "{bay} on {port} is not in {file}: nobody knows its past",
     "older_version_ran": "an older version of this service has run {bay} in the meantime: see what is wired where",

@@ -12,6 +12,8 @@ TEXTS: Mapping[str, str] = {
     "again",
     "port_busy": "{port}: in use: another program holds it, or two bays name the same port; close the other one (lsof "
     "shows it)",
+    "port_of_service": "{port}: another service (pid {pid}) has this port and commands its charger: end one of the two, "
+    "or let only one station file name this port",
     "port_forbidden": "{port}: permission denied: add the user that runs this to the group dialout, then log in again",
     "port_not_serial": "{port}: it is no serial port: check the name in the station file (ls -l /dev/serial/by-path)",
     "port_stubborn": "{port}: its driver does not take the charger's settings, {baud} baud 8N1; use another adapter "

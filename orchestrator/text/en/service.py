@@ -8,6 +8,7 @@ TEXTS: Mapping[str, str] = {
     "guardian_died": "the guardian has died",
     "guardian_silent": "the guardian has not answered for {limit_s:g} s",
     "guardian_full": "the guardian takes no messages",
+    "unable": "the service cannot begin ({error}): raise MemoryMax= and TasksMax= of the unit, or ulimit -v and -u",
     "ending": "{why}: stopping every bay",
     "ended": "ended: {verdicts:then}",
     "ended_well": "ended: every charger stands by, verified",

@@ -134,6 +134,8 @@ TEXTS: Mapping[str, str] = {
     "unfinished": "이 서비스가 충전 중에 끝난 뒤 다시 시작되어, 먼저 충전기를 정지해야 했습니다",
     "fault_of_another_version": "이 버전이 알지 못하는 고장 '{fault}'이(가) 다른 버전에서 발생했습니다{what:after}",
     "ended_in_charge": "지난 실행이 충전 중에 끝났습니다: {why}",
+    "port_was_shared": "다른 서비스(pid {pid})가 {port}을(를) 점유했습니다: 무엇을 했는지, 다시 점유하지 않는지 확인하십시오",
+    "port_was_locked": "알 수 없는 프로그램이 포트를 점유했습니다: 어떤 프로그램인지, 다시 점유하지 않는지 확인하십시오",
     "stray_ran": "충전기가 동작하는 동안 스테이션 파일에 {port}의 베이가 없었습니다",
     "past_unknown": "{port}의 {bay}이(가) {file}에 없습니다: 이전 상태를 알 수 없습니다",
     "older_version_ran": "그 사이에 이 서비스의 이전 버전이 {bay}을(를) 운전했습니다: 배선을 확인하십시오",

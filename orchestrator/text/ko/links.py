@@ -10,6 +10,8 @@ TEXTS: Mapping[str, str] = {
     "port_gone": "{port}: 어댑터가 분리되었거나 전원이 꺼졌거나, 다른 프로그램이 이 포트를 읽고 있습니다. 다시 연결하십시오",
     "port_busy": "{port}: 사용 중입니다: 다른 프로그램이 점유하고 있거나 두 베이가 같은 포트를 지정했습니다. 다른 쪽을 "
     "닫으십시오(lsof로 확인)",
+    "port_of_service": "{port}: 다른 서비스(pid {pid})가 이 포트를 점유하고 충전기를 제어합니다: 둘 중 하나를 종료하거나 이 "
+    "포트를 한 스테이션 파일에만 지정하십시오",
     "port_forbidden": "{port}: 권한이 없습니다: 실행 사용자를 dialout 그룹에 추가한 뒤 다시 로그인하십시오",
     "port_not_serial": "{port}: 시리얼 포트가 아닙니다: 스테이션 파일의 이름을 확인하십시오(ls -l /dev/serial/by-path)",
     "port_stubborn": "{port}: 드라이버가 충전기의 설정({baud} baud 8N1)을 받아들이지 않습니다. 다른 어댑터를 "

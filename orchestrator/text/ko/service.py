@@ -8,6 +8,7 @@ TEXTS: Mapping[str, str] = {
     "guardian_died": "감시 프로세스(guardian)가 종료되었습니다",
     "guardian_silent": "감시 프로세스(guardian)가 {limit_s:g}초 동안 응답하지 않았습니다",
     "guardian_full": "감시 프로세스(guardian)가 메시지를 받지 않습니다",
+    "unable": "서비스를 시작할 수 없습니다({error}): unit의 MemoryMax=와 TasksMax= 또는 ulimit -v와 -u를 올리십시오",
     "ending": "{why}: 모든 베이를 정지하고 있습니다",
     "ended": "종료했습니다: {verdicts:then}",
     "ended_well": "종료했습니다: 모든 충전기의 대기 상태를 확인했습니다",
