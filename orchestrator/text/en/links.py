@@ -26,7 +26,7 @@ TEXTS: Mapping[str, str] = {
     "that switches by itself, with rs485: off",
     "port_failed": "{port}: cannot be opened ({error:word})",
     # a charger that answers badly or not at all
-    "charger_no_reply": "{port}: {there is|there was} no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + "
+    "charger_no_reply": "{port}: no answer: check the charger's power, the cable, and for swapped wires (RX and TX, or + "
     "and −)",
     "charger_noise": "{port}: only broken frames {come|came} in: check shield, ground and termination of the cable, and 19200 "
     "8N1",
