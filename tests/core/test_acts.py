@@ -22,7 +22,16 @@ NOW_S = 10_000.0
 #: The causes that name a command, that refuse one, and that say that the fault ends by itself.
 COMMANDS = {"start_now": Request.START, "reset_now": Request.RESET}
 REFUSED = {"refused_while", "refused_until", "refused_for", "reset_locked", "waits_for_fault"}
-BY_ITSELF = {"goes_on_after", "goes_on_in", "goes_on_in_at_the_earliest", "clears_after", "clears_in", "counts_until"}
+BY_ITSELF = {
+    "goes_on_after",
+    "goes_on_after_last",
+    "goes_on_in",
+    "goes_on_in_at_the_earliest",
+    "clears_after",
+    "clears_after_last",
+    "clears_in",
+    "counts_until",
+}
 
 
 @dataclass(frozen=True)
