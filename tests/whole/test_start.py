@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.lastresort.guardian import ACTED
 from orchestrator.protocol.charger import STOP_FRAME
 from tests.waiting import wait_until
 from tests.whole.station import Service, orchestrator, station_document
@@ -122,6 +123,6 @@ def test_a_start_that_fails_later_has_stopped_the_chargers(service: Service, tmp
     with silent_port(tmp_path / "bay-1") as master:
         ended = orchestrator("run", str(service.file))
         read_until(master, STOP_FRAME)
-    assert ended.returncode == 1
+    assert ended.returncode == ACTED
     assert "orchestrator: the control socket /proc/nowhere/socket cannot be opened" in ended.stderr
     assert "guardian: the controller has ended with status 1: stopping the chargers on 1 ports" in ended.stderr

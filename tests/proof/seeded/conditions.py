@@ -16,7 +16,7 @@ CONDITIONS: tuple[Seed, ...] = (
         "neither a setting that reverts nor a current above the step is a fault",
         ("limit goes back",),
         (f"{CORE}checks/obedience.py", "    if step is None or len(recent) < MAX_REVERTS:\n", "    if True:\n"),
-        (f"{CORE}checks/obedience.py", "    if f.amps <= allowed_a:\n", "    if True:\n"),
+        (f"{CORE}checks/obedience.py", "    if f.amps <= limit_a:\n", "    if True:\n"),
     ),
     part(
         "returns of a setting are not counted",
