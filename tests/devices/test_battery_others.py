@@ -144,9 +144,7 @@ def test_each_request_explains_one_answer_and_no_more() -> None:
     say(bench, answer(request), answer(request))
     assert bench.link.implausible == {}
     say(bench, answer(request, FORGED))
-    assert (
-        text_of(bench.link.implausible["temperature_c"]) == "temperature: two answers to one request, 25.0 and 60.0"
-    )
+    assert text_of(bench.link.implausible["temperature_c"]) == "temperature: two answers to one request, 25.0 and 60.0"
 
 
 def test_a_forger_cannot_hide_behind_a_request_of_its_own() -> None:
