@@ -39,8 +39,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     "sim": ("model", "protocol.objects"),
     # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
-        "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
-        "sim.chemistry", "sim.pack", "text",
+        "config", "core", "errors", "keys", "model", "protocol.objects", "service.parts", "service.records",
+        "sim.charger", "sim.chemistry", "sim.pack", "text",
     ),
     "columns": (),
     "show": ("columns", "model", "text"),

@@ -3,6 +3,9 @@
 There are two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and the much
 larger `snapshots` for replay; each has its own share of the space, so that snapshots never displace the reasons. Both
 begin each run of the service with a line `run`: monotonic times of two runs, or two boots, are not comparable.
+
+Events are on disk within half a second, as plain text; finished parts are compressed. Snapshots are compressed as they
+are written, which needs many lines at once: they wait for each other, unless an event shows that they matter.
 """
 
 import json
@@ -17,17 +20,21 @@ from typing import TypeVar
 
 from orchestrator.model import Cause
 from orchestrator.service.disk import code_of
+from orchestrator.service.packed import PackedFile
 from orchestrator.service.records import Line
 from orchestrator.service.rotating import RotatingFile
 
 #: Of these lines; the first had no `run`, the second no causes but sentences, the third sentences in its snapshots.
 VERSION = 4
-#: The events' share of the allowed space.
-EVENTS_SHARE = 0.25
+#: The events' share of the allowed space: they are far fewer.
+EVENTS_SHARE = 0.1
 #: Lines waiting for a disk that does not take them; beyond that the oldest are dropped and counted.
 BACKLOG = 20_000
 #: How long lines are gathered before they are written, and the pause after a disk error.
 GATHER_S = 0.5
+#: How long snapshots wait for more of them, unless there are this many bytes.
+HOLD_S = 5.0
+HOLD_BYTES = 1 << 16
 RETRY_S = 5.0
 #: A disk may be slow, but a writer without progress for this long hangs.
 STALL_S = 30.0
@@ -39,8 +46,9 @@ Entry = tuple[float, float, str, Line]  #: monotonic s, wall s, bay, line
 class Stream:
     """One file's lines waiting for the disk. A gap in them is marked by a line, because what follows lacks its base."""
 
-    def __init__(self, file: RotatingFile, begin: Callable[[], bytes]) -> None:
+    def __init__(self, file: RotatingFile | PackedFile, begin: Callable[[], bytes]) -> None:
         self._file, self._begin = file, begin
+        self.bytes = 0  #: in the waiting lines
         self._lines: deque[bytes] = deque()
         self._ahead: deque[bytes] = deque()  # our own lines, written before them
         self._begun = False
@@ -52,9 +60,10 @@ class Stream:
             self._begun = True
             self._ahead.append(self._begin())
         self._lines.append(line)
+        self.bytes += len(line)
         if len(self._lines) <= BACKLOG:
             return 0
-        self._lines.popleft()
+        self.bytes -= len(self._lines.popleft())
         self.gap = True
         return 1
 
@@ -65,6 +74,7 @@ class Stream:
             self.gap = False
         self._file.take(self._ahead)
         self._file.take(self._lines)
+        self.bytes = 0
 
 
 class Journal:
@@ -90,8 +100,9 @@ class Journal:
         begun = ("run", {"version": VERSION, "boot": boot, "run": f"{boot}/{clock():.6f}"})
         self._streams: dict[bool, Stream] = {
             False: Stream(RotatingFile(directory, "events", events, durable=True), partial(self._own_line, *begun)),
-            True: Stream(RotatingFile(directory, "snapshots", snapshots), partial(self._own_line, *begun)),
+            True: Stream(PackedFile(directory, "snapshots", snapshots), partial(self._own_line, *begun)),
         }
+        self._held_s: float | None = None  # since when snapshots wait for more of them
         self._waiting: deque[Entry] = deque(maxlen=BACKLOG)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
@@ -131,23 +142,37 @@ class Journal:
     def _run(self) -> None:
         while not self._ended.wait(RETRY_S if self._problem else GATHER_S):
             self._turn_s = self._clock()
-            self._write()
+            self._write(all_of_it=False)
         self._write()
 
-    def _write(self) -> None:
+    def _write(self, *, all_of_it: bool = True) -> None:
         if self.lost > self._lost_before:
             for stream in self._streams.values():
                 stream.gap = True
+        news = False
         for entry in _drained(self._waiting):
-            self.lost += self._streams[entry[3][0] == "snapshot"].add(_line(entry))
+            snapshot = entry[3][0] == "snapshot"
+            news = news or not snapshot
+            self.lost += self._streams[snapshot].add(_line(entry))
         self._lost_before = self.lost
         try:
-            for stream in self._streams.values():
-                stream.write(self._own_line("lost", {"lines": self.lost}))
+            self._streams[False].write(self._own_line("lost", {"lines": self.lost}))
+            if all_of_it or news or self._problem or self._due():
+                self._streams[True].write(self._own_line("lost", {"lines": self.lost}))
+                self._held_s = None
             self._settle(None)
         except OSError as error:
             file = str(error.filename or self._directory)
             self._settle(Cause.of("journal_failed", error=code_of(error), file=file))
+
+    def _due(self) -> bool:
+        """Whether the snapshots have waited long enough, or are many."""
+        waiting = self._streams[True].bytes
+        if not waiting:
+            return False
+        if self._held_s is None:
+            self._held_s = self._clock()
+        return waiting >= HOLD_BYTES or self._clock() - self._held_s >= HOLD_S
 
     def _own_line(self, kind: str, fields: dict[str, object]) -> bytes:
         return _line((self._clock(), self._wall(), "", (kind, fields)))

@@ -7,9 +7,7 @@ decision within whose few milliseconds it was written, and if there are several,
 time.
 """
 
-import gzip
 import json
-import zlib
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,17 +17,17 @@ from typing import Any
 from cattrs import Converter
 from cattrs.errors import BaseValidationError
 
-from orchestrator.config.plainfile import check_plain
 from orchestrator.config.station import BayConfig
 from orchestrator.core.memory import Memory, in_parts
 from orchestrator.core.rules import Rules
-from orchestrator.errors import ConfigError, Finding
+from orchestrator.errors import Finding
 from orchestrator.model import Cause, Snapshot
 from orchestrator.model.cause import from_plain
+from orchestrator.service.parts import stream_of
+from orchestrator.workbench.replay.files import files_of, lines_of
 
 #: The records that `decision_lines` writes for a decision.
 EVENTS = frozenset({"transition", "command", "fault", "session", "decision"})
-STREAMS = ("events", "snapshots")
 #: Records that break continuity: another run of the service, lines that the disk did not take.
 BREAKS = frozenset({"run", "lost"})
 #: Why a recording cannot be repeated: it has sentences from an older version, and no causes.
@@ -99,7 +97,7 @@ class _Reader:
 
     def begin(self, path: Path) -> None:
         """Begin another file, which may continue an older one."""
-        self._stream = self._streams.setdefault(str(path.parent / path.name.partition(".")[0]), _Stream())
+        self._stream = self._streams.setdefault(str(path.parent / stream_of(path)), _Stream())
 
     def take(self, path: Path, number: int, text: bytes) -> None:
         """Process one line."""
@@ -172,42 +170,14 @@ def read(paths: Iterable[Path]) -> Record:
     Raises ConfigError for files that cannot be read at all.
     """
     reader = _Reader()
-    for path in _files(paths):
+    for path in files_of(paths):
         reader.begin(path)
-        for number, text in _lines(path, reader):
-            reader.take(path, number, text)
+        for number, text in lines_of(path):
+            if text is None:
+                reader.broken(path, number, "something is torn here")
+            else:
+                reader.take(path, number, text)
     return reader.end()
-
-
-def _files(paths: Iterable[Path]) -> list[Path]:
-    """The files, and the stream files of directories; the oldest first."""
-    found: list[Path] = []
-    for path in paths:
-        inside = [one for name in STREAMS for one in path.glob(f"{name}*.jsonl*")] if path.is_dir() else [path]
-        if not inside:
-            raise _wrong(path, 1, "there is no journal here: events.jsonl and snapshots.jsonl")
-        found += inside
-    return sorted(found, key=_age, reverse=True)
-
-
-def _age(path: Path) -> int:
-    """`NAME.jsonl` is the newest, `NAME.7.jsonl` the oldest."""
-    age = path.name.partition(".")[2].partition(".")[0]
-    return int(age) if age.isdigit() else 0
-
-
-def _lines(path: Path, reader: _Reader) -> Iterator[tuple[int, bytes]]:
-    number = 0
-    try:
-        check_plain(path, "a journal: JSON Lines, or a directory of them")
-        with (gzip.open if path.suffix == ".gz" else open)(path, "rb") as file:
-            for number, text in enumerate(file, 1):
-                if text.strip():
-                    yield number, text
-    except (EOFError, zlib.error) as error:
-        reader.broken(path, number + 1, f"the file ends here: {error}")
-    except OSError as error:
-        raise _wrong(path, number + 1, f"cannot be read: {error.strerror or error}") from None
 
 
 def _line(text: bytes) -> Fields:
@@ -239,7 +209,3 @@ def _near(t_s: float, steps: Sequence[Recorded], times: Sequence[float]) -> Iter
             return
         if t_s <= steps[at].written_s:
             yield steps[at]
-
-
-def _wrong(path: Path, number: int, text: str) -> ConfigError:
-    return ConfigError((Finding(str(path), number, 1, text),))
