@@ -1,7 +1,7 @@
 """One bay in the running service: the devices' newest views in, one decision out, carried out and recorded."""
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import inf
 from time import monotonic, time
@@ -28,7 +28,7 @@ from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
-from orchestrator.service.records import SnapshotRecorder, decision_lines
+from orchestrator.service.records import SnapshotRecorder, TimedLine, decision_lines
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status, contactor_fields
 from orchestrator.service.store import Store
@@ -108,6 +108,14 @@ class BayRunner:
             self._contactor.give_back()
             self._write_down_contactor(self._contactor)
 
+    def end_record(self) -> None:
+        """Record the last decisions, at the end of the service."""
+        self._put_timed(self._recorder.rest() if self._recorder is not None else [])
+
+    def _put_timed(self, lines: Iterable[TimedLine]) -> None:
+        for t_s, line in lines:
+            self._journal.put(self.name, line, t_s)
+
     def ask(self, asked: Asked) -> None:
         """Submit an operator's request; the next decision handles it."""
         self._requests.put(asked)
@@ -163,11 +171,10 @@ class BayRunner:
         clock, lines = WallClock(now_s, time()), []
         if before is None or decision != before:
             lines = list(decision_lines(before, decision, self._language, clock))
-        if self._recorder is not None:
-            recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
-            lines += [recorded] if recorded is not None else []
         for line in lines:
-            self._journal.put(self.name, line)
+            self._journal.put(self.name, line, now_s)
+        if self._recorder is not None:
+            self._put_timed(self._recorder.lines(now_s, snapshot, memory, decision.state, news=bool(lines)))
         if before is None or before.state is not decision.state:
             self._say(self._transition(before, decision, clock))
         self._keep(self._memory, now_s)

@@ -9,7 +9,7 @@ member. Nothing is written twice, which spares an SD card.
 import os
 import zlib
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from orchestrator.service.parts import CHUNK, GZIP, Parts, size_of
@@ -20,33 +20,41 @@ MEMBER = 1 << 18
 
 
 class PackedFile:
-    """`NAME.jsonl.gz` is written; `NAME-000001.jsonl.gz` … are finished parts."""
+    """`NAME.jsonl.gz` is written; `NAME-000001.jsonl.gz` … are finished parts.
 
-    def __init__(self, directory: Path, name: str, max_bytes: int) -> None:
-        self._directory = directory
+    `begin` makes the line with which this run of the service, and each part, begins.
+    """
+
+    def __init__(self, directory: Path, name: str, max_bytes: int, begin: Callable[[], bytes]) -> None:
+        self._directory, self._begin = directory, begin
         self._parts = Parts(directory, name, f"{name}.jsonl.gz", max_bytes)
-        self._looked = False
+        self._mended = self._begun = False
 
     def take(self, lines: deque[bytes]) -> None:
         """Write these lines and remove them; OSError if the disk does not take them: the remaining ones are pending."""
         self._directory.mkdir(parents=True, exist_ok=True, mode=0o750)
-        if not self._looked and not is_whole(self._parts.open):
+        if not self._mended and not is_whole(self._parts.open):
             self._finish()
-        self._looked = True
+        self._mended = True
         while lines:
-            batch = _batch(lines)
-            packer = zlib.compressobj(wbits=GZIP)
-            member = packer.compress(b"".join(batch)) + packer.flush()
-            taken = size_of(self._parts.open)
-            if taken and taken + len(member) > self._parts.size:
+            batch, taken = _batch(lines), size_of(self._parts.open)
+            member, begin = _member(batch), b"" if self._begun else _member([self._begin()])
+            if taken and taken + len(begin) + len(member) > self._parts.size:
                 self._finish()
-            append(self._parts.open, member, durable=False)
+                taken = 0
+            append(self._parts.open, (begin if taken else _member([self._begin()])) + member, durable=False)
+            self._begun = True
             for _ in batch:
                 lines.popleft()
 
     def _finish(self) -> None:
         os.replace(self._parts.open, self._parts.next(".jsonl.gz"))  # noqa: PTH105 - as in disk.py
         self._parts.make_room(self._parts.size)
+
+
+def _member(lines: Iterable[bytes]) -> bytes:
+    packer = zlib.compressobj(wbits=GZIP)
+    return packer.compress(b"".join(lines)) + packer.flush()
 
 
 def _batch(lines: Iterable[bytes]) -> list[bytes]:

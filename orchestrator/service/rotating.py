@@ -7,6 +7,7 @@ power cut at any moment leaves one whole copy at least. What it left half done i
 import os
 import zlib
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,11 +18,14 @@ from orchestrator.service.parts import CHUNK, FRESH, GZIP, Parts, size_of
 class RotatingFile:
     """`NAME.jsonl` is written; `NAME-000001.jsonl.gz` … are finished parts.
 
-    `durable`: lines are on disk once taken, so the reasons for a stop survive a power cut right after it.
+    `begin` makes the line with which this run of the service, and each part, begins. `durable`: lines are on disk once
+    taken, so the reasons for a stop survive a power cut right after it.
     """
 
-    def __init__(self, directory: Path, name: str, max_bytes: int, *, durable: bool = False) -> None:
-        self._directory, self._durable = directory, durable
+    def __init__(
+        self, directory: Path, name: str, max_bytes: int, begin: Callable[[], bytes], *, durable: bool = False
+    ) -> None:
+        self._directory, self._begin, self._durable = directory, begin, durable
         self._parts = Parts(directory, name, f"{name}.jsonl", max_bytes)
         self._mended = False
 
@@ -31,25 +35,25 @@ class RotatingFile:
         if not self._mended:
             self._finish_packing()
         while lines:
-            path = self._parts.open
-            room = self._parts.size - size_of(path)
+            taken = size_of(self._parts.open)
+            begin = self._begin() if not taken or not self._mended else b""
+            room = self._parts.size - taken - len(begin)
             batch: list[bytes] = []
             for line in lines:
-                if len(line) > room and (batch or room < self._parts.size):
+                if len(line) > room and (batch or taken):
                     break
                 batch.append(line)
                 room -= len(line)
             if batch:
-                self._append(path, b"".join(batch))
+                self._append(begin + b"".join(batch))
                 for _ in batch:
                     lines.popleft()
             else:
                 self._rotate()
 
-    def _append(self, path: Path, data: bytes) -> None:
-        if not self._mended:
-            data = _cut_off(path) + data
-        append(path, data, durable=self._durable)
+    def _append(self, data: bytes) -> None:
+        path = self._parts.open
+        append(path, data if self._mended else _cut_off(path) + data, durable=self._durable)
         self._mended = True
 
     def _rotate(self) -> None:

@@ -19,6 +19,7 @@ from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.link.can import CanBus, load
 from orchestrator.model import Cause
+from orchestrator.model.moment import moment
 from orchestrator.service.bay import TICK_S, BayRunner
 from orchestrator.service.boot import boot_id
 from orchestrator.service.closing import close_all
@@ -184,7 +185,8 @@ class Supervisor:
 
     def _run(self, bay: BayRunner) -> None:
         now_s = monotonic()
-        bay.run(now_s, boottime() - now_s)
+        asleep_s, at_s = boottime() - now_s, moment(now_s)
+        bay.run(at_s if at_s > bay.last_s else now_s, asleep_s)  # two decisions of a bay never have the same time
 
     def _beat(self, now_s: float) -> None:
         """Tell the guardian that every loop makes progress; end if the guardian is gone."""
@@ -216,6 +218,7 @@ class Supervisor:
         unverified = self._unverified()
         for bay in self._bays:
             bay.isolate()
+            bay.end_record()
         self._guardian.done()
         not_persisted = self._store.close(KEEP_S)
         for bay in self._bays:

@@ -20,9 +20,10 @@ from hypothesis import strategies as st
 
 from orchestrator.service import journal as journal_module
 from orchestrator.service import rotating
-from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal, rfc3339
+from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal
 from orchestrator.service.packed import PackedFile
 from orchestrator.service.parts import MIN_PART, PARTS, order, size_of
+from orchestrator.service.records import rfc3339
 from orchestrator.service.rotating import RotatingFile
 from orchestrator.workbench.replay.files import files_of, lines_of
 from tests.core.said import say
@@ -107,7 +108,7 @@ def test_it_never_takes_more_than_its_space_and_keeps_the_newest(tmp_path: Path)
             journal.put("bay-1", ("decision", {"n": number, "fill": dice.randbytes(30).hex()}))
             journal.put("bay-1", ("snapshot", {"n": number, "fill": dice.randbytes(200).hex()}))
             if number % 500 == 0:
-                wait_until(lambda: not journal._waiting, what="the writer")
+                wait_until(lambda: not any(journal._waiting.values()), what="the writer")
                 assert sum(taken(tmp_path).values()) <= 1_000_000
     sizes = taken(tmp_path)
     assert sum(sizes.values()) <= 1_000_000
@@ -116,6 +117,10 @@ def test_it_never_takes_more_than_its_space_and_keeps_the_newest(tmp_path: Path)
     for stream in ("events", "snapshots"):
         numbers = [line["n"] for line in read(tmp_path, stream)]
         assert numbers == list(range(numbers[0], 9000))
+
+
+def begin() -> bytes:
+    return b""
 
 
 def taken(directory: Path) -> dict[str, int]:
@@ -128,7 +133,7 @@ def test_a_file_of_any_lines_is_bounded_and_in_order(
     tmp_path_factory: pytest.TempPathFactory, kind: type[RotatingFile | PackedFile], lines: list[bytes]
 ) -> None:
     directory = tmp_path_factory.mktemp("lines")
-    file = kind(directory, "some", PARTS * MIN_PART)
+    file = kind(directory, "some", PARTS * MIN_PART, begin)
     for line in lines:
         left = deque([line])
         file.take(left)
@@ -173,17 +178,17 @@ def test_a_power_cut_while_a_part_is_compressed_loses_nothing(
     calls: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines = [b'{"n":%d}\n' % number for number in range(1000)]
-    RotatingFile(tmp_path, "events", 100_000).take(deque(lines))
+    RotatingFile(tmp_path, "events", 100_000, begin).take(deque(lines))
     cut = False
     with monkeypatch.context() as patched:
         patched.setattr(rotating, "os", Failing(calls))
         try:
-            RotatingFile(tmp_path, "events", 100_000)._rotate()
+            RotatingFile(tmp_path, "events", 100_000, begin)._rotate()
         except CutError:
             cut = True
     assert cut == (calls < 6), "calls that change something"
     assert [text for path in files_of([tmp_path]) for _, text in lines_of(path)] == [line[:-1] for line in lines]
-    RotatingFile(tmp_path, "events", 100_000).take(deque([b'{"n":1000}\n']))
+    RotatingFile(tmp_path, "events", 100_000, begin).take(deque([b'{"n":1000}\n']))
     assert content(tmp_path) == b"".join(lines) + b'{"n":1000}\n'
     assert not list(tmp_path.glob("*.new"))
     plain = [path.name for path in tmp_path.glob("*.jsonl")]
@@ -192,7 +197,7 @@ def test_a_power_cut_while_a_part_is_compressed_loses_nothing(
 
 def members(path: Path, count: int) -> list[bytes]:
     """The members of a file with as many of them, each with three lines."""
-    file, sizes = PackedFile(path.parent, "snapshots", 10_000_000), [0]
+    file, sizes = PackedFile(path.parent, "snapshots", 10_000_000, begin), [0]
     for number in range(count):
         file.take(deque(b'{"n":%d}\n' % (3 * number + one) for one in range(3)))
         sizes.append(size_of(path))
@@ -207,7 +212,7 @@ def test_what_a_power_cut_tears_off_the_open_part_costs_that_member_alone(tmp_pa
         for old in tmp_path.iterdir():
             old.unlink()
         path.write_bytes(b"".join(whole) + last[:left])
-        PackedFile(tmp_path, "snapshots", 10_000_000).take(deque([b'{"n":9}\n']))
+        PackedFile(tmp_path, "snapshots", 10_000_000, begin).take(deque([b'{"n":9}\n']))
         lines = [text for path in files_of([tmp_path]) for _, text in lines_of(path) if text and text.endswith(b"}")]
         assert lines[:6] == [b'{"n":%d}' % number for number in range(6)]
         assert lines[-1] == b'{"n":9}', "what comes after it"
@@ -228,7 +233,7 @@ def test_a_tear_in_the_middle_is_named_and_passed_over(tmp_path: Path, spoilt: b
 def test_parts_of_an_older_version_are_read_first_and_dropped_first(tmp_path: Path) -> None:
     for name, number in (("snapshots.2.jsonl", 0), ("snapshots.1.jsonl", 1), ("snapshots.jsonl", 2)):
         (tmp_path / name).write_text(f'{{"n":{number},"fill":"{"x" * 5000}"}}\n', encoding="utf-8")
-    file, dice = PackedFile(tmp_path, "snapshots", PARTS * MIN_PART), Random(1)
+    file, dice = PackedFile(tmp_path, "snapshots", PARTS * MIN_PART, begin), Random(1)
     for number in range(3, 30):
         file.take(deque([json.dumps({"n": number, "fill": dice.randbytes(1600).hex()}).encode() + b"\n"]))
     numbers = [json.loads(text or b"")["n"] for path in files_of([tmp_path]) for _, text in lines_of(path)]
@@ -242,7 +247,10 @@ def test_the_ordinary_tools_read_it_while_it_is_being_written(tmp_path: Path) ->
         for number in range(9):
             journal.put("bay-1", ("snapshot", {"n": number}))
             journal.put("bay-1", ("transition", {"n": number}))
-            wait_until(lambda: (tmp_path / "snapshots.jsonl.gz").exists() and not journal._waiting, what="the writer")
+            wait_until(
+                lambda: (tmp_path / "snapshots.jsonl.gz").exists() and not any(journal._waiting.values()),
+                what="the writer",
+            )
         wait_until(lambda: len(read(tmp_path, "snapshots")) == 9, what="the last one")
         shown = subprocess.run(["zcat", *tmp_path.glob("snapshots*")], check=True, capture_output=True, text=True)
         found = subprocess.run(["zgrep", "-h", "transition", *tmp_path.glob("*")], capture_output=True, text=True)
@@ -283,7 +291,7 @@ def test_what_a_full_disk_took_in_part_is_taken_back(tmp_path: Path, monkeypatch
 
     path = tmp_path / "some.jsonl"
     path.write_bytes(b"first\n")
-    file = RotatingFile(tmp_path, "some", 1_000_000)
+    file = RotatingFile(tmp_path, "some", 1_000_000, begin)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     lines = deque([b"x" * 100 + b"\n"])
     resource.setrlimit(resource.RLIMIT_FSIZE, (50, before[1]))
@@ -312,23 +320,23 @@ def test_a_directory_that_cannot_be_is_told_and_used_once_it_can(tmp_path: Path)
 def test_what_no_disk_takes_is_dropped_the_oldest_first_and_counted(tmp_path: Path) -> None:
     (tmp_path / "events.jsonl").symlink_to("/dev/full")
     with writing(tmp_path, 100.0) as journal:
-        for number in range(BACKLOG + 5):
+        for number in range(BACKLOG[False] + 5):
             journal.put("bay-1", ("decision", {"n": number}))
             if number % 5000 == 0:
-                wait_until(lambda: not journal._waiting, what="the writer")
+                wait_until(lambda: not any(journal._waiting.values()), what="the writer")
         wait_until(lambda: journal.lost == 5, what="the count")
         (tmp_path / "events.jsonl").unlink()
         wait_until(lambda: not problem(journal), what="the end of the problem")
-    assert read(tmp_path)[-1]["n"] == BACKLOG + 4
+    assert read(tmp_path)[-1]["n"] == BACKLOG[False] + 4
 
 
 def test_nobody_waits_for_a_disk_that_hangs(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "events.jsonl")  # opening it for writing hangs until it has a reader
     with writing(tmp_path) as journal:
         journal.put("bay-1", ("decision", {"n": 0}))
-        wait_until(lambda: not journal._waiting, what="the writer")
+        wait_until(lambda: not any(journal._waiting.values()), what="the writer")
         began_s = time.monotonic()
-        for number in range(BACKLOG + 7):
+        for number in range(BACKLOG[False] + 7):
             journal.put("bay-1", ("decision", {"n": number}))
         assert time.monotonic() - began_s < 2
         assert journal.lost == 7
@@ -402,7 +410,7 @@ def test_a_gap_is_a_line_of_its_own_before_what_has_lost_its_base(tmp_path: Path
     journal = Journal(tmp_path, 100.0, time.monotonic, lambda: WALL_S)
     journal.put("bay-1", ("snapshot", {"n": -1}))
     journal._write()
-    for number in range(BACKLOG + 3):
+    for number in range(BACKLOG[True] + 3):
         journal.put("bay-1", ("snapshot", {"n": number}))
     journal._write()
     lines = every(tmp_path, "snapshots")

@@ -1,14 +1,17 @@
 """The files of a journal, line by line, in the order in which they were written. A tear costs what it hit alone."""
 
+import json
 import zlib
-from collections.abc import Collection, Generator, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Sequence
 from os import SEEK_END
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from orchestrator.config.plainfile import check_plain
 from orchestrator.errors import ConfigError, Finding
-from orchestrator.service.parts import CHUNK, FRESH, GZIP, order
+from orchestrator.service.parts import CHUNK, FRESH, GZIP, order, stream_of
+
+Fields = dict[str, Any]
 
 STREAMS = ("events", "snapshots")
 #: How a gzip member begins.
@@ -30,6 +33,24 @@ def files_of(paths: Iterable[Path]) -> list[Path]:
     return sorted((path for path in found if path.suffix != FRESH and not _also_packed(path, found)), key=order)
 
 
+def journals_of(files: Iterable[Path]) -> list[list[Path]]:
+    """The files of each journal: of each directory, and each file that has both streams."""
+    found: dict[Path, list[Path]] = {}
+    for path in files:
+        found.setdefault(path.parent if stream_of(path) in STREAMS else path, []).append(path)
+    return list(found.values())
+
+
+def from_part(files: Sequence[Path], wall: str) -> Sequence[Path]:
+    """The files without those that end before this time."""
+    begin = 0
+    for number, path in enumerate(files):
+        record = next((record for _, _, record in records_of([path], lambda _: True)), "")
+        if isinstance(record, dict) and record["wall"] <= wall:
+            begin = number
+    return files[begin:]
+
+
 def _also_packed(path: Path, found: Collection[Path]) -> bool:
     """Whether it is a finished part whose compressed copy is there, too: a power cut came before it was removed."""
     return "-" in path.name and path.with_name(f"{path.name}.gz") in found
@@ -43,6 +64,38 @@ def lines_of(path: Path) -> Iterator[tuple[int, bytes | None]]:
             yield from _lines(_unpacked(file) if path.suffix == ".gz" else iter(lambda: file.read(CHUNK), b""))
     except OSError as error:
         raise wrong(path, 1, f"cannot be read: {error.strerror or error}") from None
+
+
+def records_of(files: Iterable[Path], wanted: Callable[[bytes], bool]) -> Iterator[tuple[Path, int, Fields | str]]:
+    """The record in each wanted line of the files, with file and number; or what is wrong with that line."""
+    for path in files:
+        for number, text in lines_of(path):
+            if text is None:
+                yield path, number, "something is torn here"
+            elif wanted(text):
+                try:
+                    yield path, number, _record(text)
+                except (LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:
+                    yield path, number, unreadable(error)
+
+
+def unreadable(error: Exception) -> str:
+    """What is wrong with a line that raised this."""
+    return f"this is no line of a journal: {error!r:.200}"
+
+
+def _record(text: bytes) -> Fields:
+    """One line's object; ValueError for anything else."""
+    line = json.loads(text)
+    if not isinstance(line, dict) or not all(isinstance(line.get(key), str) for key in ("kind", "bay", "wall")):
+        raise ValueError("it has t, wall, bay and kind")
+    line["t"] = float(line["t"])
+    return line
+
+
+def may_continue(path: Path) -> bool:
+    """Whether the oldest file that is left continues one that was dropped."""
+    return order(path) < (1, 0) or (2, 1) < order(path) < (3, 0)
 
 
 def _lines(chunks: Iterable[bytes | None]) -> Iterator[tuple[int, bytes | None]]:
