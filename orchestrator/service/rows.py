@@ -1,9 +1,9 @@
 """Many snapshots of one bay as one record: of each value, the changes. Exact: every float comes back bit for bit.
 
 Theory of operation. A charging bay is decided several times a second, mostly because values have become newer, not
-different. So a record has columns instead of rows. A *time* (`charger.t_s`, `battery.soc_pct.t_s`) is a list with an
-entry for each row: by how many milliseconds it has grown, 0 if it is the same, or, where that would not be exact, the
-time itself as a float; rows after the end of the list change nothing. Any other value is a list of pairs, row and
+different. So a record has columns instead of rows. A *number* (`charger.t_s`, `battery.soc_pct`) is a list with an
+entry for each row: by how many thousandths it has grown, 0 if it is the same, or, where that would not be exact, the
+number itself as a float; rows after the end of the list change nothing. Any other value is a list of pairs, row and
 value. A column that equals an earlier one is that one's name.
 """
 
@@ -24,10 +24,10 @@ OTHERS = tuple(one.name for one in fields(Snapshot) if one.name not in RECORDS a
 #: The columns of a record's fields.
 COLUMNS = {part: {one.name: f"{part}.{one.name}" for one in fields(kind)} for part, kind in RECORDS.items()}
 BATTERY = {name: (f"battery.{name}", f"battery.{name}.t_s") for name in BatteryReading.__slots__}
-#: Columns that are times, beside the battery's.
-TIMES = frozenset(
+#: Columns of numbers, beside the battery's.
+NUMBERS = frozenset(
     column for columns in COLUMNS.values() for name, column in columns.items() if name.endswith(("_t_s", "sent_s"))
-) | {"charger.t_s"}  # fmt: skip
+) | {"charger.t_s", "charger.voltage_v", "charger.current_a"}  # fmt: skip
 
 
 def as_columns(base: Snapshot, rows: Sequence[Row]) -> dict[str, object]:
@@ -47,7 +47,7 @@ class Columns:
 
     def __init__(self) -> None:
         self.at: list[int | float] = []
-        self._times: dict[str, list[int | float | None]] = {}
+        self._numbers: dict[str, list[int | float | None]] = {}
         self._values: dict[str, list[object]] = {}
 
     def row(self, number: int, old: Snapshot, new: Snapshot) -> None:
@@ -65,22 +65,23 @@ class Columns:
         """All columns."""
         found: dict[str, object] = {"at": self.at}
         seen: dict[str, str] = {}
-        for name, times in self._times.items():
-            found[name] = alike = seen.setdefault(str(times), name)
+        for name, entries in self._numbers.items():
+            found[name] = alike = seen.setdefault(str(entries), name)
             if alike == name:
-                found[name] = times
+                found[name] = entries
         return {**found, **self._values}
 
     def _record(self, number: int, part: str, columns: Mapping[str, str], was: Any, now: Any) -> None:  # noqa: ANN401
         if was is None or now is None:
             self._value(number, part, was, now)
-            if now is not None:  # what its times grow from
-                self._time(number, f"{part}.t_s", None, now.t_s)
+            for name, column in columns.items() if now is not None else ():
+                if column in NUMBERS:  # what they grow from
+                    self._number(number, column, None, getattr(now, name))
             return
         for name, column in columns.items():
             old, new = getattr(was, name), getattr(now, name)
-            if column in TIMES:
-                self._time(number, column, old, new)
+            if column in NUMBERS:
+                self._number(number, column, old, new)
             else:
                 self._value(number, column, old, new)
 
@@ -89,19 +90,19 @@ class Columns:
             old, new = getattr(was, name), getattr(now, name)
             if old is new:
                 continue
-            self._value(number, value, old and old.value, new and new.value)
+            self._number(number, value, old and old.value, new and new.value)
             if new is not None:
-                self._time(number, time, old and old.t_s, new.t_s)
+                self._number(number, time, old and old.t_s, new.t_s)
 
     def _value(self, number: int, column: str, old: object, new: object) -> None:
         if not same(old, new):
             self._values.setdefault(column, []).extend((number, bare(new)))
 
-    def _time(self, number: int, column: str, old: float | None, new: float | None) -> None:
-        if old != new:
-            times = self._times.setdefault(column, [])
-            times.extend([0] * (number - len(times)))
-            times.append(None if new is None else grown(old, new))
+    def _number(self, number: int, column: str, old: float | None, new: float | None) -> None:
+        if not same(old, new):
+            entries = self._numbers.setdefault(column, [])
+            entries.extend([0] * (number - len(entries)))
+            entries.append(None if new is None else grown(old, new))
 
 
 def same(old: object, new: object) -> bool:
@@ -112,17 +113,17 @@ def same(old: object, new: object) -> bool:
 
 
 def grown(old: float | None, new: float) -> int | float:
-    """What is written for a time after another: milliseconds where both are whole ones."""
-    before, after = whole_ms(old), whole_ms(new)
+    """What is written for a number after another: thousandths where both are whole ones."""
+    before, after = thousandths(old), thousandths(new)
     return new if before is None or after is None or before == after else after - before
 
 
-def whole_ms(t_s: float | None) -> int | None:
-    """The time in milliseconds, if that is exact."""
-    if t_s is None or not -1e12 < t_s < 1e12:
+def thousandths(number: float | None) -> int | None:
+    """The number in thousandths, if that is exact."""
+    if number is None or not -1e12 < number < 1e12:
         return None
-    ms = round(t_s * 1000)
-    return ms if ms / 1000 == t_s else None
+    whole = round(number * 1000)
+    return whole if whole / 1000 == number and (whole or str(number) == "0.0") else None
 
 
 def bare(value: object) -> object:

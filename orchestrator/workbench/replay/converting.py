@@ -12,7 +12,7 @@ from orchestrator.core.memory import Memory, in_parts
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause, Snapshot
 from orchestrator.model.cause import from_plain
-from orchestrator.service.rows import BATTERY, COLUMNS, OTHERS, RECORDS, TIMES
+from orchestrator.service.rows import BATTERY, COLUMNS, NUMBERS, OTHERS, RECORDS
 from orchestrator.workbench.replay.files import Fields
 
 _CONVERTER = Converter(detailed_validation=False)
@@ -56,7 +56,7 @@ def _makers() -> dict[str, Callable[[Any], Any]]:
     for part, record in RECORDS.items():
         inside = get_type_hints(record)
         found |= {column: _maker(inside[name]) for name, column in COLUMNS[part].items()}
-    return found | {value: float for value, _ in BATTERY.values()}
+    return found
 
 
 MAKERS: Mapping[str, Callable[[Any], Any]] = _makers()
@@ -67,4 +67,4 @@ PLACES: Mapping[str, tuple[str, str]] = {
     **{name: ("", name) for name in (*OTHERS, *RECORDS)},
 }
 BATTERY_TIMES = {time: name for name, (_, time) in BATTERY.items()}
-ALL_TIMES = TIMES | BATTERY_TIMES.keys()
+ALL_NUMBERS = NUMBERS | {column for columns in BATTERY.values() for column in columns}

@@ -6,7 +6,7 @@ from typing import Any
 
 from orchestrator.core.parts import changed, made
 from orchestrator.model import BatteryReading, Measurement, Snapshot
-from orchestrator.workbench.replay.converting import ALL_TIMES, BATTERY_TIMES, MAKERS, PLACES
+from orchestrator.workbench.replay.converting import ALL_NUMBERS, BATTERY_TIMES, MAKERS, PLACES
 from orchestrator.workbench.replay.files import Fields
 
 #: No record has more rows; more would be somebody's joke.
@@ -39,9 +39,9 @@ def _changes(line: Fields, base: Snapshot) -> list[Changes]:
     """What each row changes."""
     rows: list[Changes] = [{} for _ in range(len(line["at"]) + 1)]
     for column, entries in line.items():
-        if column in ALL_TIMES:
+        if column in ALL_NUMBERS:
             steps = line[entries] if entries.__class__ is str else entries
-            last = _time_in(base, column)
+            last = _number_in(base, column)
             for number, step in enumerate(steps):
                 if step != 0 or step.__class__ is float:
                     rows[number][column] = last = _grown(last, step)
@@ -52,10 +52,12 @@ def _changes(line: Fields, base: Snapshot) -> list[Changes]:
     return rows
 
 
-def _time_in(base: Snapshot, column: str) -> float | None:
+def _number_in(base: Snapshot, column: str) -> float | None:
     part, name = PLACES[column]
     value = getattr(getattr(base, part), name, None)
-    return value.t_s if isinstance(value, Measurement) else value
+    if isinstance(value, Measurement):
+        return value.t_s if column in BATTERY_TIMES else value.value
+    return value
 
 
 def _after(base: Snapshot, changes: Changes) -> Snapshot:
