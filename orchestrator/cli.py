@@ -111,6 +111,7 @@ def _kinds(text: str) -> tuple[int, int]:
 def _check(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import check
     from orchestrator.devices.bus_load import slow_buses
+    from orchestrator.service.reach import reach
     from orchestrator.workbench.prove.lint import LINT
 
     findings = check(arguments.file, LINT)
@@ -121,6 +122,8 @@ def _check(arguments: argparse.Namespace) -> int:
     for station in filter(None, map(_station, arguments.file)):
         for warning in slow_buses(station):
             print(warning, file=sys.stderr)
+        for line in reach(station):
+            print(line)
     return prove_all(arguments.file, arguments.jobs) if arguments.exhaustive else 0
 
 
