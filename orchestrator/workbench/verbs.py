@@ -28,6 +28,7 @@ def add_workbench_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentPars
     replay.add_argument("--policy", metavar="FILE", help="show what this policy would have decided, and the effect")
     replay.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
     replay.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
+    replay.add_argument("--jobs", type=int, metavar="N", help="processes (default: for a long journal one per core)")
     replay.set_defaults(run=_replay)
     diagram = verbs.add_parser("diagram", help="draw the state machine")
     diagram.add_argument("--policy", metavar="FILE", help="as used by this policy, with its thresholds")
@@ -122,11 +123,12 @@ def _progress(form: str = "{:.0%}") -> Callable[[str, float], None]:
 
 def _replay(arguments: argparse.Namespace) -> int:
     try:
-        from orchestrator.workbench.replay.verb import replay
+        from orchestrator.workbench.replay.verb import processes_for, replay
     except ImportError as error:
         raise missing("replay", error) from None
     since = since_of(arguments.since, time.time()) if arguments.since else ""
-    return replay(arguments.journal, arguments.policy, arguments.bay, since)
+    jobs = arguments.jobs if arguments.jobs is not None else processes_for(arguments.journal)
+    return replay(arguments.journal, arguments.policy, arguments.bay, since, jobs=jobs)
 
 
 def since_of(text: str, wall_s: float) -> str:

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,10 @@ from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.core import next_transition
 from orchestrator.model import Cause, Request, State
-from orchestrator.service.records import WHOLE_S
+from orchestrator.service.records import MAX_ROWS, WHOLE_S
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import Difference, compare, told
-from orchestrator.workbench.replay.recording import read
+from orchestrator.workbench.replay.recording import Recorded, Recording, read
 from tests.core.said import reason_of
 from tests.service.bench import STEP_S, Bench
 
@@ -98,7 +99,9 @@ def test_a_value_that_was_altered_is_seen_in_the_memory(journal: Path, tmp_path:
     copy = tmp_path / "copy"
     shutil.copytree(journal, copy)
     (path,) = copy.glob("snapshots*.jsonl")
-    text, count = re.subn(r'("charger.current_a":\[\d+,14.0)', r"\g<1>1", path.read_text(encoding="utf-8"), count=1)
+    text, count = re.subn(
+        r'("charger.current_a":\[(?:0,)*)14000', r"\g<1>13900", path.read_text(encoding="utf-8"), count=1
+    )
     assert count == 1
     path.write_text(text, encoding="utf-8")
     wrong = [one.wrong for one in again(read([copy]).bays["bay-1"]) if one.wrong]
@@ -289,6 +292,63 @@ def test_steps_that_no_disk_took_are_a_gap_and_no_other_decision(
     assert [step.memory is not None for step in steps if step.gap] == [True], "it begins anew with the next whole line"
     assert len(steps) == len(before) - sum(len(json.loads(line)["at"]) + 1 for line in missing.splitlines())
     replayed(tmp_path, capsys)
+
+
+def test_a_stretch_of_time_alone_begins_at_a_complete_snapshot(
+    journal: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    steps = read([journal]).bays["bay-1"]
+    second = [step for step in steps if step.memory is not None][1]
+    later = next(step for step in steps if step.at_s > second.at_s + 5)
+    assert main(["replay", str(journal), "--since", later.wall]) == 0
+    said = re.search(r"bay-1: (\d+) decisions in .* all as recorded", capsys.readouterr().out)
+    assert said is not None
+    assert int(said[1]) == sum(step.wall >= later.wall for step in steps)
+    begun = list(Recording([journal], since=later.wall))
+    assert begun[0].memory is not None
+    assert begun[0].wall <= later.wall, "what leads up to it is decided, too"
+    assert main(["replay", str(journal), "--since", "2100-01-01"]) == 1
+    assert "nothing is recorded of bay-1 since 2" in capsys.readouterr().err
+    assert main(["replay", str(journal), "--since", "yesterday"]) == 2
+    assert "--since yesterday: expected 90min, 2h, 7d, 2026-11-28" in capsys.readouterr().err
+
+
+def test_parts_before_that_time_are_not_read(tmp_path: Path) -> None:
+    one_run(tmp_path, 1000.0, MONDAY_S)
+    shutil.move(tmp_path / "snapshots.jsonl.gz", tmp_path / "snapshots-000001.jsonl.gz")
+    one_run(tmp_path, 20.0, MONDAY_S + DAY_S)
+    with (tmp_path / "snapshots-000001.jsonl.gz").open("ab") as file:
+        file.write(b"what nobody looks at")
+    everything, later = Recording([tmp_path]), Recording([tmp_path], since="2026-12-01T00:20:00.000Z")
+    assert {step.wall[:10] for step in everything} == {"2026-11-30", "2026-12-01"}
+    assert list(later) == []
+    assert (everything.broken_count, later.broken_count) == (1, 0)
+
+
+@pytest.mark.parametrize("policy", [[], ["--policy", "long-life-48v"]])
+def test_processes_share_the_bays_of_a_journal(
+    policy: list[str], journal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for path in journal.glob("*.jsonl"):
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        both = (line + line.replace('"bay":"bay-1"', '"bay":"bay-2"', 1) for line in lines)
+        (tmp_path / path.name).write_text("".join(both), encoding="utf-8")
+    outs = []
+    for jobs in ("1", "2"):
+        assert main(["replay", str(tmp_path), "--jobs", jobs, *policy]) == 0
+        outs.append(capsys.readouterr().out)
+    assert outs[0] == outs[1]
+    assert outs[0].count("bay-2: ") == 1
+
+
+def test_however_long_a_journal_is_little_of_it_is_in_memory(journal: Path) -> None:
+    recording, alive = Recording([journal]), list[weakref.ref[Recorded]]()
+    most = 0
+    for step in recording:
+        alive.append(weakref.ref(step))
+        most = max(most, sum(one() is not None for one in alive[-1000:]))
+    assert len(alive) > 2000
+    assert most <= MAX_ROWS + 1, "only those of one line"
 
 
 def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

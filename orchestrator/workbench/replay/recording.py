@@ -26,6 +26,7 @@ from orchestrator.workbench.replay.files import (
     files_of,
     from_part,
     journals_of,
+    lines_of,
     records_of,
     unreadable,
 )
@@ -41,7 +42,7 @@ _BAY = re.compile(rb'"bay":"((?:[^"\\]|\\.)*)","kind":"snapshot"')
 SHOWN_BROKEN = 1000
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, weakref_slot=True)
 class Recorded:
     """One recorded decision. `memory` and `rules` are present where the recording has a complete snapshot."""
 
@@ -81,7 +82,6 @@ class Recording:
     def __init__(self, paths: Iterable[Path], bays: Collection[str] = (), since: str = "") -> None:
         self._journals = journals_of(files_of(paths))
         self._only = frozenset(bays)
-        self.names: set[str] = set()  #: of the bays that have decisions here
         self._bays: dict[str, _Bay] = {}
         self._begin = _earlier(since) if since else ""  # complete snapshots before this are not needed
         self._run = ""
@@ -121,9 +121,7 @@ class Recording:
         found = _BAY.search(text, 0, 200)
         if found is None:
             return True
-        bay = found[1].decode(errors="replace")
-        self.names.add(bay)
-        return not self._only or bay in self._only
+        return not self._only or found[1].decode(errors="replace") in self._only
 
     def _pass_over(self, path: Path, number: int, text: str) -> list[Taken]:
         self._broken(path, number, text)
@@ -202,3 +200,9 @@ def read(paths: Iterable[Path]) -> Record:
         record.bays.setdefault(one.bay, []).append(one)
     record.broken = recording.broken
     return record
+
+
+def bays_in(paths: Iterable[Path]) -> set[str]:
+    """The names of all bays that have decisions there."""
+    lines = (text for path in files_of(paths) if stream_of(path) != "events" for _, text in lines_of(path) if text)
+    return {found[1].decode(errors="replace") for text in lines if (found := _BAY.search(text, 0, 200)) is not None}
