@@ -9,7 +9,7 @@ from orchestrator.service.journal import EVENTS_SHARE
 #: What one charging bay writes for a replay, compressed, by the number of bays on its CAN bus: up to that many, bytes a
 #: second. Many bays on one bus are read more rarely, and their records have more in common. Measured, with a margin, by
 #: `tests/proof/test_journal_size.py`, with volts that never stand still.
-SNAPSHOTS_B_S = ((2, 130.0), (8, 105.0), (128, 80.0))
+SNAPSHOTS_B_S = ((1, 115.0), (8, 90.0), (128, 80.0))
 #: What its events add: some twenty kilobytes for a charge of two hours, written as text and again compressed.
 EVENTS_B_S = 3.0
 DAY_S, MB = 86_400.0, 1_000_000

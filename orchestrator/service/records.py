@@ -44,6 +44,11 @@ def rfc3339(wall_s: float) -> str:
     return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
+def unix_s(wall: str) -> float:
+    """The inverse of `rfc3339`; a time without a zone is local. ValueError for anything else."""
+    return datetime.fromisoformat(wall).timestamp()
+
+
 def decision_lines(
     before: Decision | None, now: Decision, language: str = "en", clock: WallClock | None = None
 ) -> Iterator[EventLine]:

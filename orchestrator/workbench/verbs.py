@@ -8,7 +8,6 @@ import re
 import sys
 import time
 from collections.abc import Callable, Sequence
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -133,12 +132,12 @@ def _replay(arguments: argparse.Namespace) -> int:
 
 def since_of(text: str, wall_s: float) -> str:
     """The beginning that a person named, as the journal writes times; a date and time without a zone is local."""
-    from orchestrator.service.records import rfc3339
+    from orchestrator.service.records import rfc3339, unix_s
 
     if (ago := re.fullmatch(r"(\d{1,6})\s*(min|h|d)", text)) is not None:
         return rfc3339(max(wall_s - int(ago[1]) * AGO_S[ago[2]], 0.0))
     try:
-        return rfc3339(datetime.fromisoformat(text).astimezone().timestamp())
+        return rfc3339(unix_s(text))
     except (ValueError, OverflowError, OSError):
         raise UsageError(f"--since {text}: expected 90min, 2h, 7d, 2026-11-28 or 2026-11-28T06:00") from None
 

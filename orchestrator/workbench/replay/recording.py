@@ -9,7 +9,6 @@ journal is, only the latest snapshot of each bay is in memory.
 import re
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
 from pathlib import Path
 
 from orchestrator.core.memory import Memory
@@ -17,7 +16,7 @@ from orchestrator.core.rules import Rules
 from orchestrator.errors import Finding
 from orchestrator.model import Snapshot
 from orchestrator.service.parts import stream_of
-from orchestrator.service.records import WHOLE_S, rfc3339
+from orchestrator.service.records import WHOLE_S, rfc3339, unix_s
 from orchestrator.workbench.replay.converting import SENTENCES, UNREADABLE, OlderError, snapshot_of, whole
 from orchestrator.workbench.replay.events import Event, Events, run_of
 from orchestrator.workbench.replay.files import (
@@ -70,7 +69,7 @@ class _Bay:
 
 
 def _earlier(since: str) -> str:
-    return rfc3339((datetime.fromisoformat(since) - timedelta(seconds=WHOLE_S + SLACK_S)).timestamp())
+    return rfc3339(max(unix_s(since) - WHOLE_S - SLACK_S, 0.0))
 
 
 class Recording:
@@ -169,7 +168,7 @@ class Recording:
     def _rows(self, line: Fields, bay: _Bay) -> list[Taken]:
         assert bay.snapshot is not None
         rows = list(rows_of(line, bay.snapshot))
-        begin_s = datetime.fromisoformat(line["wall"]).timestamp() - line["t"]
+        begin_s = unix_s(line["wall"]) - line["t"]
         bay.snapshot = rows[-1][1]
         gap, bay.gap = bay.gap, False
         return [
