@@ -116,7 +116,7 @@ class Notebook:
     def say(self, text: str) -> None:
         self.said.append(text)
 
-    def put(self, bay: str, line: Any, t_s: float | None = None) -> None:  # noqa: ARG002 - the real one has it
+    def put(self, bay: str, line: Any, t_s: float | None = None) -> None:
         if line[0] == "fault":
             self.lines.append((bay, line[1]))
 
