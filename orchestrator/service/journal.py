@@ -150,7 +150,7 @@ class Journal:
         news = bool(self._waiting[False])
         for snapshot, waiting in self._waiting.items():
             for entry in _drained(waiting):
-                self.lost += self._streams[snapshot].add(_line(entry))
+                self.lost += self._add(self._streams[snapshot], entry)
         self._lost_before = self.lost
         try:
             self._streams[False].write(self._own_line("lost", {"lines": self.lost}))
@@ -161,6 +161,13 @@ class Journal:
         except OSError as error:
             file = str(error.filename or self._directory)
             self._settle(Cause.of("journal_failed", error=code_of(error), file=file))
+
+    def _add(self, stream: Stream, entry: Entry) -> int:
+        """Add the line; returns how many are lost. A defect in making one costs that line, not the station."""
+        try:
+            return stream.add(_line(entry))
+        except Exception:  # noqa: BLE001 - without its writer the service would end
+            return 1 + stream.add(self._own_line("lost", {"lines": self.lost + 1}))
 
     def _due(self) -> bool:
         """Whether the snapshots have waited long enough, or are many."""

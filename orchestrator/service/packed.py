@@ -33,9 +33,11 @@ class PackedFile:
     def take(self, lines: deque[bytes]) -> None:
         """Write these lines and remove them; OSError if the disk does not take them: the remaining ones are pending."""
         self._directory.mkdir(parents=True, exist_ok=True, mode=0o750)
-        if not self._mended and not is_whole(self._parts.open):
-            self._finish()
-        self._mended = True
+        if not self._mended:
+            if not is_whole(self._parts.open):
+                self._finish()
+            self._parts.make_room(self._parts.size)  # it may have been larger, or an older version's
+            self._mended = True
         while lines:
             batch, taken = _batch(lines), size_of(self._parts.open)
             member, begin = _member(batch), b"" if self._begun else _member([self._begin()])

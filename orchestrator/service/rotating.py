@@ -33,6 +33,7 @@ class RotatingFile:
         """Write these lines and remove them; OSError if the disk does not take them: the remaining ones are pending."""
         self._directory.mkdir(parents=True, exist_ok=True, mode=0o750)
         if not self._mended:
+            self._parts.make_room(self._parts.size)  # it may have been larger, or an older version's
             self._finish_packing()
         while lines:
             taken = size_of(self._parts.open)

@@ -258,6 +258,34 @@ def test_the_ordinary_tools_read_it_while_it_is_being_written(tmp_path: Path) ->
     assert len(found.stdout.splitlines()) == 9
 
 
+def test_a_smaller_space_holds_from_the_start(tmp_path: Path) -> None:
+    for age in range(1, 8):
+        (tmp_path / f"events.{age}.jsonl").write_bytes(b"x" * 20_000)
+        (tmp_path / f"snapshots-{age:06}.jsonl.gz").write_bytes(b"x" * 200_000)
+    journal = Journal(tmp_path, 1.0, time.monotonic, lambda: WALL_S)
+    journal.put("bay-1", ("decision", {}))
+    journal.put("bay-1", ("snapshot", {}))
+    journal._write()
+    assert sum(taken(tmp_path).values()) <= 1_000_000
+    assert (tmp_path / "snapshots-000007.jsonl.gz").exists(), "the newest stay"
+
+
+def test_a_record_that_cannot_be_made_costs_itself_alone(tmp_path: Path) -> None:
+    def fails() -> dict[str, object]:
+        raise RuntimeError("a defect")
+
+    with writing(tmp_path) as journal:
+        journal.put("bay-1", ("snapshot", {"n": 0}))
+        journal.put("bay-1", ("snapshot", fails))
+        journal.put("bay-1", ("snapshot", {"n": 2}))
+        journal.put("bay-1", ("decision", {}))
+        wait_until(lambda: (tmp_path / "snapshots.jsonl.gz").exists(), what="the writer")
+        assert not journal.stalled(time.monotonic())
+        assert journal.lost == 1
+    kinds = [line["kind"] for line in every(tmp_path, "snapshots")]
+    assert kinds == ["run", "snapshot", "lost", "snapshot"], "what follows lacks its base"
+
+
 def test_snapshots_wait_for_each_other_unless_something_happens(tmp_path: Path) -> None:
     now_s = 1000.0
     journal = Journal(tmp_path, 1.0, lambda: now_s, lambda: WALL_S)
