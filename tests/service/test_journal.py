@@ -262,12 +262,14 @@ def test_a_smaller_space_holds_from_the_start(tmp_path: Path) -> None:
     for age in range(1, 8):
         (tmp_path / f"events.{age}.jsonl").write_bytes(b"x" * 20_000)
         (tmp_path / f"snapshots-{age:06}.jsonl.gz").write_bytes(b"x" * 200_000)
+    (tmp_path / "events-000001.jsonl.gz.new").write_bytes(b"half of a part that was dropped meanwhile")
     journal = Journal(tmp_path, 1.0, time.monotonic, lambda: WALL_S)
     journal.put("bay-1", ("decision", {}))
     journal.put("bay-1", ("snapshot", {}))
     journal._write()
     assert sum(taken(tmp_path).values()) <= 1_000_000
     assert (tmp_path / "snapshots-000007.jsonl.gz").exists(), "the newest stay"
+    assert list(tmp_path.glob("*.new")) == []
 
 
 def test_a_record_that_cannot_be_made_costs_itself_alone(tmp_path: Path) -> None:
