@@ -124,6 +124,7 @@ def _check(arguments: argparse.Namespace) -> int:
     from orchestrator.config.load import check
     from orchestrator.config.occupied import occupied
     from orchestrator.devices.bus_load import slow_buses
+    from orchestrator.service.reach import reach
     from orchestrator.workbench.prove.lint import LINT
 
     findings = check(arguments.file, LINT)
@@ -140,6 +141,8 @@ def _check(arguments: argparse.Namespace) -> int:
             print(warning, file=sys.stderr)
     if errors:
         return 1
+        for line in reach(station):
+            print(line)
     return prove_all(arguments.file, arguments.jobs) if arguments.exhaustive else 0
 
 

@@ -40,8 +40,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     "sim": ("model", "protocol.objects"),
     # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
-        "columns", "config", "core", "errors", "keys", "model", "protocol.objects", "service.records", "sim.charger",
-        "sim.chemistry", "sim.pack", "text",
+        "columns", "config", "core", "errors", "keys", "model", "protocol.objects", "service.parts", "service.records",
+        "service.rows", "sim.charger", "sim.chemistry", "sim.pack", "text",
     ),
     "columns": (),
     "show": ("columns", "model", "text"),
@@ -56,7 +56,7 @@ EDGES: dict[str, tuple[str, ...]] = {
 OWNERS: dict[str, tuple[str, ...]] = {
     "can": ("link.can", "sim"),
     "canopen": ("link.can",),
-    "cattrs": ("workbench.replay.recording",),
+    "cattrs": ("workbench.replay.converting",),
     "distributed": ("workbench.simulate.sweep",),
     "durand": ("sim",),
     "gpiod": ("link.gpio",),
@@ -272,6 +272,7 @@ SAID = frozenset({
         "let a bay charge", "stop charging", "clear latched faults", "orchestrator: ", "; to stop chargers without",
     )),
     ("link.gpio", "used by "),  # what `probe` shows of a line
+    ("service.reach", ""),  # what `check` says of a file
     ("service.bay", " in "),  # where an exception of our own was raised
     ("service.where", ""),  # the same
 })  # fmt: skip

@@ -21,6 +21,7 @@ from orchestrator.devices.requester import Requester, Send
 from orchestrator.devices.sdo_client import SdoClient, Verdict
 from orchestrator.devices.whose_answer import whose_answer
 from orchestrator.model import BatteryLink, BatteryReading, Cause
+from orchestrator.model.moment import moment
 from orchestrator.protocol.objects import TpdoEntry
 from orchestrator.protocol.sdo import (
     NmtState,
@@ -215,7 +216,7 @@ class BatteryNode:
             if state == data[0]:  # else it answers another master's node guarding, and is not a heartbeat
                 if (before_s := self._view.link.heartbeat_t_s) is not None:
                     self._setup.interval(now_s - before_s, now_s)
-                self._view.set(heartbeat_t_s=now_s, news=False)
+                self._view.set(heartbeat_t_s=moment(now_s), news=False)
             if self._setup.start_due or self._setup.check_due:
                 self.next_due_s = now_s
 

@@ -9,6 +9,7 @@ from enum import IntEnum
 
 from orchestrator.errors import ProtocolError
 from orchestrator.model import ChargerReading
+from orchestrator.model.moment import moment
 from orchestrator.protocol.charger import (
     STATUS_KINDS,
     Code,
@@ -104,7 +105,7 @@ class Dialogue:
     def _reading(self, frame: Frame) -> ChargerReading | None:
         if self._asked_s is not None:
             try:
-                reading = parse_status(frame, self._kinds, self._asked_s)
+                reading = parse_status(frame, self._kinds, moment(self._asked_s))
             except ProtocolError:
                 pass  # the answer to another request
             else:

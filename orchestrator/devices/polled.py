@@ -6,6 +6,7 @@ from math import inf
 from orchestrator.devices.sdo_client import Key
 from orchestrator.devices.two_answers import TwoAnswers
 from orchestrator.model import Cause, Measurement
+from orchestrator.model.moment import moment
 from orchestrator.protocol.objects import ObjectEntry
 from orchestrator.protocol.sdo import SdoAbort, SdoValue
 from orchestrator.protocol.words import Decoded, decode_word
@@ -42,7 +43,7 @@ class Polled:
 
     def from_tpdo(self, word: int, now_s: float) -> Fields:
         """The fields, from the object's word in a TPDO received at `now_s`."""
-        fields = decode_word(self.entry, word, self.entry.size, now_s)
+        fields = decode_word(self.entry, word, self.entry.size, moment(now_s))
         self.tpdo_t_s, self._tpdo_fields = now_s, fields
         return self._doubted(fields, now_s)
 
@@ -50,7 +51,7 @@ class Polled:
         """The fields, from an SDO answer to the request of `asked_s`. If TPDOs carry them as well, both must agree."""
         self.abort = None
         self.answers.took(reply, asked_s)
-        fields = decode_word(self.entry, reply.value, reply.size, asked_s)
+        fields = decode_word(self.entry, reply.value, reply.size, moment(asked_s))
         if self._tpdo_fields:
             different = self._different(fields)
             self._differed = min(CONFLICTS, self._differed + 1) if different else max(0.0, self._differed - AGREED)

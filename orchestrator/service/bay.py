@@ -1,7 +1,7 @@
 """One bay in the running service: the devices' newest views in, one decision out, carried out and recorded."""
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import inf
 from time import monotonic, time
@@ -20,7 +20,7 @@ from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
-from orchestrator.service.records import SnapshotRecorder, decision_lines
+from orchestrator.service.records import SnapshotRecorder, TimedLine, decision_lines, transition
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status, contactor_fields, told
 from orchestrator.service.store import Store
@@ -48,7 +48,7 @@ class BayRunner:
         language: str = "en",
     ) -> None:
         self.name, self.place = bay.name, Place.of(bay)
-        self.due_s = -inf  #: when the next decision is due at the latest
+        self.last_s, self.due_s = 0.0, -inf  #: when the last decision was made, and when the next is due at the latest
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
         self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
@@ -103,10 +103,15 @@ class BayRunner:
             self._waits = Cause.of("ended_in_charge", why=why)
 
     def isolate(self) -> None:
-        """Open the contactor for good, at the end of the service, and record that."""
+        """Open the contactor for good, at the end of the service, and record that and the last decisions."""
+        self._put_timed(self._recorder.rest() if self._recorder is not None else [])
         if self._contactor is not None:
             self._contactor.give_back()
             self._write_down_contactor(self._contactor)
+
+    def _put_timed(self, lines: Iterable[TimedLine]) -> None:
+        for t_s, line in lines:
+            self._journal.put(self.name, line, t_s)
 
     def ask(self, asked: Asked) -> None:
         """Submit an operator's request; the next decision handles it."""
@@ -140,7 +145,7 @@ class BayRunner:
         internal = f"{error!r} in {where.name}, line {where.lineno}"
         if internal != self._internal:
             self._say(Cause.of("bay_internal", bay=self.name, error=internal))
-        self._internal, self.due_s = internal, now_s + TICK_S
+        self._internal, self.last_s, self.due_s = internal, now_s, now_s + TICK_S
         try:
             snapshot, memory = replace(self._snapshot, request=request), self._memory
             memory = memory or self._store.past(self.place).memory(now_s)
@@ -161,7 +166,7 @@ class BayRunner:
         self._starts.follow(self.name, now_s, self._memory, snapshot)
         # In a quiet state no current flows and none is about to: what a BMU reports changes slowly.
         closely = decision.state not in QUIET
-        self.decision, self._internal = decision, ""
+        self.decision, self._internal, self.last_s = decision, "", now_s
         self.due_s = now_s + (TICK_S if closely or decision.command is not None else QUIET_TICK_S)
         if self._closely is not closely:
             self._closely = closely
@@ -169,20 +174,13 @@ class BayRunner:
         clock, lines = WallClock(now_s, time()), []
         if before is None or decision != before:
             lines = list(decision_lines(before, decision, self._language, clock))
-        if self._recorder is not None:
-            recorded = self._recorder.line(now_s, snapshot, memory, decision.state, news=bool(lines))
-            lines += [recorded] if recorded is not None else []
         for line in lines:
-            self._journal.put(self.name, line)
+            self._journal.put(self.name, line, now_s)
+        if self._recorder is not None:
+            self._put_timed(self._recorder.lines(now_s, snapshot, memory, decision.state, news=bool(lines)))
         if before is None or before.state is not decision.state:
-            self._say(self._transition(before, decision, clock))
+            self._say(transition(self.name, before, decision, clock))
         self._keep(self._memory, now_s)
-
-    def _transition(self, before: Decision | None, now: Decision, clock: WallClock) -> Cause:
-        state, reason = now.state.value, clock.told(now.cause)
-        if before is None:
-            return Cause.of("bay_begins", bay=self.name, state=state, reason=reason)
-        return Cause.of("bay_goes", bay=self.name, before=before.state.value, state=state, reason=reason)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """Everything known about the bay now."""

@@ -3,6 +3,9 @@
 There are two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and the much
 larger `snapshots` for replay; each has its own share of the space, so that snapshots never displace the reasons. Both
 begin each run of the service with a line `run`: monotonic times of two runs, or two boots, are not comparable.
+
+Events are on disk within half a second, as plain text; finished parts are compressed. Snapshots are compressed as they
+are written, which needs many lines at once: they wait for each other, unless an event shows that they matter.
 """
 
 import json
@@ -10,24 +13,28 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from orchestrator.model import Cause
 from orchestrator.service.disk import code_of
-from orchestrator.service.records import Line
+from orchestrator.service.packed import PackedFile
+from orchestrator.service.records import Line, rfc3339
 from orchestrator.service.rotating import RotatingFile
 
-#: Of these lines; the first had no `run`, the second no causes but sentences, the third sentences in its snapshots.
-VERSION = 4
-#: The events' share of the allowed space.
-EVENTS_SHARE = 0.25
-#: Lines waiting for a disk that does not take them; beyond that the oldest are dropped and counted.
-BACKLOG = 20_000
+#: Of these lines; the first had no `run`, the second no causes but sentences, the third sentences in its snapshots, the
+#: fourth a line for each decision.
+VERSION = 5
+#: The events' share of the allowed space: they are far fewer.
+EVENTS_SHARE = 0.1
+#: Lines waiting for a disk that does not take them; beyond that the oldest are dropped and counted. Snapshots (True)
+#: are large: each line holds the readings of seconds.
+BACKLOG = {False: 20_000, True: 2_000}
 #: How long lines are gathered before they are written, and the pause after a disk error.
 GATHER_S = 0.5
+#: How long snapshots wait for more of them, unless there are this many bytes.
+HOLD_S = 5.0
+HOLD_BYTES = 1 << 16
 RETRY_S = 5.0
 #: A disk may be slow, but a writer without progress for this long hangs.
 STALL_S = 30.0
@@ -39,22 +46,20 @@ Entry = tuple[float, float, str, Line]  #: monotonic s, wall s, bay, line
 class Stream:
     """One file's lines waiting for the disk. A gap in them is marked by a line, because what follows lacks its base."""
 
-    def __init__(self, file: RotatingFile, begin: Callable[[], bytes]) -> None:
-        self._file, self._begin = file, begin
+    def __init__(self, file: RotatingFile | PackedFile, backlog: int) -> None:
+        self._file, self._backlog = file, backlog
+        self.bytes = 0  #: in the waiting lines
         self._lines: deque[bytes] = deque()
         self._ahead: deque[bytes] = deque()  # our own lines, written before them
-        self._begun = False
         self.gap = False  #: lines are missing before the first waiting one
 
     def add(self, line: bytes) -> int:
         """Add a line; returns how many are lost because of it."""
-        if not self._begun:
-            self._begun = True
-            self._ahead.append(self._begin())
         self._lines.append(line)
-        if len(self._lines) <= BACKLOG:
+        self.bytes += len(line)
+        if len(self._lines) <= self._backlog:
             return 0
-        self._lines.popleft()
+        self.bytes -= len(self._lines.popleft())
         self.gap = True
         return 1
 
@@ -65,6 +70,7 @@ class Stream:
             self.gap = False
         self._file.take(self._ahead)
         self._file.take(self._lines)
+        self.bytes = 0
 
 
 class Journal:
@@ -84,15 +90,16 @@ class Journal:
         say: Callable[[Cause], None] = lambda _: None,
     ) -> None:
         self._clock, self._wall, self._say = clock, wall, say
-        self._directory = directory
+        self._directory, self._boot, self._run_name = directory, boot, ""
         total = int(max_mb * 1_000_000)
         events, snapshots = int(total * EVENTS_SHARE), int(total * (1 - EVENTS_SHARE))
-        begun = ("run", {"version": VERSION, "boot": boot, "run": f"{boot}/{clock():.6f}"})
-        self._streams: dict[bool, Stream] = {
-            False: Stream(RotatingFile(directory, "events", events, durable=True), partial(self._own_line, *begun)),
-            True: Stream(RotatingFile(directory, "snapshots", snapshots), partial(self._own_line, *begun)),
+        files: dict[bool, RotatingFile | PackedFile] = {
+            False: RotatingFile(directory, "events", events, self._begin, durable=True),
+            True: PackedFile(directory, "snapshots", snapshots, self._begin),
         }
-        self._waiting: deque[Entry] = deque(maxlen=BACKLOG)
+        self._streams = {kind: Stream(file, BACKLOG[kind]) for kind, file in files.items()}
+        self._held_s: float | None = None  # since when snapshots wait for more of them
+        self._waiting: dict[bool, deque[Entry]] = {snapshot: deque(maxlen=most) for snapshot, most in BACKLOG.items()}
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
         self._turn_s = clock()
@@ -104,11 +111,13 @@ class Journal:
         """Begin to write."""
         self._thread.start()
 
-    def put(self, bay: str, line: Line) -> None:
-        """Add a line with the present time."""
-        if len(self._waiting) == BACKLOG:
+    def put(self, bay: str, line: Line, t_s: float | None = None) -> None:
+        """Add a line about this time; by default the present."""
+        waiting = self._waiting[line[0] == "snapshot"]
+        if len(waiting) == waiting.maxlen:
             self.lost += 1
-        self._waiting.append((self._clock(), self._wall(), bay, line))
+        now_s, wall_s = self._clock(), self._wall()
+        waiting.append((now_s, wall_s, bay, line) if t_s is None else (t_s, wall_s - (now_s - t_s), bay, line))
 
     def problem(self, now_s: float) -> Cause | None:
         """Why nothing is being written; None while all is well."""
@@ -131,23 +140,48 @@ class Journal:
     def _run(self) -> None:
         while not self._ended.wait(RETRY_S if self._problem else GATHER_S):
             self._turn_s = self._clock()
-            self._write()
+            self._write(all_of_it=False)
         self._write()
 
-    def _write(self) -> None:
+    def _write(self, *, all_of_it: bool = True) -> None:
         if self.lost > self._lost_before:
             for stream in self._streams.values():
                 stream.gap = True
-        for entry in _drained(self._waiting):
-            self.lost += self._streams[entry[3][0] == "snapshot"].add(_line(entry))
+        news = bool(self._waiting[False])
+        for snapshot, waiting in self._waiting.items():
+            for entry in _drained(waiting):
+                self.lost += self._add(self._streams[snapshot], entry)
         self._lost_before = self.lost
         try:
-            for stream in self._streams.values():
-                stream.write(self._own_line("lost", {"lines": self.lost}))
+            self._streams[False].write(self._own_line("lost", {"lines": self.lost}))
+            if all_of_it or news or self._problem or self._due():
+                self._streams[True].write(self._own_line("lost", {"lines": self.lost}))
+                self._held_s = None
             self._settle(None)
         except OSError as error:
             file = str(error.filename or self._directory)
             self._settle(Cause.of("journal_failed", error=code_of(error), file=file))
+
+    def _add(self, stream: Stream, entry: Entry) -> int:
+        """Add the line; returns how many are lost. A defect in making one costs that line, not the station."""
+        try:
+            return stream.add(_line(entry))
+        except Exception:  # noqa: BLE001 - without its writer the service would end
+            return 1 + stream.add(self._own_line("lost", {"lines": self.lost + 1}))
+
+    def _due(self) -> bool:
+        """Whether the snapshots have waited long enough, or are many."""
+        waiting = self._streams[True].bytes
+        if not waiting:
+            return False
+        if self._held_s is None:
+            self._held_s = self._clock()
+        return waiting >= HOLD_BYTES or self._clock() - self._held_s >= HOLD_S
+
+    def _begin(self) -> bytes:
+        """The line with which this run, and each part of a file, begins."""
+        self._run_name = self._run_name or f"{self._boot}/{self._clock():.6f}/{self._wall():.0f}"
+        return self._own_line("run", {"version": VERSION, "boot": self._boot, "run": self._run_name})
 
     def _own_line(self, kind: str, fields: dict[str, object]) -> bytes:
         return _line((self._clock(), self._wall(), "", (kind, fields)))
@@ -168,10 +202,6 @@ def _drained(waiting: "deque[T]") -> Iterator[T]:
 def _line(entry: Entry) -> bytes:
     t_s, wall_s, bay, (kind, fields) = entry
     head = {"t": t_s, "wall": rfc3339(wall_s), "bay": bay, "kind": kind}
-    text = json.dumps({**head, **fields}, ensure_ascii=False, separators=(",", ":")) + "\n"
+    said = fields() if callable(fields) else fields
+    text = json.dumps({**head, **said}, ensure_ascii=False, separators=(",", ":")) + "\n"
     return text.encode(errors="backslashreplace")  # file names need not be valid text; the result is still JSON
-
-
-def rfc3339(wall_s: float) -> str:
-    """A wall-clock time in UTC, for people and programs."""
-    return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")

@@ -1,49 +1,57 @@
 """Turns decisions into the journal's lines. Pure; the journal writes them."""
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, fields, is_dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, fields
+from datetime import UTC, datetime
+from functools import partial
 
 from orchestrator.config.station import BayConfig
 from orchestrator.core.memory import Memory, side_by_side
 from orchestrator.core.states import QUIET
 from orchestrator.model import (
     ActiveFault,
-    BatteryLink,
-    BatteryReading,
     Cause,
-    ChargerLink,
-    ChargerReading,
     Command,
     CurrentStep,
     Decision,
-    Measurement,
     Session,
     Snapshot,
     State,
 )
 from orchestrator.model.cause import plain
+from orchestrator.service.rows import Row, as_columns, bare
 from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import say
 
-Line = tuple[str, dict[str, object]]  #: kind, fields
+Fields = Mapping[str, object]
+Line = tuple[str, Fields | Callable[[], Fields]]  #: kind, fields or what makes them when the line is written
+EventLine = tuple[str, dict[str, object]]
+TimedLine = tuple[float, Line]  #: the monotonic time of what it records
 
 #: The parts of a record that are texts for people, beside the cause.
 TEXTS = frozenset({"reason", "text", "rule", "result"})
-#: The parts of a snapshot that concern this service and its contactor.
-OURS = (
-    "internal", "late_s", "slept_s", "not_persisted", "ending", "connected", "contactor_problem", "waits", "moves",
-    "running_persisted",
-)  # fmt: skip
-#: What of a reading or a link may have causes in it; the rest is written as it is.
-DEEP = frozenset({Cause, tuple, dict})
-#: The longest interval, in lines, between complete snapshots with memory and rules: a reader can begin at each of them.
-WHOLE_EVERY = 250
+#: The longest interval between complete snapshots with memory and rules: a reader can begin at each of them.
+WHOLE_S = 600.0
+#: Decisions share a line for this long at most, …
+GATHER_S = 5.0
+#: … and so many of them.
+MAX_ROWS = 250
+
+
+def rfc3339(wall_s: float) -> str:
+    """A wall-clock time in UTC, for people and programs."""
+    return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def unix_s(wall: str) -> float:
+    """The inverse of `rfc3339`; a time without a zone is local. ValueError for anything else."""
+    return datetime.fromisoformat(wall).timestamp()
 
 
 def decision_lines(
     before: Decision | None, now: Decision, language: str = "en", clock: WallClock | None = None
-) -> Iterator[Line]:
+) -> Iterator[EventLine]:
     """What has changed from one decision to the next, for programs and, in `language`, for people.
 
     A line has its own time, on both clocks: only sentences need the time of day (`clock`).
@@ -94,7 +102,15 @@ def _fault_fields(fault: ActiveFault, event: str, cause: Cause, language: str) -
     return {"id": fault.id, "event": event, "effect": fault.effect.name, **said}
 
 
-def _fault_lines(before: Decision | None, now: Decision, language: str) -> Iterator[Line]:
+def transition(bay: str, before: Decision | None, now: Decision, clock: WallClock) -> Cause:
+    """A change of state as the service's log says it."""
+    state, reason = now.state.value, clock.told(now.cause)
+    if before is None:
+        return Cause.of("bay_begins", bay=bay, state=state, reason=reason)
+    return Cause.of("bay_goes", bay=bay, before=before.state.value, state=state, reason=reason)
+
+
+def _fault_lines(before: Decision | None, now: Decision, language: str) -> Iterator[EventLine]:
     old = {fault.id: fault for fault in before.faults} if before else {}
     new = {fault.id: fault for fault in now.faults}
     for name, fault in new.items():
@@ -106,7 +122,9 @@ def _fault_lines(before: Decision | None, now: Decision, language: str) -> Itera
             yield "fault", _fault_fields(fault, "cleared", was, language)
 
 
-def _session_lines(before: Decision | None, now: Decision, language: str, clock: WallClock | None) -> Iterator[Line]:
+def _session_lines(
+    before: Decision | None, now: Decision, language: str, clock: WallClock | None
+) -> Iterator[EventLine]:
     was = before.session if before and before.session and not before.session.result else None
     if now.session is None:
         return
@@ -132,89 +150,49 @@ def session_fields(session: Session, language: str = "en", clock: WallClock | No
 
 
 class SnapshotRecorder:
-    """Turns the decisions of one bay into `snapshot` lines: some complete, the others differences from the line before.
+    """Turns the decisions of one bay into `snapshot` lines: some complete, the others with the changes since the last.
 
-    In a quiet state nothing is written until something happens; then a complete line starts over. A line has the whole
-    input of a decision: repeating it gives the same result.
+    In a quiet state nothing is written until something happens; then a complete line starts over. The lines have the
+    whole input of every decision: repeating it gives the same result. What is expensive is left to whoever writes them.
     """
 
     def __init__(self, bay: BayConfig) -> None:
-        self._since_whole = 0
+        self._rows: list[Row] = []  # the decisions since the last line
+        self._base = Snapshot()  # the snapshot before them
         self.begin(bay)
 
     def begin(self, bay: BayConfig) -> None:
         """Start over with a complete line, with the policy now in force."""
         self._config = json.loads(json.dumps(asdict(bay), default=str))
-        self._last: Snapshot | None = None
+        self._whole_s: float | None = None  # when the last complete line was written; None: one is due
 
-    def line(self, now_s: float, snapshot: Snapshot, memory: Memory, state: State, *, news: bool) -> Line | None:
-        """The line for a decision made at `now_s` with `snapshot` and `memory`; None if nothing is to be recorded.
+    def lines(self, now_s: float, snapshot: Snapshot, memory: Memory, state: State, *, news: bool) -> list[TimedLine]:
+        """The lines due after a decision made at `now_s` with `snapshot` and `memory`.
 
-        `state` is the resulting state, `news` is whether there were any `decision_lines`.
+        `state` is the resulting state, `news` is whether there were any `decision_lines`: what led to them is written
+        with them.
         """
         if state in QUIET and not news and snapshot.request is None:
-            self._last = None
-            return None
-        said: dict[str, object] = {"at_s": now_s}
-        if self._last is None or self._since_whole >= WHOLE_EVERY:
-            said |= {"whole": True, **_record(snapshot), "memory": _bare(side_by_side(memory)), "config": self._config}
-            self._since_whole = 0
-        else:
-            said |= _difference(self._last, snapshot)
-            self._since_whole += 1
-        self._last = snapshot
-        return "snapshot", said
+            self._whole_s = None
+            return self.rest()
+        if self._whole_s is None or now_s - self._whole_s >= WHOLE_S:
+            lines = self.rest()
+            lines.append((now_s, ("snapshot", partial(_whole, snapshot, memory, self._config))))
+            self._base, self._whole_s = snapshot, now_s
+            return lines
+        self._rows.append((now_s, snapshot))
+        due = news or now_s - self._rows[0][0] >= GATHER_S or len(self._rows) >= MAX_ROWS
+        return self.rest() if due else []
+
+    def rest(self) -> list[TimedLine]:
+        """The line for the decisions since the last one, if there were any."""
+        if not self._rows:
+            return []
+        rows, base = self._rows, self._base
+        self._rows, self._base = [], rows[-1][1]
+        return [(rows[0][0], ("snapshot", partial(as_columns, base, rows)))]
 
 
-def _difference(old: Snapshot, new: Snapshot) -> dict[str, object]:
-    """Only the parts that differ; of the battery's values only the new ones."""
-    said: dict[str, object] = {}
-    if new.charger is not old.charger:
-        said["charger"] = _plain(new.charger)
-    if new.charger_link is not old.charger_link and new.charger_link != old.charger_link:
-        said["charger_link"] = _record(new.charger_link)
-    if new.battery is not old.battery:
-        said["battery"] = _new_values(old.battery, new.battery)
-    if new.battery_link is not old.battery_link:
-        said["battery_link"] = _plain(new.battery_link)
-    if new.request is not old.request:
-        said["request"] = new.request
-    for name in OURS:
-        if getattr(new, name) != getattr(old, name):
-            value = getattr(new, name)
-            said[name] = _bare(value)
-    return said
-
-
-def _new_values(old: BatteryReading, new: BatteryReading) -> dict[str, object]:
-    values: dict[str, object] = {}
-    for name in BatteryReading.__slots__:
-        value = getattr(new, name)
-        if value is not getattr(old, name):
-            values[name] = _plain(value)
-    return values
-
-
-def _plain(record: ChargerReading | BatteryLink | Measurement | None) -> dict[str, object] | None:
-    """A record without records in it but causes. Far faster than `asdict`, and this is done for every reading."""
-    if record is None:
-        return None
-    return {
-        name: _bare(value) if (value := getattr(record, name)).__class__ in DEEP else value for name in record.__slots__
-    }
-
-
-def _record(record: Snapshot | ChargerLink) -> dict[str, object]:
-    """The same for a record with others in it, however deep."""
-    return {one.name: _bare(getattr(record, one.name)) for one in fields(record)}
-
-
-def _bare(value: object) -> object:
-    """A value with the records and causes in it as JSON has them."""
-    if isinstance(value, Cause):
-        return plain(value)
-    if isinstance(value, tuple):
-        return [_bare(one) for one in value]
-    if is_dataclass(value) and not isinstance(value, type):
-        return {one.name: _bare(getattr(value, one.name)) for one in fields(value)}
-    return {name: _bare(one) for name, one in value.items()} if isinstance(value, Mapping) else value
+def _whole(snapshot: Snapshot, memory: Memory, config: object) -> dict[str, object]:
+    said = {one.name: bare(getattr(snapshot, one.name)) for one in fields(snapshot)}
+    return {"whole": True, **said, "memory": bare(side_by_side(memory)), "config": config}

@@ -19,6 +19,7 @@ from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.link.can import CanBus
 from orchestrator.model import Cause
+from orchestrator.model.moment import moment
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.boot import boot_id
 from orchestrator.service.closing import close_all
@@ -191,7 +192,8 @@ class Supervisor:
 
     def _run(self, bay: BayRunner) -> None:
         now_s = monotonic()
-        bay.run(now_s, boottime() - now_s)
+        asleep_s, at_s = boottime() - now_s, moment(now_s)
+        bay.run(at_s if at_s > bay.last_s else now_s, asleep_s)  # two decisions of a bay never have the same time
 
     def _beat(self, now_s: float) -> None:
         """Tell the guardian that every loop makes progress; end if the guardian is gone."""

@@ -4,6 +4,7 @@ Each imports its dependencies when it runs: plotting and the like are extras, wh
 """
 
 import argparse
+import re
 import shutil
 import sys
 import time
@@ -15,6 +16,8 @@ from orchestrator.errors import OrchestratorError, UsageError
 
 #: A computation that takes longer shows its progress, this often.
 PROGRESS_S = 1.0
+#: What `--since` counts in.
+AGO_S = {"min": 60.0, "h": 3600.0, "d": 86_400.0}
 PICTURES = ("mermaid", "svg", "png")
 
 
@@ -25,6 +28,8 @@ def add_workbench_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentPars
     replay.add_argument("journal", nargs="+", type=Path, help="a journal's directory, or its files (may be gzipped)")
     replay.add_argument("--policy", metavar="FILE", help="show what this policy would have decided, and the effect")
     replay.add_argument("--bay", action="append", default=[], help="only this bay (may be repeated)")
+    replay.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
+    replay.add_argument("--jobs", type=int, metavar="N", help="processes (default: for a long journal one per core)")
     replay.set_defaults(run=_replay)
     diagram = verbs.add_parser("diagram", help="draw the state machine")
     diagram.add_argument("--policy", metavar="FILE", help="as used by this policy, with its thresholds")
@@ -131,10 +136,24 @@ def progress(head: str = "") -> Callable[[str], None]:
 
 def _replay(arguments: argparse.Namespace) -> int:
     try:
-        from orchestrator.workbench.replay.verb import replay
+        from orchestrator.workbench.replay.verb import processes_for, replay
     except ImportError as error:
         raise missing("replay", error) from None
-    return replay(arguments.journal, arguments.policy, arguments.bay)
+    since = since_of(arguments.since, time.time()) if arguments.since else ""
+    jobs = arguments.jobs if arguments.jobs is not None else processes_for(arguments.journal)
+    return replay(arguments.journal, arguments.policy, arguments.bay, since, jobs=jobs)
+
+
+def since_of(text: str, wall_s: float) -> str:
+    """The beginning that a person named, as the journal writes times; a date and time without a zone is local."""
+    from orchestrator.service.records import rfc3339, unix_s
+
+    if (ago := re.fullmatch(r"(\d{1,6})\s*(min|h|d)", text)) is not None:
+        return rfc3339(max(wall_s - int(ago[1]) * AGO_S[ago[2]], 0.0))
+    try:
+        return rfc3339(unix_s(text))
+    except (ValueError, OverflowError, OSError):
+        raise UsageError(f"--since {text}: expected 90min, 2h, 7d, 2026-11-28 or 2026-11-28T06:00") from None
 
 
 def _diagram(arguments: argparse.Namespace) -> int:

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.model import BatteryReading, Measurement
+from orchestrator.model.moment import moment
 from orchestrator.protocol.objects import FieldMap
 from tests.core.said import say
 from tests.devices.bmu_bench import EMERGENCY, HEARTBEAT, REPLY, TABOS, Bench, config
@@ -58,7 +59,7 @@ def test_a_word_is_never_shown_with_the_time_of_another_request(fates: list[tupl
             bench.now_s = max(bench.now_s, arrival_s)
             bench.node.on_frame(REPLY, answer, bench.now_s)
             volts = bench.reading.voltage_v
-            assert volts is None or asked_s[round(volts.value * 100)] == volts.t_s
+            assert volts is None or moment(asked_s[round(volts.value * 100)]) == volts.t_s
         _, request = frame
         asked_s[number] = bench.now_s
         last_s = min(max(last_s, bench.now_s + delay_s), bench.now_s + 1.29)  # in order, at most the quiet time late

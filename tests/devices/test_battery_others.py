@@ -5,6 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from orchestrator.devices.two_answers import DOUBT_S
+from orchestrator.model.moment import moment
 from orchestrator.protocol.sdo import read_request, write_request
 from tests.core.said import say as text_of
 from tests.devices.bmu_bench import HEARTBEAT, REPLY, REQUEST, TIMERS, WORDS, Bench, config
@@ -127,7 +128,7 @@ def test_a_value_is_as_old_as_the_older_of_two_requests() -> None:
     assert request == read_request(TEMPERATURE, 0)
     assert bench.now_s - asked_s > 0.02
     say(bench, answer(request))
-    assert bench.reading.temperature_c.t_s == asked_s  # type: ignore[union-attr]  # just read
+    assert bench.reading.temperature_c.t_s == moment(asked_s)  # type: ignore[union-attr]  # just read
 
 
 def test_a_request_that_the_node_lost_makes_no_later_value_old() -> None:

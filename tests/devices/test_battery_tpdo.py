@@ -3,6 +3,7 @@
 import pytest
 
 from orchestrator.model import Measurement
+from orchestrator.model.moment import moment
 from tests.core.said import say
 from tests.devices.bmu_bench import HEARTBEAT, REPLY, REQUEST, RX, TX, WORDS, Bench, Dialogue, config
 
@@ -97,14 +98,14 @@ def test_a_tpdo_carries_the_maps_objects_and_is_as_old_as_its_arrival() -> None:
     bench = tpdo_bench()
     bench.now_s += 0.05
     bench.hear(TPDO1, "10 00 60 09 3C 00 02 00")
-    assert bench.reading.voltage_v == Measurement(24.0, bench.now_s)
-    assert bench.reading.current_a == Measurement(0.16, bench.now_s)
-    assert bench.reading.status == Measurement(2, bench.now_s)
-    assert bench.reading.time_to_full_min == Measurement(60, bench.now_s)
+    assert bench.reading.voltage_v == Measurement(24.0, moment(bench.now_s))
+    assert bench.reading.current_a == Measurement(0.16, moment(bench.now_s))
+    assert bench.reading.status == Measurement(2, moment(bench.now_s))
+    assert bench.reading.time_to_full_min == Measurement(60, moment(bench.now_s))
     bench.hear(TPDO3, "0C 01 00 00")
-    assert bench.reading.temperature_c == Measurement(26.8, bench.now_s)
+    assert bench.reading.temperature_c == Measurement(26.8, moment(bench.now_s))
     bench.hear(TPDO2, "64 46 78 00 D0 07 E8 03")
-    assert bench.reading.soc_pct == Measurement(70, bench.now_s)
+    assert bench.reading.soc_pct == Measurement(70, moment(bench.now_s))
 
 
 def test_a_tpdo_of_another_length_is_dropped() -> None:

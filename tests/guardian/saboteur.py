@@ -25,7 +25,7 @@ def hang(*_: object) -> None:
     threading.Event().wait()
 
 
-def end_thread(*_: object) -> None:
+def end_thread(*_: object, **__: object) -> None:
     """Silently: `except Exception` does not catch it."""
     raise SystemExit
 

@@ -103,7 +103,7 @@ def record(judge: "Judge") -> Iterator[Finding]:
     """The replayed decisions of all lives match the recording."""
     with TemporaryDirectory(prefix="record") as directory:
         for path, inode in judge.gateway.disk.names.items():
-            if path.endswith(".jsonl"):
+            if path.endswith((".jsonl", ".gz")):
                 Path(directory, Path(path).name).write_bytes(bytes(inode.data))
         try:
             taken = [(bay, one) for bay, steps in read([Path(directory)]).bays.items() for one in again(steps)]

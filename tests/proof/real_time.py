@@ -7,7 +7,6 @@ Run it on a quiet machine: a pty's data passes through a kernel thread that no p
 for half a second, the service stops, its guardian ends it, and the restart is counted.
 """
 
-import json
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -24,6 +23,7 @@ from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import State
 from orchestrator.sim.faults import FAULTS
+from orchestrator.workbench.replay.files import files_of, records_of
 from tests.proof.truth import MARGIN_S, SILENT_S, VERIFY_S
 from tests.waiting import wait_until
 
@@ -281,6 +281,6 @@ def judge(real: Real, journal: Path, due: list[tuple[float, float]]) -> None:
 
 
 def _lines(journal: Path) -> Iterator[dict[str, Any]]:
-    for path in sorted(journal.glob("events*.jsonl*")):
-        for line in path.read_text(encoding="utf-8").splitlines():
-            yield json.loads(line)
+    for _, _, line in records_of(files_of(journal.glob("events*.jsonl*")), lambda _: True):
+        if isinstance(line, dict):
+            yield line

@@ -123,7 +123,7 @@ class Notebook:
     def say(self, text: str) -> None:
         self.said.append(text)
 
-    def put(self, bay: str, line: Any) -> None:
+    def put(self, bay: str, line: Any, t_s: float | None = None) -> None:
         if line[0] == "fault":
             self.lines.append((bay, line[1]))
 

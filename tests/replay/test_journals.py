@@ -12,14 +12,16 @@ from orchestrator.workbench.replay.recording import read
 from tests.core.said import say
 from tests.replay.record import JOURNALS, SEEDS
 
-PATHS = sorted(JOURNALS.glob("*.jsonl.gz"))
+PATHS = sorted(JOURNALS.rglob("*.jsonl.gz"))
 
 
 def test_the_journals_are_there() -> None:
-    assert {path.name for path in PATHS} >= {"demo.jsonl.gz", *(f"script-{seed}.jsonl.gz" for seed in SEEDS)}
+    names = {"demo.jsonl.gz", *(f"script-{seed}.jsonl.gz" for seed in SEEDS)}
+    for directory in (JOURNALS, JOURNALS / "version-4"):
+        assert {path.name for path in directory.glob("*.gz")} >= names
 
 
-@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: str(path.relative_to(JOURNALS)))
 def test_every_decision_is_the_one_that_was_recorded(path: Path) -> None:
     wrong = {
         f"{bay} {one.recorded.wall}": one.wrong

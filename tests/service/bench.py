@@ -1,7 +1,7 @@
 """A bay of the service without threads: the test is its control loop, devices obey at once, time is simulated."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from orchestrator.service.bay import BayRunner
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Entry, Place
+from orchestrator.service.records import Line
 from orchestrator.service.store import Store
 from orchestrator.text.catalogue import say
 from tests.core.said import into
@@ -51,6 +52,11 @@ def the_bay() -> BayConfig:
         limits=Limits(voltage_v=58.4, current_a=15.0, temperature_c=Range(0, 45)),
         policy=load_policy("li-ion-48v", changes={"finish.full.soc_pct": "100"}),  # a test ends a charge by one value
     )
+
+
+def fields_of(line: Line) -> Mapping[str, object]:
+    """The fields of a line that the journal was given."""
+    return line[1]() if callable(line[1]) else line[1]
 
 
 class Charger:

@@ -16,7 +16,7 @@ from orchestrator.model.cause import from_plain
 from orchestrator.service import bay as bay_module
 from orchestrator.service.asked import Asked
 from orchestrator.text.catalogue import say
-from tests.service.bench import STEP_S, Bench
+from tests.service.bench import STEP_S, Bench, fields_of
 
 HELD = "stopped by the operator"
 
@@ -31,7 +31,7 @@ def said(bench: Bench) -> list[str]:
 
 
 def decisions(bench: Bench) -> int:
-    return sum(kind == "decision" for _, _, _, (kind, _) in bench.journal._waiting)
+    return sum(kind == "decision" for _, _, _, (kind, _) in bench.journal._waiting[False])
 
 
 def test_before_the_first_step_the_status_says_that_it_starts(bench: Bench) -> None:
@@ -256,7 +256,11 @@ def test_the_stop_at_the_end_is_no_operators(bench: Bench) -> None:
     bench.step(10)
     assert bench.bay.verified
     assert kept(bench) == (False, "", False)
-    ended = [line for _, _, _, line in bench.journal._waiting if line[0] == "session" and line[1]["result"]]
+    ended = [
+        line
+        for _, _, _, line in bench.journal._waiting[False]
+        if line[0] == "session" and dict(fields_of(line))["result"]
+    ]
     assert ended == [], "the charge goes on with the next run"
 
 

@@ -13,7 +13,7 @@ from orchestrator.service.contactor import CLOSING_S, REOPEN_S, Contactor
 from orchestrator.service.guarded import GuardedOutput
 from orchestrator.text.catalogue import fields
 from tests.core.said import cause, say
-from tests.service.bench import Bench
+from tests.service.bench import Bench, fields_of
 
 GONE = "/dev/gpiochip0 line 17: gone"
 
@@ -61,7 +61,7 @@ def _bench(tmp_path: Path, contactor: Contactor) -> Bench:
 
 
 def told(bench: Bench) -> list[dict[str, object]]:
-    return [dict(fields) for _, _, _, (kind, fields) in bench.journal._waiting if kind == "contactor"]
+    return [dict(fields_of(line)) for _, _, _, line in bench.journal._waiting[False] if line[0] == "contactor"]
 
 
 # --- by itself -------------------------------------------------------------------------------------------------------

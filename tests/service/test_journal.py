@@ -1,12 +1,17 @@
 """The journal on real files: bounded, on full, missing or hanging disks, and never blocking anyone."""
 
+import gzip
 import json
 import os
+import subprocess
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -14,8 +19,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.service import journal as journal_module
-from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal, rfc3339
-from orchestrator.service.rotating import FILES, RotatingFile
+from orchestrator.service import rotating
+from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal
+from orchestrator.service.packed import PackedFile
+from orchestrator.service.parts import MIN_PART, PARTS, order, size_of
+from orchestrator.service.records import rfc3339
+from orchestrator.service.rotating import RotatingFile
+from orchestrator.workbench.replay.files import files_of, lines_of
 from tests.core.said import say
 from tests.waiting import wait_until
 
@@ -49,9 +59,12 @@ def read(directory: Path, stream: str = "events") -> list[dict[str, Any]]:
 
 def every(directory: Path, stream: str) -> list[dict[str, Any]]:
     """All lines of a stream, the oldest file first."""
-    names = [f"{stream}.{age}.jsonl" for age in range(FILES, 0, -1)] + [f"{stream}.jsonl"]
-    texts = [(directory / name).read_text(encoding="utf-8") for name in names if (directory / name).exists()]
-    return [json.loads(line) for text in texts for line in text.splitlines()]
+    return [json.loads(text or b"") for path in files(directory, stream) for _, text in lines_of(path)]
+
+
+def files(directory: Path, stream: str) -> list[Path]:
+    """Its files, the oldest first."""
+    return files_of(directory.glob(f"{stream}*.jsonl*"))
 
 
 def test_lines_go_where_they_belong_with_both_times(tmp_path: Path) -> None:
@@ -89,35 +102,204 @@ def test_a_line_that_a_power_failure_cut_off_spoils_only_itself(tmp_path: Path) 
 
 
 def test_it_never_takes_more_than_its_space_and_keeps_the_newest(tmp_path: Path) -> None:
+    dice = Random(1)
     with writing(tmp_path) as journal:
         for number in range(9000):
-            journal.put("bay-1", ("decision", {"n": number, "fill": "x" * 50}))
-            journal.put("bay-1", ("snapshot", {"n": number, "fill": "°" * 200}))
-            if number % 1000 == 0:
-                wait_until(lambda: not journal._waiting, what="the writer")
-    sizes = {path.name: path.stat().st_size for path in tmp_path.glob("*.jsonl")}
-    assert len(sizes) == 2 * FILES
+            journal.put("bay-1", ("decision", {"n": number, "fill": dice.randbytes(30).hex()}))
+            journal.put("bay-1", ("snapshot", {"n": number, "fill": dice.randbytes(200).hex()}))
+            if number % 500 == 0:
+                wait_until(lambda: not any(journal._waiting.values()), what="the writer")
+                assert sum(taken(tmp_path).values()) <= 1_000_000
+    sizes = taken(tmp_path)
     assert sum(sizes.values()) <= 1_000_000
-    assert sum(size for name, size in sizes.items() if name.startswith("events")) > 150_000
+    assert sum(size for name, size in sizes.items() if name.startswith("events")) > 80_000
+    assert sum(size for name, size in sizes.items() if name.startswith("snapshots")) > 800_000
     for stream in ("events", "snapshots"):
         numbers = [line["n"] for line in read(tmp_path, stream)]
         assert numbers == list(range(numbers[0], 9000))
 
 
+def begin() -> bytes:
+    return b""
+
+
+def taken(directory: Path) -> dict[str, int]:
+    return {path.name: size_of(path) for path in directory.iterdir()}
+
+
+@pytest.mark.parametrize("kind", [RotatingFile, PackedFile])
 @given(st.lists(st.binary(min_size=1, max_size=3000).map(lambda data: data.replace(b"\n", b" ") + b"\n"), max_size=40))
 def test_a_file_of_any_lines_is_bounded_and_in_order(
-    tmp_path_factory: pytest.TempPathFactory, lines: list[bytes]
+    tmp_path_factory: pytest.TempPathFactory, kind: type[RotatingFile | PackedFile], lines: list[bytes]
 ) -> None:
     directory = tmp_path_factory.mktemp("lines")
-    file = RotatingFile(directory, "some", FILES * 4096)
-    left = deque(lines)
-    file.take(left)
-    assert not left
-    parts = [directory / f"some.{age}.jsonl" for age in range(FILES - 1, 0, -1)] + [directory / "some.jsonl"]
-    assert all(part.stat().st_size <= 4096 for part in parts if part.exists())
-    written = b"".join(part.read_bytes() for part in parts if part.exists())
+    file = kind(directory, "some", PARTS * MIN_PART, begin)
+    for line in lines:
+        left = deque([line])
+        file.take(left)
+        assert not left
+    assert sum(taken(directory).values()) <= PARTS * MIN_PART
+    written = content(directory)
     assert b"".join(lines).endswith(written)
-    assert (len(written) == len(b"".join(lines))) or len(written) > (FILES - 1) * 1000
+    assert (len(written) == len(b"".join(lines))) or len(written) > (PARTS - 3) * 1000
+
+
+def content(directory: Path) -> bytes:
+    """All its files, the oldest first."""
+    parts = sorted(directory.iterdir(), key=order)
+    return b"".join(gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes() for path in parts)
+
+
+class CutError(BaseException):
+    """The power fails."""
+
+
+class Failing:
+    """`os`, until the power fails in its n-th call that changes something; half of a write is done by then."""
+
+    def __init__(self, calls: int) -> None:
+        self.calls = calls
+
+    def __getattr__(self, name: str) -> Any:
+        call = getattr(os, name)
+        return partial(self._counted, call) if name in ("write", "fsync", "replace", "unlink") else call
+
+    def _counted(self, call: Callable[..., Any], *arguments: Any) -> Any:
+        self.calls -= 1
+        if self.calls < 0:
+            if call is os.write:
+                os.write(arguments[0], arguments[1][: len(arguments[1]) // 2])
+            raise CutError
+        return call(*arguments)
+
+
+@pytest.mark.parametrize("calls", range(12))
+def test_a_power_cut_while_a_part_is_compressed_loses_nothing(
+    calls: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = [b'{"n":%d}\n' % number for number in range(1000)]
+    RotatingFile(tmp_path, "events", 100_000, begin).take(deque(lines))
+    cut = False
+    with monkeypatch.context() as patched:
+        patched.setattr(rotating, "os", Failing(calls))
+        try:
+            RotatingFile(tmp_path, "events", 100_000, begin)._rotate()
+        except CutError:
+            cut = True
+    assert cut == (calls < 6), "calls that change something"
+    assert [text for path in files_of([tmp_path]) for _, text in lines_of(path)] == [line[:-1] for line in lines]
+    RotatingFile(tmp_path, "events", 100_000, begin).take(deque([b'{"n":1000}\n']))
+    assert content(tmp_path) == b"".join(lines) + b'{"n":1000}\n'
+    assert not list(tmp_path.glob("*.new"))
+    plain = [path.name for path in tmp_path.glob("*.jsonl")]
+    assert plain == ["events.jsonl"], "what was left half done is finished"
+
+
+def members(path: Path, count: int) -> list[bytes]:
+    """The members of a file with as many of them, each with three lines."""
+    file, sizes = PackedFile(path.parent, "snapshots", 10_000_000, begin), [0]
+    for number in range(count):
+        file.take(deque(b'{"n":%d}\n' % (3 * number + one) for one in range(3)))
+        sizes.append(size_of(path))
+    data = path.read_bytes()
+    return [data[begin:end] for begin, end in pairwise(sizes)]
+
+
+def test_what_a_power_cut_tears_off_the_open_part_costs_that_member_alone(tmp_path: Path) -> None:
+    path = tmp_path / "snapshots.jsonl.gz"
+    *whole, last = members(path, 3)
+    for left in range(len(last)):
+        for old in tmp_path.iterdir():
+            old.unlink()
+        path.write_bytes(b"".join(whole) + last[:left])
+        PackedFile(tmp_path, "snapshots", 10_000_000, begin).take(deque([b'{"n":9}\n']))
+        lines = [text for path in files_of([tmp_path]) for _, text in lines_of(path) if text and text.endswith(b"}")]
+        assert lines[:6] == [b'{"n":%d}' % number for number in range(6)]
+        assert lines[-1] == b'{"n":9}', "what comes after it"
+        assert len(files_of([tmp_path])) == (2 if left else 1), "a torn part is not continued"
+
+
+@pytest.mark.parametrize("spoilt", [b"", b"\0" * 40, b"\x1f\x8b\x08 no gzip at all"])
+def test_a_tear_in_the_middle_is_named_and_passed_over(tmp_path: Path, spoilt: bytes) -> None:
+    path = tmp_path / "snapshots.jsonl.gz"
+    first, second, third = members(path, 3)
+    path.write_bytes(first + second[:-12] + spoilt + third)
+    found = [text for _, text in lines_of(path)]
+    numbers = [text for text in found if text and text.startswith(b"{") and text.endswith(b"}")]
+    assert [*numbers[:3], *numbers[-3:]] == [b'{"n":%d}' % number for number in (0, 1, 2, 6, 7, 8)]
+    assert None in found
+
+
+def test_parts_of_an_older_version_are_read_first_and_dropped_first(tmp_path: Path) -> None:
+    for name, number in (("snapshots.2.jsonl", 0), ("snapshots.1.jsonl", 1), ("snapshots.jsonl", 2)):
+        (tmp_path / name).write_text(f'{{"n":{number},"fill":"{"x" * 5000}"}}\n', encoding="utf-8")
+    file, dice = PackedFile(tmp_path, "snapshots", PARTS * MIN_PART, begin), Random(1)
+    for number in range(3, 30):
+        file.take(deque([json.dumps({"n": number, "fill": dice.randbytes(1600).hex()}).encode() + b"\n"]))
+    numbers = [json.loads(text or b"")["n"] for path in files_of([tmp_path]) for _, text in lines_of(path)]
+    assert numbers == list(range(numbers[0], 30))
+    assert numbers[0] in (1, 2)
+    assert sum(taken(tmp_path).values()) <= PARTS * MIN_PART
+
+
+def test_the_ordinary_tools_read_it_while_it_is_being_written(tmp_path: Path) -> None:
+    with writing(tmp_path) as journal:
+        for number in range(9):
+            journal.put("bay-1", ("snapshot", {"n": number}))
+            journal.put("bay-1", ("transition", {"n": number}))
+            wait_until(
+                lambda: (tmp_path / "snapshots.jsonl.gz").exists() and not any(journal._waiting.values()),
+                what="the writer",
+            )
+        wait_until(lambda: len(read(tmp_path, "snapshots")) == 9, what="the last one")
+        shown = subprocess.run(["zcat", *tmp_path.glob("snapshots*")], check=True, capture_output=True, text=True)
+        found = subprocess.run(["zgrep", "-h", "transition", *tmp_path.glob("*")], capture_output=True, text=True)
+    assert [json.loads(line)["kind"] for line in shown.stdout.splitlines()] == ["run", *["snapshot"] * 9]
+    assert len(found.stdout.splitlines()) == 9
+
+
+def test_a_smaller_space_holds_from_the_start(tmp_path: Path) -> None:
+    for age in range(1, 8):
+        (tmp_path / f"events.{age}.jsonl").write_bytes(b"x" * 20_000)
+        (tmp_path / f"snapshots-{age:06}.jsonl.gz").write_bytes(b"x" * 200_000)
+    (tmp_path / "events-000001.jsonl.gz.new").write_bytes(b"half of a part that was dropped meanwhile")
+    journal = Journal(tmp_path, 1.0, time.monotonic, lambda: WALL_S)
+    journal.put("bay-1", ("decision", {}))
+    journal.put("bay-1", ("snapshot", {}))
+    journal._write()
+    assert sum(taken(tmp_path).values()) <= 1_000_000
+    assert (tmp_path / "snapshots-000007.jsonl.gz").exists(), "the newest stay"
+    assert list(tmp_path.glob("*.new")) == []
+
+
+def test_a_record_that_cannot_be_made_costs_itself_alone(tmp_path: Path) -> None:
+    def fails() -> dict[str, object]:
+        raise RuntimeError("a defect")
+
+    with writing(tmp_path) as journal:
+        journal.put("bay-1", ("snapshot", {"n": 0}))
+        journal.put("bay-1", ("snapshot", fails))
+        journal.put("bay-1", ("snapshot", {"n": 2}))
+        journal.put("bay-1", ("decision", {}))
+        wait_until(lambda: (tmp_path / "snapshots.jsonl.gz").exists(), what="the writer")
+        assert not journal.stalled(time.monotonic())
+        assert journal.lost == 1
+    kinds = [line["kind"] for line in every(tmp_path, "snapshots")]
+    assert kinds == ["run", "snapshot", "lost", "snapshot"], "what follows lacks its base"
+
+
+def test_snapshots_wait_for_each_other_unless_something_happens(tmp_path: Path) -> None:
+    now_s = 1000.0
+    journal = Journal(tmp_path, 1.0, lambda: now_s, lambda: WALL_S)
+    for second in range(12):
+        now_s = 1000.0 + second
+        journal.put("bay-1", ("snapshot", {"n": second}))
+        journal._write(all_of_it=False)
+        assert len(read(tmp_path, "snapshots")) == (0 if second < 5 else 6 if second < 11 else 12)
+    journal.put("bay-1", ("snapshot", {"n": 12}))
+    journal.put("bay-1", ("decision", {}))
+    journal._write(all_of_it=False)
+    assert len(read(tmp_path, "snapshots")) == 13, "what led to it is written with it"
 
 
 def test_a_full_disk_is_told_and_nothing_is_lost_when_it_has_room_again(tmp_path: Path) -> None:
@@ -139,7 +321,7 @@ def test_what_a_full_disk_took_in_part_is_taken_back(tmp_path: Path, monkeypatch
 
     path = tmp_path / "some.jsonl"
     path.write_bytes(b"first\n")
-    file = RotatingFile(tmp_path, "some", 1_000_000)
+    file = RotatingFile(tmp_path, "some", 1_000_000, begin)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     lines = deque([b"x" * 100 + b"\n"])
     resource.setrlimit(resource.RLIMIT_FSIZE, (50, before[1]))
@@ -167,24 +349,24 @@ def test_a_directory_that_cannot_be_is_told_and_used_once_it_can(tmp_path: Path)
 
 def test_what_no_disk_takes_is_dropped_the_oldest_first_and_counted(tmp_path: Path) -> None:
     (tmp_path / "events.jsonl").symlink_to("/dev/full")
-    with writing(tmp_path) as journal:
-        for number in range(BACKLOG + 5):
+    with writing(tmp_path, 100.0) as journal:
+        for number in range(BACKLOG[False] + 5):
             journal.put("bay-1", ("decision", {"n": number}))
             if number % 5000 == 0:
-                wait_until(lambda: not journal._waiting, what="the writer")
+                wait_until(lambda: not any(journal._waiting.values()), what="the writer")
         wait_until(lambda: journal.lost == 5, what="the count")
         (tmp_path / "events.jsonl").unlink()
         wait_until(lambda: not problem(journal), what="the end of the problem")
-    assert read(tmp_path)[-1]["n"] == BACKLOG + 4
+    assert read(tmp_path)[-1]["n"] == BACKLOG[False] + 4
 
 
 def test_nobody_waits_for_a_disk_that_hangs(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "events.jsonl")  # opening it for writing hangs until it has a reader
     with writing(tmp_path) as journal:
         journal.put("bay-1", ("decision", {"n": 0}))
-        wait_until(lambda: not journal._waiting, what="the writer")
+        wait_until(lambda: not any(journal._waiting.values()), what="the writer")
         began_s = time.monotonic()
-        for number in range(BACKLOG + 7):
+        for number in range(BACKLOG[False] + 7):
             journal.put("bay-1", ("decision", {"n": number}))
         assert time.monotonic() - began_s < 2
         assert journal.lost == 7
@@ -258,7 +440,7 @@ def test_a_gap_is_a_line_of_its_own_before_what_has_lost_its_base(tmp_path: Path
     journal = Journal(tmp_path, 100.0, time.monotonic, lambda: WALL_S)
     journal.put("bay-1", ("snapshot", {"n": -1}))
     journal._write()
-    for number in range(BACKLOG + 3):
+    for number in range(BACKLOG[True] + 3):
         journal.put("bay-1", ("snapshot", {"n": number}))
     journal._write()
     lines = every(tmp_path, "snapshots")

@@ -1,11 +1,13 @@
 """A bay's journal records: readable for people, complete for a replay."""
 
 import json
+import zlib
 from collections.abc import Iterable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -31,14 +33,17 @@ from orchestrator.model import (
     Operation,
     Precharge,
     Request,
+    Sent,
     Session,
     Snapshot,
     State,
 )
-from orchestrator.service.records import WHOLE_EVERY, SnapshotRecorder, decision_lines
+from orchestrator.service.journal import _line
+from orchestrator.service.records import WHOLE_S, SnapshotRecorder, TimedLine, decision_lines
+from orchestrator.workbench.replay.recording import read
 from tests.core.bays import charging
 from tests.core.said import cause, reason_of
-from tests.service.bench import Bench, the_bay
+from tests.service.bench import Bench, fields_of, the_bay
 
 BAY = the_bay()
 NO_BATTERY = cause("no battery")
@@ -125,102 +130,137 @@ def test_a_session_begins_and_ends_once() -> None:
 # --- snapshots -------------------------------------------------------------------------------------------------------
 
 
-def plain(snapshot: Snapshot) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads(json.dumps(causes_plain(asdict(snapshot))))
-    return document
+def reread(lines: Iterable[TimedLine], directory: Path) -> list[tuple[float, Snapshot]]:
+    """The decisions' times and snapshots, as a reader of the journal finds them."""
+    path = directory / "snapshots.jsonl"
+    path.write_bytes(b"".join(_line((t_s, 1_700_000_000.0 + t_s, "bay-1", line)) for t_s, line in lines))
+    record = read([path])
+    assert not record.broken
+    return [(one.at_s, one.snapshot) for one in record.bays.get("bay-1", [])]
 
 
-def causes_plain(value: Any) -> Any:
-    """Causes as the journal has them: with their parameters as an object."""
-    if isinstance(value, dict):
-        found = {name: causes_plain(one) for name, one in value.items()}
-        return {**found, "params": dict(found["params"])} if "params" in found else found
-    return [causes_plain(one) for one in value] if isinstance(value, list | tuple) else value
-
-
-def rebuilt(lines: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The snapshots a reader builds from the lines, knowing them only as JSON."""
-    snapshots: list[dict[str, Any]] = []
-    for line in lines:
-        fields = json.loads(json.dumps(line))
-        if fields.pop("whole", False):
-            for name in ("memory", "config", "at_s"):
-                fields.pop(name)
-            snapshots.append(fields)
-        else:
-            battery = {**snapshots[-1]["battery"], **fields.pop("battery", {})}
-            fields.pop("at_s")
-            snapshots.append({**snapshots[-1], **fields, "battery": battery})
-    return snapshots
+def lines_for(steps: Iterable[tuple[float, Snapshot]], *, news: bool = False) -> list[TimedLine]:
+    recorder, memory = SnapshotRecorder(BAY), Memory()
+    lines = [
+        line for at_s, snapshot in steps for line in recorder.lines(at_s, snapshot, memory, State.CHARGING, news=news)
+    ]
+    return lines + recorder.rest()
 
 
 READING = ChargerReading(
     1.0, 48.0, 0.0, ControlMode.MANUAL, Operation.STOPPED, 0, ChargeMode.FULL, Precharge.OFF, Connection.NORMAL
 )
-measurements = st.none() | st.builds(Measurement, st.sampled_from([20.0, 21.0]), st.sampled_from([1.0, 2.0]))
+#: Whole milliseconds, and times that are none.
+times = st.one_of(
+    st.sampled_from([1.0, 2.0, 2.001, 0.1 + 0.2, 0.3, 12345.678, 37048.010390211, 0.0]), st.floats(0, 1e6)
+)
+numbers = st.one_of(st.sampled_from([20.0, 21.0, 0.0, -0.0, 0.1]), st.floats(allow_nan=False, allow_infinity=False))
+measurements = st.none() | st.builds(Measurement, numbers, times)
+readings = st.builds(
+    replace, st.just(READING), t_s=times, voltage_v=numbers, charge_mode=st.sampled_from([None, ChargeMode.CHARGE]),
+    illegal=st.sampled_from([(), (cause("mode 9"),)]),
+)  # fmt: skip
 snapshots = st.builds(
     Snapshot,
-    st.sampled_from(
-        [None, READING, replace(READING, t_s=2.0), replace(READING, charge_mode=None, illegal=(cause("mode 9"),))]
-    ),
-    st.sampled_from(
-        [ChargerLink(), ChargerLink(online=True), ChargerLink(problem=cause("gone")), ChargerLink(online=True)]
+    st.none() | readings,
+    st.builds(
+        ChargerLink,
+        online=st.booleans(),
+        problem=st.sampled_from([None, cause("gone")]),
+        sent=st.sampled_from([None, Sent(STOP, 1.0), Sent(STOP, 1.5), Sent(Command(Action.SET_LIMIT, 3), 1.5)]),
+        stop_sent_s=st.none() | times,
+        bad_pct=numbers,
     ),
     st.builds(BatteryReading, soc_pct=measurements, temperature_c=measurements, voltage_v=measurements),
-    st.sampled_from([BatteryLink(), BatteryLink(online=True, implausible={"soc_pct": cause("140")})]),
+    st.builds(
+        BatteryLink,
+        heartbeat_t_s=st.none() | times,
+        implausible=st.sampled_from([{}, {"soc_pct": cause("140")}]),
+        nmt_state=st.sampled_from([None, 5]),
+    ),
     st.sampled_from([None, *Request]),
     st.sampled_from(["", "broken"]),
-    st.booleans(),
-    st.sampled_from(["", "the line is gone"]),
+    late_s=numbers,
+    not_persisted=st.sampled_from([None, cause("the disk is full")]),
+    connected=st.booleans(),
+    moves=st.sampled_from(["", "bay-2"]),
 )
 
 
-@given(st.lists(snapshots, max_size=12))
-def test_the_lines_are_enough_to_rebuild_every_snapshot(steps: list[Snapshot]) -> None:
-    recorder, lines = SnapshotRecorder(BAY), []
-    for snapshot in steps:
-        line = recorder.line(1.0, snapshot, Memory(), State.CHARGING, news=False)
-        assert line is not None
-        lines.append(line[1])
-    assert rebuilt(lines) == [plain(snapshot) for snapshot in steps]
+@given(st.lists(st.tuples(times, snapshots), max_size=12), st.booleans())
+def test_every_snapshot_is_read_back_bit_for_bit(
+    tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[float, Snapshot]], news: bool
+) -> None:
+    steps = sorted(steps, key=lambda step: step[0])
+    found = reread(lines_for(steps, news=news), tmp_path_factory.mktemp("rows"))
+    assert repr(found) == repr(steps), "repr tells 0.0 from -0.0, and 1 from 1.0"
 
 
-def test_a_whole_line_with_the_memory_comes_now_and_then() -> None:
-    recorder = SnapshotRecorder(BAY)
-    lines = [
-        recorder.line(float(number), Snapshot(), Memory(), State.CHARGING, news=False)
-        for number in range(2 * WHOLE_EVERY + 4)
-    ]
-    whole = [number for number, line in enumerate(lines) if line is not None and line[1].get("whole")]
-    assert whole == [0, WHOLE_EVERY + 1, 2 * (WHOLE_EVERY + 1)]
-    assert lines[0] is not None
-    first = json.loads(json.dumps(lines[0][1]))
+def charging_rows(count: int, began_s: float = 1000.0) -> list[tuple[float, Snapshot]]:
+    """Decisions of a steady charge, five a second."""
+    rows = []
+    for number in range(count):
+        at_s = (round(began_s * 1000) + 200 * number) / 1000
+        value = Measurement(48.0, at_s)
+        battery = BatteryReading(voltage_v=value, current_a=value, soc_pct=Measurement(50.0, float(int(at_s))))
+        rows.append((at_s, Snapshot(replace(READING, t_s=at_s), battery=battery)))
+    return rows
+
+
+def test_a_complete_line_with_memory_and_rules_comes_every_ten_minutes() -> None:
+    lines = lines_for(charging_rows(round(2 * WHOLE_S * 5) + 10))
+    whole = [t_s for t_s, line in lines if fields_of(line).get("whole")]
+    assert whole == [1000.0, 1000.0 + WHOLE_S, 1000.0 + 2 * WHOLE_S]
+    first = json.loads(json.dumps(fields_of(lines[0][1])))
     assert "state" in first["memory"]
     assert first["config"]["policy"]["policy"] == "li-ion-48v"
-    assert [line[1]["at_s"] for line in lines if line is not None] == list(range(2 * WHOLE_EVERY + 4))
+
+
+def test_decisions_share_a_line_for_a_few_seconds_or_until_something_happens() -> None:
+    recorder, rows = SnapshotRecorder(BAY), charging_rows(60)
+    written = [
+        number
+        for number, (at_s, snapshot) in enumerate(rows)
+        if recorder.lines(at_s, snapshot, Memory(), State.CHARGING, news=number == 40)
+    ]
+    assert written == [0, 26, 40]
+
+
+def test_a_row_of_a_steady_charge_costs_a_few_bytes() -> None:
+    """Five values that have only become newer."""
+    lines = lines_for(charging_rows(100))
+    data = b"".join(_line((t_s, 0.0, "bay-1", line)) for t_s, line in lines[1:])
+    assert len(data) / 99 < 40
+    assert len(zlib.compress(data)) / 99 < 6
 
 
 def test_a_quiet_bay_says_nothing_until_something_happens() -> None:
     recorder = SnapshotRecorder(BAY)
+
+    def lines(state: State, *, request: Request | None = None, news: bool = False) -> list[TimedLine]:
+        return recorder.lines(1.0, Snapshot(request=request), Memory(), state, news=news)
+
     for state in QUIET:
-        assert recorder.line(1.0, Snapshot(), Memory(), state, news=False) is None
-    assert recorder.line(1.0, Snapshot(request=Request.START), Memory(), State.IDLE, news=False) is not None
-    assert recorder.line(1.0, Snapshot(), Memory(), State.IDLE, news=False) is None
-    line = recorder.line(1.0, Snapshot(), Memory(), State.IDLE, news=True)
-    assert line is not None
-    assert line[1]["whole"]
+        assert lines(state) == []
+    assert len(lines(State.IDLE, request=Request.START)) == 1
+    assert lines(State.IDLE) == []
+    ((_, line),) = lines(State.IDLE, news=True)
+    assert fields_of(line)["whole"]
+    assert lines(State.STARTING) == []
+    ((t_s, line),) = lines(State.IDLE)
+    assert (t_s, fields_of(line)["at"]) == (1.0, []), "what waited for more is written when it becomes quiet"
 
 
 def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
-    """From the first decision to the end of a charge: every line is JSON, and no snapshot is lost."""
+    """From the first decision to the end of a charge: no snapshot is lost, none is changed."""
     bench = Bench(tmp_path)
-    journal, seen = bench.journal, list[dict[str, Any]]()
+    seen, busy = dict[float, Snapshot](), set[float]()
 
     def step_and_look() -> State:
-        before = len(journal._waiting)
         state = bench.step()
-        if any(entry[3][0] == "snapshot" for entry in list(journal._waiting)[before:]):
-            seen.append(plain(bench.bay._snapshot))
+        seen[bench.now_s] = bench.bay._snapshot
+        if state not in QUIET:
+            busy.add(bench.now_s)
         return state
 
     for _ in range(60):
@@ -228,8 +268,11 @@ def test_a_whole_charge_can_be_read_back(tmp_path: Path) -> None:
     assert bench.charger.reading.current_a > 0
     bench.battery.values["soc_pct"] = 100.0
     assert State.FULL in [step_and_look() for _ in range(30)]
-    lines = [json.loads(json.dumps(entry[3])) for entry in journal._waiting]
-    assert rebuilt(fields for kind, fields in lines if kind == "snapshot") == seen
+    waiting = bench.journal._waiting
+    found = reread([(t_s, line) for t_s, _, _, line in waiting[True]], tmp_path)
+    assert found == [(at_s, seen[at_s]) for at_s, _ in found]
+    assert {at_s for at_s, _ in found} >= busy
+    lines = [(line[0], fields_of(line)) for _, _, _, line in waiting[False]]
     path = [fields["to"] for kind, fields in lines if kind == "transition"]
     assert path == ["STARTING", "IDLE", "QUALIFYING", "CHARGING", "STOPPING", "FULL"]
     assert [fields["event"] for kind, fields in lines if kind == "session"] == ["begin", "end"]

@@ -14,6 +14,7 @@ from typing import Any, Self, cast
 
 from orchestrator.lastresort.asking import ask
 from orchestrator.sim.client import PlantProcess
+from orchestrator.workbench.replay.files import files_of, records_of
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until
 
@@ -186,10 +187,8 @@ class Service:
 
     def journal(self, bay: str, kind: str) -> list[Document]:
         """The bay's journal lines of one kind, oldest first."""
-        name = "snapshots" if kind == "snapshot" else "events"
-        path = self.directory / "run" / "journal" / f"{name}.jsonl"
-        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-        records = [cast("Document", json.loads(line)) for line in lines]
+        files = (self.directory / "run" / "journal").glob("*.jsonl*")
+        records = [record for _, _, record in records_of(files_of(files), lambda _: True) if isinstance(record, dict)]
         return [record for record in records if record["bay"] == bay and record["kind"] == kind]
 
     def path_of(self, bay: str) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from orchestrator.show import own_language
+from orchestrator.workbench.replay.files import files_of, lines_of
 from tests.waiting import wait_until
 from tests.whole.station import Document, whole_station
 
@@ -70,7 +71,7 @@ def test_a_korean_station_says_nothing_in_english(tmp_path: Path, monkeypatch: p
         service.signal(signal.SIGTERM)
         assert service.ended() == 1
         assert list(english(service.log().splitlines())) == []
-        lines = [json.loads(line) for path in journal.glob("*.jsonl") for line in path.read_text().splitlines()]
+        lines = [json.loads(text or b"") for path in files_of([journal]) for _, text in lines_of(path)]
         assert {"transition", "fault", "snapshot"} <= {line["kind"] for line in lines}
         assert list(english(lines)) == []
 

@@ -10,7 +10,7 @@ import sys
 import threading
 
 from orchestrator.lastresort import guardian
-from orchestrator.service import controller, disk, loading, rotating
+from orchestrator.service import controller, disk, loading, packed, parts, rotating
 
 ARMED = threading.Event()
 
@@ -33,6 +33,8 @@ if __name__ == "__main__":
     call, *arguments = sys.argv[1:]
     if len(arguments) == 1:
         sys.exit(guardian.guard(arguments, ("-m", "tests.whole.worn", call)))
-    disk.os = loading.os = rotating.os = Worn(call)  # type: ignore[attr-defined,assignment]  # their whole disk
+    hangs = Worn(call)
+    for module in (disk, loading, packed, parts, rotating):  # their whole disk
+        module.os = hangs  # type: ignore[attr-defined]
     signal.signal(signal.SIGUSR1, lambda *_: ARMED.set())
     sys.exit(controller.main(int(arguments[0]), arguments[1]))

@@ -3,7 +3,9 @@
 import gzip
 import json
 import os
+import re
 import shutil
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,10 +16,10 @@ from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.core import next_transition
 from orchestrator.model import Cause, Request, State
-from orchestrator.service.records import WHOLE_EVERY
+from orchestrator.service.records import MAX_ROWS, WHOLE_S
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import Difference, compare, told
-from orchestrator.workbench.replay.recording import read
+from orchestrator.workbench.replay.recording import Recorded, Recording, read
 from tests.core.said import reason_of
 from tests.service.bench import STEP_S, Bench
 
@@ -35,7 +37,7 @@ def _journal(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for temperature_c in (17.0, 14.0, 11.0, 9.0):
         bench.battery.values["temperature_c"] = temperature_c
         pass_s(2)
-    pass_s(WHOLE_EVERY * STEP_S)
+    pass_s(WHOLE_S)
     bench.ask(Request.PAUSE)
     pass_s(5)
     bench.ask(Request.START)
@@ -46,7 +48,15 @@ def _journal(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pass_s(20)
     bench.ask(Request.STOP)
     bench.journal._write()
-    return bench.journal._directory
+    return unpacked(bench.journal._directory)
+
+
+def unpacked(journal: Path) -> Path:
+    """With plain files only, so that tests can change lines."""
+    for path in journal.glob("*.gz"):
+        path.with_suffix("").write_bytes(gzip.decompress(path.read_bytes()))
+        path.unlink()
+    return journal
 
 
 def differences(journal: Path, policy: str | Path) -> list[Difference]:
@@ -88,9 +98,12 @@ def test_a_value_that_was_altered_is_seen_in_the_memory(journal: Path, tmp_path:
     """Where the sentences do not show it, the resulting memory does."""
     copy = tmp_path / "copy"
     shutil.copytree(journal, copy)
-    (path,) = (one for one in copy.glob("snapshots*.jsonl") if '"voltage_v":50.4,"current_a":2.0' in one.read_text())
-    text = path.read_text(encoding="utf-8")
-    path.write_text(text.replace('"voltage_v":50.4,"current_a":2.0', '"voltage_v":48.1,"current_a":2.0', 1))
+    (path,) = copy.glob("snapshots*.jsonl")
+    text, count = re.subn(
+        r'("charger.current_a":\[(?:0,)*)14000', r"\g<1>13900", path.read_text(encoding="utf-8"), count=1
+    )
+    assert count == 1
+    path.write_text(text, encoding="utf-8")
     wrong = [one.wrong for one in again(read([copy]).bays["bay-1"]) if one.wrong]
     assert any(text.startswith("memory.session was Session(") for text in wrong)
 
@@ -148,7 +161,9 @@ BROKEN: dict[str, tuple[Callable[[str], str], str]] = {
     "no JSON": (lambda text: "{oh no\n" + text, ":1:1: error: this is no line of a journal: it is not JSON"),
     "no line of ours": (lambda text: '{"a": 1}\n' + text, "it has t, wall, bay and kind"),
     "no time": (lambda text: '{"kind":"fault","bay":"bay-1","wall":"","t":"x"}\n' + text, "could not convert string"),
-    "a text for a number": (lambda text: text.replace('"at_s":', '"at_s":"x","y":', 1), "could not convert string"),
+    "a text for a number": (lambda text: text.replace('{"t":', '{"t":"x","y":', 1), "could not convert string"),
+    "a row too many": (lambda text: text.replace('"at":[', '"moves":[300,""],"at":[', 1), "IndexError"),
+    "half a change": (lambda text: text.replace('"at":[', '"moves":[3],"at":[', 1), "ValueError"),
     "an unknown state": (lambda text: text.replace('"state":"STARTING"', '"state":"FLYING"', 1), "FLYING"),
 }  # fmt: skip
 
@@ -171,7 +186,9 @@ def test_a_line_that_a_power_failure_cut_off_is_passed_over(journal: Path, tmp_p
     text = (journal / "snapshots.jsonl").read_text(encoding="utf-8")
     path.write_text(text[:-20], encoding="utf-8")
     record = read([path])
-    assert len(record.bays["bay-1"]) == len(text.splitlines()) - 1 - _continues(text)
+    last = json.loads(text.splitlines()[-1])
+    before = read([journal]).bays["bay-1"]
+    assert len(record.bays["bay-1"]) == len(before) - 1 - len(last.get("at", []))
     assert len(record.broken) == 1
 
 
@@ -249,11 +266,12 @@ def test_what_a_power_cut_tears_costs_itself_only(
     name: str, stream: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     one_run(tmp_path, 1000.0, MONDAY_S)
-    path = tmp_path / f"{stream}.jsonl"
+    path = tmp_path / {"events": "events.jsonl", "snapshots": "snapshots.jsonl.gz"}[stream]
     path.write_bytes(ENDS[name](path.read_bytes()))
     one_run(tmp_path, 20.0, MONDAY_S + DAY_S, trip=True)
     out = replayed(tmp_path, capsys)
-    assert f" passed over, the first: {path}:" in out
+    torn = tmp_path / {"events": "events.jsonl", "snapshots": "snapshots-000001.jsonl.gz"}[stream]
+    assert f" passed over, the first: {torn}:" in out
     second = [step for step in read([tmp_path]).bays["bay-1"] if step.wall.startswith("2026-12-01")]
     assert second[0].memory is not None
     assert second[0].memory.last_s is None, "the first line of the second run is there"
@@ -268,17 +286,69 @@ def test_steps_that_no_disk_took_are_a_gap_and_no_other_decision(
     lines = path.read_bytes().splitlines(keepends=True)
     whole = [number for number, line in enumerate(lines) if b'"whole":true' in line]
     lost = b'{"t":1001.0,"wall":"2026-11-30T00:00:01.000Z","bay":"","kind":"lost","lines":3}\n'
+    missing = b"".join(lines[whole[1] - 9 : whole[1]])
     path.write_bytes(b"".join([*lines[: whole[1] - 9], lost, *lines[whole[1] - 6 :]]))
-    steps = read([tmp_path]).bays["bay-1"]
+    steps, before = read([tmp_path]).bays["bay-1"], read([journal]).bays["bay-1"]
     assert [step.memory is not None for step in steps if step.gap] == [True], "it begins anew with the next whole line"
-    assert len(steps) == len(lines) - 1 - 9
+    assert len(steps) == len(before) - sum(len(json.loads(line)["at"]) + 1 for line in missing.splitlines())
     replayed(tmp_path, capsys)
 
 
-def _continues(text: str) -> int:
-    """The number of lines at the start that continue a missing file."""
-    lines = [json.loads(line) for line in text.splitlines()]
-    return next(number for number, line in enumerate(lines) if line.get("whole"))
+def test_a_stretch_of_time_alone_begins_at_a_complete_snapshot(
+    journal: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    steps = read([journal]).bays["bay-1"]
+    second = [step for step in steps if step.memory is not None][1]
+    later = next(step for step in steps if step.at_s > second.at_s + 5)
+    assert main(["replay", str(journal), "--since", later.wall]) == 0
+    said = re.search(r"bay-1: (\d+) decisions in .* all as recorded", capsys.readouterr().out)
+    assert said is not None
+    assert int(said[1]) == sum(step.wall >= later.wall for step in steps)
+    begun = list(Recording([journal], since=later.wall))
+    assert begun[0].memory is not None
+    assert begun[0].wall <= later.wall, "what leads up to it is decided, too"
+    assert main(["replay", str(journal), "--since", "2100-01-01"]) == 1
+    assert "nothing is recorded of bay-1 since 2" in capsys.readouterr().err
+    assert main(["replay", str(journal), "--since", "yesterday"]) == 2
+    assert "--since yesterday: expected 90min, 2h, 7d, 2026-11-28" in capsys.readouterr().err
+
+
+def test_parts_before_that_time_are_not_read(tmp_path: Path) -> None:
+    one_run(tmp_path, 1000.0, MONDAY_S)
+    shutil.move(tmp_path / "snapshots.jsonl.gz", tmp_path / "snapshots-000001.jsonl.gz")
+    one_run(tmp_path, 20.0, MONDAY_S + DAY_S)
+    with (tmp_path / "snapshots-000001.jsonl.gz").open("ab") as file:
+        file.write(b"what nobody looks at")
+    everything, later = Recording([tmp_path]), Recording([tmp_path], since="2026-12-01T00:20:00.000Z")
+    assert {step.wall[:10] for step in everything} == {"2026-11-30", "2026-12-01"}
+    assert list(later) == []
+    assert (everything.broken_count, later.broken_count) == (1, 0)
+
+
+@pytest.mark.parametrize("policy", [[], ["--policy", "long-life-48v"]])
+def test_processes_share_the_bays_of_a_journal(
+    policy: list[str], journal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for path in journal.glob("*.jsonl"):
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        both = (line + line.replace('"bay":"bay-1"', '"bay":"bay-2"', 1) for line in lines)
+        (tmp_path / path.name).write_text("".join(both), encoding="utf-8")
+    outs = []
+    for jobs in ("1", "2"):
+        assert main(["replay", str(tmp_path), "--jobs", jobs, *policy]) == 0
+        outs.append(capsys.readouterr().out)
+    assert outs[0] == outs[1]
+    assert outs[0].count("bay-2: ") == 1
+
+
+def test_however_long_a_journal_is_little_of_it_is_in_memory(journal: Path) -> None:
+    recording, alive = Recording([journal]), list[weakref.ref[Recorded]]()
+    most = 0
+    for step in recording:
+        alive.append(weakref.ref(step))
+        most = max(most, sum(one() is not None for one in alive[-1000:]))
+    assert len(alive) > 2000
+    assert most <= MAX_ROWS + 1, "only those of one line"
 
 
 def test_what_was_not_recorded_is_said(journal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,67 +1,187 @@
 """Reads a journal back: every recorded decision of a bay, with its input, and the events it caused.
 
 Theory of operation. File content is untrusted until it is decoded, and a power cut leaves torn lines: unreadable lines
-are counted and skipped. Snapshots are differences, so a lost line invalidates its successors up to the next complete
-one. Each run of the service starts over, and so does the monotonic clock after a reboot: an event belongs to the
-decision within whose few milliseconds it was written, and if there are several, to the one with the same wall-clock
-time.
+are counted and passed over. A snapshot continues the one before it, so a lost line invalidates its successors up to the
+next complete one. Each run of the service starts over, and so does the monotonic clock after a reboot. However long the
+journal is, only the latest snapshot of each bay is in memory.
 """
 
-import gzip
-import json
-import zlib
-from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from cattrs import Converter
-from cattrs.errors import BaseValidationError
-
-from orchestrator.config.plainfile import check_plain
-from orchestrator.config.station import BayConfig
-from orchestrator.core.memory import Memory, in_parts
+from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
-from orchestrator.errors import ConfigError, Finding
-from orchestrator.model import Cause, Snapshot
-from orchestrator.model.cause import from_plain
+from orchestrator.errors import Finding
+from orchestrator.model import Snapshot
+from orchestrator.service.parts import stream_of
+from orchestrator.service.records import WHOLE_S, rfc3339, unix_s
+from orchestrator.workbench.replay.converting import SENTENCES, UNREADABLE, OlderError, snapshot_of, whole
+from orchestrator.workbench.replay.events import Event, Events, run_of
+from orchestrator.workbench.replay.files import (
+    STREAMS,
+    Fields,
+    files_of,
+    from_part,
+    journals_of,
+    lines_of,
+    records_of,
+    unreadable,
+)
+from orchestrator.workbench.replay.rows import rows_of
 
-#: The records that `decision_lines` writes for a decision.
-EVENTS = frozenset({"transition", "command", "fault", "session", "decision"})
-STREAMS = ("events", "snapshots")
 #: Records that break continuity: another run of the service, lines that the disk did not take.
 BREAKS = frozenset({"run", "lost"})
-#: Why a recording cannot be repeated: it has sentences from an older version, and no causes.
-SENTENCES = "an older version of this service has recorded this step: only that version can decide it again"
-#: No decision takes longer than this to be recorded.
-STEP_S = 60.0
-
-Fields = dict[str, Any]
-Event = tuple[str, Mapping[str, object]]  #: kind, fields
-
-_CONVERTER = Converter(detailed_validation=False)
-_CONVERTER.register_structure_hook(Path, lambda text, _: Path(text))
-_CONVERTER.register_structure_hook(Cause, lambda value, _: from_plain(value))
+#: Complete snapshots may come this much later than they are due.
+SLACK_S = 60.0
+#: A snapshot's bay: it is found without decoding the line.
+_BAY = re.compile(rb'"bay":"((?:[^"\\]|\\.)*)","kind":"snapshot"')
+#: As many unreadable lines are kept; the others are only counted.
+SHOWN_BROKEN = 1000
 
 
-class _OlderError(Exception):
-    """A line with sentences where the core now has causes."""
-
-
-@dataclass(slots=True)
+@dataclass(slots=True, weakref_slot=True)
 class Recorded:
     """One recorded decision. `memory` and `rules` are present where the recording has a complete snapshot."""
 
+    bay: str
     at_s: float  #: the time given to the decision
     wall: str  #: the same for people, RFC 3339
     snapshot: Snapshot
     memory: Memory | None = None
     rules: Rules | None = None
     events: list[Event] = field(default_factory=list)  #: its events in the journal
-    written_s: float = 0.0  #: when it was recorded, right after its events
     gap: bool = False  #: decisions right before it are lost
     unsure: bool = False  #: some of its events may be lost
+
+
+Taken = tuple[Recorded, float]  #: a decision, and when it was recorded: its events were recorded before
+
+
+@dataclass(slots=True)
+class _Bay:
+    """The last snapshot of a bay; None: the following lines continue something that is lost."""
+
+    snapshot: Snapshot | None = None
+    plain: Fields | None = None  #: the same in JSON, in a journal of version 4
+    gap: bool = False
+
+
+def _earlier(since: str) -> str:
+    return rfc3339(max(unix_s(since) - WHOLE_S - SLACK_S, 0.0))
+
+
+class Recording:
+    """The decisions in journal directories and files (JSON Lines, also gzipped), in the order of writing: iterate once.
+
+    `bays`: only these, if any are given. `since`: from the last complete snapshots before this time (RFC 3339, UTC) on.
+    """
+
+    def __init__(self, paths: Iterable[Path], bays: Collection[str] = (), since: str = "") -> None:
+        self._journals = journals_of(files_of(paths))
+        self._only = frozenset(bays)
+        self._bays: dict[str, _Bay] = {}
+        self._begin = _earlier(since) if since else ""  # complete snapshots before this are not needed
+        self._run = ""
+        self.broken: list[Finding] = []  #: the unreadable lines, the first of them
+        self.broken_count = 0
+
+    def __iter__(self) -> Iterator[Recorded]:
+        for files in self._journals:
+            yield from self._journal(files)
+
+    def _journal(self, files: Sequence[Path]) -> Iterator[Recorded]:
+        """The decisions of one journal."""
+        streams = {name: [path for path in files if stream_of(path) == name] for name in STREAMS}
+        merged = not any(streams.values())
+        events = Events(
+            files if merged else streams["events"], (lambda *_: None) if merged else self._broken, alone=merged
+        )
+        self._run = ""
+        self._bays.clear()
+        snapshots = files if merged else from_part(streams["snapshots"], self._begin)
+        for path, number, line in records_of(snapshots, self._is_wanted):
+            if isinstance(line, str):
+                self._broken(path, number, line)
+                self._stop()
+                continue
+            try:
+                taken = self._take(line)
+            except OlderError:
+                taken = self._pass_over(path, number, SENTENCES)
+            except UNREADABLE as error:
+                taken = self._pass_over(path, number, unreadable(error))
+            for recorded, until_s in taken:
+                recorded.events, recorded.unsure = events.take(self._run, recorded.bay, recorded.at_s, until_s)
+                yield recorded
+
+    def _is_wanted(self, text: bytes) -> bool:
+        found = _BAY.search(text, 0, 200)
+        if found is None:
+            return True
+        return not self._only or found[1].decode(errors="replace") in self._only
+
+    def _pass_over(self, path: Path, number: int, text: str) -> list[Taken]:
+        self._broken(path, number, text)
+        self._stop()
+        return []
+
+    def _broken(self, path: Path, number: int, text: str) -> None:
+        self.broken_count += 1
+        if len(self.broken) < SHOWN_BROKEN:
+            self.broken.append(Finding(str(path), number, 1, text))
+
+    def _stop(self) -> None:
+        """Break continuity: the following lines do not continue the earlier ones."""
+        for bay in self._bays.values():
+            bay.gap = bay.gap or bay.snapshot is not None
+            bay.snapshot = bay.plain = None
+
+    def _take(self, line: Fields) -> list[Taken]:
+        """The decisions in one line."""
+        if line["kind"] in BREAKS and (line["kind"] == "lost" or run_of(line) != self._run):
+            self._run = run_of(line) if line["kind"] == "run" else self._run
+            self._stop()
+        if line["kind"] != "snapshot":
+            return []
+        bay = self._bays.setdefault(line["bay"], _Bay())
+        if line.get("whole"):
+            return [] if line["wall"] < self._begin else [self._whole(line, bay)]
+        if bay.snapshot is None:
+            return []  # what it continues is lost
+        return [self._single(line, bay)] if "at" not in line else self._rows(line, bay)
+
+    def _whole(self, line: Fields, bay: _Bay) -> Taken:
+        plain, memory, rules = whole(line)
+        recorded = self._recorded(line, bay, snapshot_of(plain), plain)
+        recorded.memory, recorded.rules = memory, rules
+        return recorded, line["t"]
+
+    def _single(self, line: Fields, bay: _Bay) -> Taken:
+        """The only decision in a line of version 4."""
+        before = bay.plain or {}
+        now = {name: line[name] for name in Snapshot.__slots__ if name in line}
+        plain = {**before, **now, "battery": {**before["battery"], **now.get("battery", {})}}
+        return self._recorded(line, bay, snapshot_of(plain), plain), line["t"]
+
+    def _rows(self, line: Fields, bay: _Bay) -> list[Taken]:
+        assert bay.snapshot is not None
+        rows = list(rows_of(line, bay.snapshot))
+        begin_s = unix_s(line["wall"]) - line["t"]
+        bay.snapshot = rows[-1][1]
+        gap, bay.gap = bay.gap, False
+        return [
+            (Recorded(line["bay"], at_s, rfc3339(begin_s + at_s), snapshot, gap=gap and not number), at_s)
+            for number, (at_s, snapshot) in enumerate(rows)
+        ]
+
+    def _recorded(self, line: Fields, bay: _Bay, snapshot: Snapshot, plain: Fields) -> Recorded:
+        gap, bay.gap = bay.gap, False
+        bay.snapshot, bay.plain = snapshot, plain
+        return Recorded(
+            line["bay"], float(line["at_s"] if "at_s" in line else line["t"]), line["wall"], snapshot, gap=gap
+        )
 
 
 @dataclass(slots=True)
@@ -72,178 +192,16 @@ class Record:
     broken: list[Finding] = field(default_factory=list)  #: the unreadable lines
 
 
-@dataclass(slots=True)
-class _Stream:
-    """The reading position in the files of one stream."""
-
-    parts: dict[str, Fields] = field(default_factory=dict)  #: each bay's last snapshot
-    gaps: set[str] = field(default_factory=set)  #: the bays that have lost decisions since then
-    wall: str = ""  #: the time of the last line …
-    hole: bool = False  #: … after which something is missing
-
-    def stop(self) -> None:
-        """Break continuity: the following lines do not continue the earlier ones."""
-        self.gaps |= self.parts.keys()
-        self.parts.clear()
-
-
-class _Reader:
-    """Reads the lines of all files, one after another."""
-
-    def __init__(self) -> None:
-        self.record = Record()
-        self.events: list[Fields] = []
-        self.holes: list[tuple[str, str]] = []  # wall-clock intervals in which something is missing
-        self._streams: dict[str, _Stream] = {}
-        self._stream = _Stream()
-
-    def begin(self, path: Path) -> None:
-        """Begin another file, which may continue an older one."""
-        self._stream = self._streams.setdefault(str(path.parent / path.name.partition(".")[0]), _Stream())
-
-    def take(self, path: Path, number: int, text: bytes) -> None:
-        """Process one line."""
-        try:
-            line = _line(text)
-            if line["kind"] == "snapshot":
-                self._snapshot(line)
-        except _OlderError:
-            self.broken(path, number, SENTENCES)
-            return
-        except (json.JSONDecodeError, KeyError) as error:
-            wrong = f"it has no {error}" if isinstance(error, KeyError) else "it is not JSON"
-            self.broken(path, number, f"this is no line of a journal: {wrong}")
-            return
-        except (BaseValidationError, LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:
-            self.broken(path, number, f"this is no line of a journal: {error!r:.200}")
-            return
-        stream = self._stream
-        if stream.hole:
-            self.holes.append((stream.wall, line["wall"]))
-        stream.wall, stream.hole = line["wall"], False
-        if line["kind"] in BREAKS:
-            stream.stop()
-        elif line["kind"] in EVENTS:
-            self.events.append(line)
-
-    def broken(self, path: Path, number: int, text: str) -> None:
-        """Record a skipped line; its content is unknown."""
-        self.record.broken.append(Finding(str(path), number, 1, text))
-        self._stream.hole = True
-        self._stream.stop()
-
-    def end(self) -> Record:
-        """Everything read, with each event assigned to its decision."""
-        self.holes += [(stream.wall, "") for stream in self._streams.values() if stream.hole]
-        for step in (step for taken in self.record.bays.values() for step in taken):
-            step.unsure = any(since <= step.wall and (not until or step.wall <= until) for since, until in self.holes)
-        _spread(self.events, self.record.bays)
-        return self.record
-
-    def _snapshot(self, line: Fields) -> None:
-        """A complete snapshot, or its differences from the previous one."""
-        memory: Memory | None = None
-        rules: Rules | None = None
-        bay, at_s, parts = line["bay"], float(line["at_s"]), self._stream.parts
-        if line.get("whole"):
-            if "cause" not in line["memory"] or isinstance(line["charger_link"]["problem"], str):
-                raise _OlderError
-            plain = {name: line[name] for name in Snapshot.__slots__ if name in line}  # newer fields get their defaults
-            memory = _CONVERTER.structure(in_parts(line["memory"]), Memory)
-            if "chemistry" not in line["config"]["policy"]["pack"]:
-                raise ValueError(
-                    "its policy is of the first edition, which spoke of steps: replay it with that version"
-                )
-            rules = Rules.of(_CONVERTER.structure(line["config"], BayConfig))
-        elif bay in parts:
-            before = parts[bay]
-            changed = {name: line[name] for name in Snapshot.__slots__ if name in line}
-            plain = {**before, **changed, "battery": {**before["battery"], **changed.get("battery", {})}}
-        else:
-            return  # the snapshot that it continues is lost
-        snapshot = _CONVERTER.structure(plain, Snapshot)
-        recorded = Recorded(
-            at_s, line["wall"], snapshot, memory, rules, written_s=line["t"], gap=bay in self._stream.gaps
-        )
-        self.record.bays.setdefault(bay, []).append(recorded)
-        parts[bay] = plain
-        self._stream.gaps.discard(bay)
-
-
 def read(paths: Iterable[Path]) -> Record:
-    """Each bay's decisions from journal directories and files (JSON Lines, also gzipped).
-
-    Raises ConfigError for files that cannot be read at all.
-    """
-    reader = _Reader()
-    for path in _files(paths):
-        reader.begin(path)
-        for number, text in _lines(path, reader):
-            reader.take(path, number, text)
-    return reader.end()
+    """All decisions at once, for short journals. Raises ConfigError for files that cannot be read at all."""
+    recording, record = Recording(paths), Record()
+    for one in recording:
+        record.bays.setdefault(one.bay, []).append(one)
+    record.broken = recording.broken
+    return record
 
 
-def _files(paths: Iterable[Path]) -> list[Path]:
-    """The files, and the stream files of directories; the oldest first."""
-    found: list[Path] = []
-    for path in paths:
-        inside = [one for name in STREAMS for one in path.glob(f"{name}*.jsonl*")] if path.is_dir() else [path]
-        if not inside:
-            raise _wrong(path, 1, "there is no journal here: events.jsonl and snapshots.jsonl")
-        found += inside
-    return sorted(found, key=_age, reverse=True)
-
-
-def _age(path: Path) -> int:
-    """`NAME.jsonl` is the newest, `NAME.7.jsonl` the oldest."""
-    age = path.name.partition(".")[2].partition(".")[0]
-    return int(age) if age.isdigit() else 0
-
-
-def _lines(path: Path, reader: _Reader) -> Iterator[tuple[int, bytes]]:
-    number = 0
-    try:
-        check_plain(path, "a journal: JSON Lines, or a directory of them")
-        with (gzip.open if path.suffix == ".gz" else open)(path, "rb") as file:
-            for number, text in enumerate(file, 1):
-                if text.strip():
-                    yield number, text
-    except (EOFError, zlib.error) as error:
-        reader.broken(path, number + 1, f"the file ends here: {error}")
-    except OSError as error:
-        raise _wrong(path, number + 1, f"cannot be read: {error.strerror or error}") from None
-
-
-def _line(text: bytes) -> Fields:
-    """One line's object; ValueError for anything else."""
-    line = json.loads(text)
-    if not isinstance(line, dict) or not all(isinstance(line.get(key), str) for key in ("kind", "bay", "wall")):
-        raise ValueError("it has t, wall, bay and kind")
-    line["t"] = float(line["t"])
-    return line
-
-
-def _spread(events: Iterable[Fields], bays: Mapping[str, list[Recorded]]) -> None:
-    """Assign each event to its decision; drop events whose decision is lost."""
-    by_time = {bay: sorted(steps, key=lambda step: step.at_s) for bay, steps in bays.items()}
-    times = {bay: [step.at_s for step in steps] for bay, steps in by_time.items()}
-    for line in events:
-        near = list(_near(line["t"], by_time.get(line["bay"], []), times.get(line["bay"], [])))
-        if near:
-            later = [step for step in near if step.wall >= line["wall"]]  # a decision is recorded after its events
-            step = min(later or near, key=lambda step: step.wall)
-            fields = {name: value for name, value in line.items() if name not in ("t", "wall", "bay", "kind")}
-            step.events.append((line["kind"], fields))
-
-
-def _near(t_s: float, steps: Sequence[Recorded], times: Sequence[float]) -> Iterator[Recorded]:
-    """The decisions that an event of this time may belong to: one in each boot of the machine."""
-    for at in range(bisect_right(times, t_s) - 1, -1, -1):
-        if times[at] < t_s - STEP_S:
-            return
-        if t_s <= steps[at].written_s:
-            yield steps[at]
-
-
-def _wrong(path: Path, number: int, text: str) -> ConfigError:
-    return ConfigError((Finding(str(path), number, 1, text),))
+def bays_in(paths: Iterable[Path]) -> set[str]:
+    """The names of all bays that have decisions there."""
+    lines = (text for path in files_of(paths) if stream_of(path) != "events" for _, text in lines_of(path) if text)
+    return {found[1].decode(errors="replace") for text in lines if (found := _BAY.search(text, 0, 200)) is not None}

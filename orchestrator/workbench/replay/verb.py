@@ -1,70 +1,154 @@
 """`orchestrator replay`: repeats a journal's decisions and prints the results, line by line."""
 
-from collections.abc import Callable, Iterable
-from itertools import pairwise
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.config.load import load_policy
 from orchestrator.config.policy import Policy
-from orchestrator.errors import OrchestratorError
-from orchestrator.workbench.replay.again import again
-from orchestrator.workbench.replay.otherwise import compare, told
-from orchestrator.workbench.replay.recording import Recorded, read
+from orchestrator.errors import Finding, OrchestratorError
+from orchestrator.workbench.processes import cores
+from orchestrator.workbench.replay.again import Again, Repeater
+from orchestrator.workbench.replay.files import files_of
+from orchestrator.workbench.replay.otherwise import Comparison, told
+from orchestrator.workbench.replay.recording import Recorded, Recording, bays_in
 
 #: At most this many deviations are shown per bay.
 SHOWN = 20
+#: A journal of more bytes is long.
+LONG = 500_000
 Show = Callable[[str], None]
 
 
-def replay(journals: Iterable[Path], policy: str | None, bays: Iterable[str] = (), show: Show = print) -> int:
+def replay(
+    journals: Iterable[Path],
+    policy: str | None,
+    bays: Collection[str] = (),
+    since: str = "",
+    show: Show = print,
+    *,
+    jobs: int = 1,
+) -> int:
     """Replay each bay, or those named; returns 1 if, without `policy`, a decision differs from the recording.
 
-    Raises ConfigError if journals or policy cannot be read, OrchestratorError if nothing is recorded.
+    `since`: only decisions from this time on (RFC 3339, UTC). `jobs`: as many processes share the bays. Raises
+    ConfigError if journals or policy cannot be read, OrchestratorError if nothing is recorded.
     """
-    other = load_policy(policy) if policy else None
-    record = read(journals)
-    recorded = record.bays
-    if record.broken:
-        lines = (
-            "1 line cannot be read and is"
-            if len(record.broken) == 1
-            else f"{len(record.broken)} lines cannot be read and are"
-        )
-        show(f"{lines} passed over, the first: {record.broken[0]}")
-    chosen = {name: recorded.get(name, []) for name in bays} or recorded
-    if record.broken and not recorded:
+    paths, other = tuple(journals), load_policy(policy) if policy else None
+    recorded = bays_in(paths)
+    chosen = sorted(set(bays) or recorded)
+    shares = [share for number in range(jobs) if (share := chosen[number::jobs])]
+    results = _all_shares(paths, other, shares, since)
+    broken = sorted({finding for result in results for finding in result.broken})
+    if broken:
+        lines = "1 line cannot be read and is" if len(broken) == 1 else f"{len(broken)} lines cannot be read and are"
+        show(f"{lines} passed over, the first: {broken[0]}")
+    if broken and not recorded:
         raise OrchestratorError(
             "there is no journal in these files: name a journal's directory, or its snapshots.jsonl"
         )
-    missing = [name for name, steps in chosen.items() if not steps]
-    if missing or not chosen:
+    found = {outcome.bay: outcome for result in results for outcome in result.outcomes}
+    missing = [name for name in chosen if name not in found]
+    if (missing and bays) or not found:
+        since_then = f" since {since}" if since else ""
         raise OrchestratorError(
-            f"nothing is recorded of {', '.join(missing) or 'any bay'} "
-            f"(recorded: {', '.join(recorded) or 'none'}): snapshots need journal.snapshots in the station file"
+            f"nothing is recorded of {', '.join(missing) or 'any bay'}{since_then} "
+            f"(recorded: {', '.join(sorted(recorded)) or 'none'}): "
+            "snapshots need journal.snapshots in the station file"
         )
-    outcomes = [
-        _otherwise(bay, steps, other, show) if other else _same(bay, steps, show) for bay, steps in chosen.items()
-    ]
-    return max(outcomes)
+    for _, outcome in sorted(found.items()):
+        for line in outcome.lines:
+            show(line)
+    return max(outcome.status for outcome in found.values())
 
 
-def _same(bay: str, steps: list[Recorded], show: Show) -> int:
-    wrong = [one for one in again(steps) if one.wrong]
-    for one in wrong[:SHOWN]:
-        show(f"{bay}  {one.recorded.wall}  {one.wrong}")
-    if len(wrong) > SHOWN:
-        show(f"{bay}  … and {len(wrong) - SHOWN} more")
-    span_s = sum(max(after.at_s - before.at_s, 0.0) for before, after in pairwise(steps) if not after.gap)
-    verdict = f"{len(wrong)} are NOT as recorded" if wrong else "all as recorded"
-    show(f"{bay}: {len(steps)} decisions in {span_s:.0f} s taken again: {verdict}")
-    return 1 if wrong else 0
+def processes_for(journals: Iterable[Path]) -> int:
+    """One per core, unless the journal is replayed sooner than they have begun."""
+    size = sum(path.stat().st_size for path in files_of(journals) if path.is_file())
+    return len(os.sched_getaffinity(0)) if size > LONG else 1
 
 
-def _otherwise(bay: str, steps: list[Recorded], policy: Policy, show: Show) -> int:
-    differences = compare(again(steps), policy)
-    for difference in differences:
-        show("\n".join((f"{bay}  {next(lines := told(difference))}", *lines)))
-    names = {one.rules.policy.policy for one in steps if one.rules is not None}
-    found = f"{len(differences)} difference{'s' * (len(differences) != 1)}"
-    show(f"{bay}: {len(steps)} decisions, {found} ({', '.join(names)} → {policy.policy})")
-    return 0
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The result for one bay."""
+
+    bay: str
+    status: int
+    lines: list[str]  #: for people
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """The results for some bays, and the lines that could not be read meanwhile."""
+
+    outcomes: list[Outcome]
+    broken: list[Finding]
+
+
+def _all_shares(paths: Sequence[Path], other: Policy | None, shares: list[list[str]], since: str) -> list[Share]:
+    """The first share is ours, the others are for other processes."""
+    if len(shares) < 2:
+        return [replay_share(paths, other, share, since) for share in shares or [[]]]
+    with cores(len(shares) - 1) as pool:
+        others = [pool.submit(replay_share, paths, other, share, since) for share in shares[1:]]
+        return [replay_share(paths, other, shares[0], since), *(one.result() for one in others)]
+
+
+def replay_share(paths: Sequence[Path], other: Policy | None, bays: Collection[str], since: str) -> Share:
+    """Replay these bays."""
+    recording, found = Recording(paths, bays, since), dict[str, _Bay]()
+    for recorded in recording:
+        if recorded.bay not in found:
+            found[recorded.bay] = _Bay(recorded.bay, other)
+        found[recorded.bay].take(recorded, counts=recorded.wall >= since)
+    return Share([bay.outcome() for bay in found.values() if bay.count], recording.broken)
+
+
+class _Bay:
+    """One bay's decisions, repeated as they are read; with another policy, compared."""
+
+    def __init__(self, name: str, other: Policy | None) -> None:
+        self.name = name
+        self._lines: list[str] = []
+        self.count = 0  #: decisions repeated, of those asked for
+        self._other, self._comparison = other, Comparison(other) if other is not None else None
+        self._repeater = Repeater()
+        self._policies: set[str] = set()
+        self._wrong = 0
+        self._span_s, self._last_s = 0.0, 0.0
+
+    def take(self, recorded: Recorded, *, counts: bool) -> None:
+        """Repeat this decision; one that does not count only leads up to those that do."""
+        one = self._repeater.take(recorded)
+        if not counts:
+            return
+        if self.count and not recorded.gap:
+            self._span_s += max(recorded.at_s - self._last_s, 0.0)
+        self.count, self._last_s = self.count + 1, recorded.at_s
+        if self._comparison is not None:
+            self._policies.add(one.rules.policy.policy)
+            self._comparison.take(one)
+        elif one.wrong:
+            self._deviates(one)
+
+    def _deviates(self, one: Again) -> None:
+        self._wrong += 1
+        if self._wrong <= SHOWN:
+            self._lines.append(f"{self.name}  {one.recorded.wall}  {one.wrong}")
+
+    def outcome(self) -> Outcome:
+        """The result, with a summary."""
+        if self._comparison is not None and self._other is not None:
+            return Outcome(self.name, 0, list(self._differences(self._comparison, self._other.policy)))
+        more = [f"{self.name}  … and {self._wrong - SHOWN} more"] if self._wrong > SHOWN else []
+        verdict = f"{self._wrong} are NOT as recorded" if self._wrong else "all as recorded"
+        summary = f"{self.name}: {self.count} decisions in {self._span_s:.0f} s taken again: {verdict}"
+        return Outcome(self.name, 1 if self._wrong else 0, [*self._lines, *more, summary])
+
+    def _differences(self, comparison: Comparison, policy: str) -> Iterator[str]:
+        for difference in comparison.differences:
+            yield "\n".join((f"{self.name}  {next(lines := told(difference))}", *lines))
+        names = ", ".join(sorted(self._policies))
+        count = len(comparison.differences)
+        yield f"{self.name}: {self.count} decisions, {count} difference{'s' * (count != 1)} ({names} → {policy})"

@@ -55,9 +55,9 @@ OURS: tuple[Seed, ...] = (
         "a journal with one unreadable line is not replayed",
         ("a record over lives",),
         (
-            f"{WORKBENCH}replay/recording.py",
-            "        except (BaseValidationError, LookupError, TypeError, ValueError, ",
-            "        except (",
+            f"{WORKBENCH}replay/files.py",
+            "                except (LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:\n",
+            "                except (RecursionError, OverflowError) as error:\n",
         ),
     ),
     scene(
@@ -74,10 +74,9 @@ OURS: tuple[Seed, ...] = (
         "events of the second boot are searched in the first boot's decisions",
         ("tests/workbench/test_replay.py",),
         (
-            f"{WORKBENCH}replay/recording.py",
-            '            later = [step for step in near if step.wall >= line["wall"]]  # a decision '
-            "is recorded after its events\n",
-            "            later = near[-1:]\n",
+            f"{WORKBENCH}replay/events.py",
+            "        while self._run != run and run in self._runs and self._next is not None:\n",
+            "        while not self._run and self._next is not None:\n",
         ),
     ),
 )

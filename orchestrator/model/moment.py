@@ -1,0 +1,15 @@
+"""Moments, to the millisecond."""
+
+from math import floor
+
+#: Less than any clock resolves: products of floats may lie this much below a whole number.
+_EPSILON = 1e-6
+
+
+def moment(t_s: float) -> float:
+    """The millisecond that `t_s` is in, rounded down: an age computed from it is never too young.
+
+    What decisions are made from is recorded exactly, and the digits beyond milliseconds are noise that nobody needs but
+    every journal would have to keep: they cannot be compressed.
+    """
+    return floor(t_s * 1000 + _EPSILON) / 1000
