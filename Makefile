@@ -22,7 +22,7 @@ test: .venv/dev.stamp  ## all tests, three files at a time; ARGS='tests/core -k 
 # time them. The other tests run in `make test`.
 COVERED := core interlock lastresort protocol
 COVERING := tests/core tests/guardian tests/interlock tests/protocol tests/link/test_serial.py \
-	tests/service/test_asking.py --ignore=tests/guardian/test_estop.py --ignore=tests/guardian/test_kills.py \
+	tests/service/test_asking.py tests/whole/test_beginning.py --ignore=tests/guardian/test_estop.py --ignore=tests/guardian/test_kills.py \
 	--deselect=tests/core/test_decide.py::test_whatever_comes_it_decides_soberly \
 	--deselect=tests/core/test_decide.py::test_whatever_happened_a_person_gets_it_charging_again
 

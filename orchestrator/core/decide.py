@@ -14,7 +14,7 @@ from orchestrator.core.history import stage as stages
 from orchestrator.core.machine import fire
 from orchestrator.core.memory import Memory, Sequence
 from orchestrator.core.next_transition import next_transition
-from orchestrator.core.operator import handle_request
+from orchestrator.core.operator import handle_request, held_back
 from orchestrator.core.parts import changed
 from orchestrator.core.rules import Rules
 from orchestrator.core.safestop import must_stop, stands_by
@@ -95,7 +95,7 @@ def _requested(f: Facts, request: Request | None, not_persisted: Cause | None) -
         refusal = heard.refusal
         f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
     if (hold := shared(f.charger)) is not None:
-        f = f.with_memory(changed(f.memory, operator=changed(f.memory.operator, hold=hold)))
+        f = f.with_memory(changed(f.memory, operator=held_back(f.memory.operator, hold)))
         refusal = hold if request is Request.START else refusal
     return f, refusal
 

@@ -67,6 +67,11 @@ def stopped(known: Operator) -> Operator:
     return changed(known, hold=STOPPED)
 
 
+def held_back(known: Operator, why: Cause) -> Operator:
+    """The operator's part of the memory where nobody but a person may let a charge begin, for this reason."""
+    return changed(known, hold=why)
+
+
 def _refused(memory: Memory, why: Cause) -> Heard:
     return Heard(memory.operator, memory.faults, why)
 

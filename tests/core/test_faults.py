@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.core.active import OWN_ADVICE
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
-from orchestrator.core.faults import FAULTS, ROW, Check, Clear, FaultRow
+from orchestrator.core.faults import FAULTS, RANK, ROW, Check, Clear, FaultRow
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
 from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import measured, pack, paired, standby
@@ -49,6 +49,11 @@ def test_a_row_makes_sense(row: FaultRow) -> None:
     assert len(advice) > 10
     assert advice[0].islower()
     assert advice[-1] != "."
+
+
+def test_a_fault_that_is_not_in_the_table_trips_and_is_told_after_all_others() -> None:
+    assert (ROW["of a later version"].effect, ROW["of a later version"].clear) == (Effect.TRIP, Clear.RESET)
+    assert RANK["of a later version"] > max(RANK.values())
 
 
 def test_the_rows_are_one_each() -> None:

@@ -8,10 +8,21 @@ import pytest
 from orchestrator.config.policy import Band, Policy, Table, Where
 from orchestrator.core.decide import PRECHARGE
 from orchestrator.core.facts import Facts
-from orchestrator.core.limits import choose
+from orchestrator.core.limits import choose, present
+from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.keys import Range, Source
-from orchestrator.model import BatteryStatus, ChargeMode, CurrentStep, Precharge, Request, Setpoint, Snapshot, State
+from orchestrator.model import (
+    BatteryStatus,
+    ChargeMode,
+    CurrentStep,
+    Measurement,
+    Precharge,
+    Request,
+    Setpoint,
+    Snapshot,
+    State,
+)
 from tests.core.bays import POLICY, charging
 from tests.core.said import reason_of, say
 from tests.core.world import STEPS_A, TICK_S, World, bay
@@ -451,3 +462,17 @@ def test_a_pause_may_come_back_as_often_as_it_must() -> None:
             world.values["temperature_c"] = celsius
             world.run(3)
         world.until(State.CHARGING, 60)
+
+
+def test_a_row_is_told_with_the_present_value_whatever_it_was_chosen_by() -> None:
+    world = charging()
+    key = next(bound.key for bounds in world.rules.table_bounds for bound in bounds if "soc_pct" in bound.key)
+    for soc_pct, words in ((55.0, "SOC 55 % in"), (99.0, "SOC 99 % has left")):
+        snapshot = world.snapshot(None, "")
+        battery = replace(snapshot.battery, soc_pct=Measurement(soc_pct, world.now_s))
+        cause = present(key, replace(snapshot, battery=battery), world.memory, world.rules)
+        assert cause is not None
+        assert cause.key == key
+        assert words in say(cause)
+    assert present("limits.current_a", world.snapshot(None, ""), world.memory, world.rules) is None
+    assert present(key, world.snapshot(None, ""), Memory(), world.rules) is None  # nothing was decided yet
