@@ -465,12 +465,12 @@ def test_a_pause_may_come_back_as_often_as_it_must() -> None:
 
 
 def test_a_row_is_told_with_the_present_value_whatever_it_was_chosen_by() -> None:
-    world = charging()
+    world, nearly_full = charging(), World(soc_pct=92.0).charging()
     key = next(bound.key for bounds in world.rules.table_bounds for bound in bounds if "soc_pct" in bound.key)
-    for soc_pct, words in ((55.0, "SOC 55 % in"), (99.0, "SOC 99 % has left")):
-        snapshot = world.snapshot(None, "")
-        battery = replace(snapshot.battery, soc_pct=Measurement(soc_pct, world.now_s))
-        cause = present(key, replace(snapshot, battery=battery), world.memory, world.rules)
+    for one, soc_pct, words in ((world, 55.0, "SOC 55 % in"), (nearly_full, 92.0, "SOC 92 % has left")):
+        snapshot = one.snapshot(None, "")
+        battery = replace(snapshot.battery, soc_pct=Measurement(soc_pct, one.now_s))
+        cause = present(key, replace(snapshot, battery=battery), one.memory, one.rules)
         assert cause is not None
         assert cause.key == key
         assert words in say(cause)
