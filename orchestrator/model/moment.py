@@ -7,7 +7,7 @@ _EPSILON = 1e-6
 
 
 def moment(t_s: float) -> float:
-    """The millisecond that `t_s` is in, rounded down: an age computed from it is never too young.
+    """The millisecond that `t_s` is in, rounded down: an age between two of them is wrong by less than one.
 
     What decisions are made from is recorded exactly, and the digits beyond milliseconds are noise that nobody needs but
     every journal would have to keep: they cannot be compressed.
