@@ -326,6 +326,8 @@ PAIR = (
     Edge(measured.over_voltage, "55.21 V at the pack, the limit is 55.2 V", bmu={"voltage_v": 55.21}),
     Edge(measured.over_voltage, None, charger={"t_s": ago(9)}, bmu={"voltage_v": None}),
     Edge(measured.volts_disagree, None, charger={"voltage_v": 49.0}),
+    Edge(measured.volts_disagree, DIFFERS.replace("48.51", "53.00"), charger={"voltage_v": 53.0},
+         bmu={"soc_pct": None}),
     Edge(measured.volts_disagree,
          "the charger reads 49.01 V, the BMU 48.00 V: not the same battery, or a bad connection",
          charger={"voltage_v": 49.01}),
