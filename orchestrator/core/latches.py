@@ -25,6 +25,7 @@ CLEAN_S = 10.0
 BACKOFF_S = (10.0, 60.0, 300.0)
 #: Strikes are forgotten after this long; one more strike than there are backoffs latches.
 STRIKES_S = 3600.0
+#: Of a row that has seen nothing until now.
 UNKNOWN = FaultMemory()
 
 

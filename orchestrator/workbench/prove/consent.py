@@ -51,7 +51,7 @@ def waits_for_a_start(taken: Taken) -> str | None:
     before, after, asked = taken.before, taken.after, taken.snapshot.request
     waiting = _waiting(after)
     gone = _waiting(before) - waiting
-    left = {name for name in gone if ROW[name].departs and not taken.snapshot.battery_link.online} if gone else gone
+    left = {name for name in gone if ROW[name].departs and not taken.snapshot.battery_link.online}
     if gone > left and asked not in (Request.START, Request.RESET):
         return f"{min(gone - left)} has gone without a person"
     waits = bool(after.operator.hold or waiting)

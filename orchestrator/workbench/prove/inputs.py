@@ -96,7 +96,7 @@ def _switched(said: Said, _: float) -> None:
 
 _STANDBY = _reading(operation=Operation.STOPPED, charge_mode=ChargeMode.FULL, current_a=0.0)
 
-#: What inputs are made from, because that is much faster than by their constructors.
+#: As in `batteries.py`.
 READING = ChargerReading(0.0, 0.0, 0.0, None, None, None, None, None, None)
 LINK, SNAPSHOT, RESUME = ChargerLink(), Snapshot(), Command(Action.RESUME)
 
