@@ -16,9 +16,10 @@ from unittest.mock import patch
 from orchestrator.config.load import load_policy
 from orchestrator.core import latches, safestop
 from orchestrator.core.faults import FAULTS, FaultRow
-from orchestrator.core.states import SETTLED
+from orchestrator.core.states import QUIET, SETTLED
 from orchestrator.model import STOP, Action, Alarm, Cause, ControlMode, Effect, Request, State
 from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
+from orchestrator.service.bay import QUIET_TICK_S
 from orchestrator.sim.faults import FAULTS as INJECTIONS
 from orchestrator.sim.pack import Pack
 from orchestrator.sim.presets import PACKS
@@ -239,7 +240,8 @@ class Run:
         self._standing = decision.command == STOP
         self.forced = "seen by the grid"
         self.world.supervisor._wake.put(0)
-        lasts_s = self.cell.row.for_s + 0.3 + 0.5 * self.cell.row.polls
+        looks_s = QUIET_TICK_S if decision.state in QUIET else 0.0  # a bay at rest looks so rarely
+        lasts_s = self.cell.row.for_s + 0.3 + 0.5 * self.cell.row.polls + 2 * looks_s
         self.time.call_later(lasts_s, self._gone)
         self.time.call_later(lasts_s + SETTLE_S, self._judge)
 

@@ -47,7 +47,7 @@ PATHS: dict[str, Script] = {
     "QUALIFYING → IDLE": _script(HALF, (3.0, "implausible_soc", 99.0)),
     "IDLE → HELD → IDLE → OFFLINE": _script(IDLES, (4.0, "stop"), (5.0, "start"), (6.0, "charger_cut_off")),
     "QUALIFYING → HELD → OFFLINE → TRIPPED → HELD": _script(
-        HALF, (3.0, "stop"), (4.0, "charger_cut_off"), (7.0, "heal"), (7.0, "status_bits"), (10.0, "heal"),
+        HALF, (3.0, "stop"), (4.0, "charger_cut_off"), (5.5, "status_bits"), (8.0, "heal"),
         (16.0, "reset")
     ),
     "QUALIFYING → OFFLINE": _script(HALF, (3.0, "bmu_reboot")),

@@ -55,7 +55,7 @@ def mends(on: World) -> None:
 
 def test_from_the_start_to_a_full_charge_and_back() -> None:
     """From the bottom of the deep discharge through every state; recharged after some use."""
-    assert played({120.0: lambda on: on.rigs[0].bay.pack.set_soc(50.0)}, 150.0, soc_pct=-100.0) == [
+    assert played({120.0: lambda on: on.rigs[0].bay.pack.set_soc(50.0)}, 160.0, soc_pct=-100.0) == [
         (S.STARTING, False),
         (S.OFFLINE, True),
         (S.IDLE, True),

@@ -19,7 +19,7 @@ from tests.proof.virtual_service import FIRST_NODE, World, station, world
 S = State
 #: Faults that only report somebody else's presence.
 SAID = {"other_master", "heartbeat_set"}
-START_S, END_S = 6.0, 40.0
+START_S, END_S = 8.0, 42.0
 
 
 @dataclass

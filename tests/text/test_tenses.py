@@ -6,7 +6,7 @@ from orchestrator.text.catalogue import LANGUAGES
 from orchestrator.text.en.links import TEXTS
 
 #: Verbless, or never the evidence of a fault.
-WITHOUT = {"bmu_not_asked", "bmu_internal", "charger_internal"}
+WITHOUT = {"bmu_not_asked", "charger_no_reply", "bmu_internal", "charger_internal"}
 EVIDENCE = [id_ for id_ in TEXTS if id_.startswith(("bmu_", "charger_")) and id_ not in WITHOUT]
 
 
