@@ -7,10 +7,10 @@ from orchestrator.config.station import Station
 from orchestrator.service.journal import EVENTS_SHARE
 
 #: What one charging bay writes for a replay, compressed, by the number of bays on its CAN bus: up to that many, bytes a
-#: second. Many bays on one bus are read more rarely. The only bay of a station writes more: records of several have
-#: much in common. Measured, with a margin, by `tests/proof/test_journal_size.py`, with volts that never stand still.
-SNAPSHOTS_B_S = ((8, 88.0), (128, 75.0))
-ALONE_B_S = 115.0
+#: second. Several bays write less each: their records have much in common. Measured, with a margin, by
+#: `tests/proof/test_journal_size.py`, with volts that never stand still.
+SNAPSHOTS_B_S = ((2, 55.0), (128, 45.0))
+ALONE_B_S = 80.0
 #: What its events add: some twenty kilobytes for a charge of two hours, written as text and again compressed.
 EVENTS_B_S = 3.0
 DAY_S, MB = 86_400.0, 1_000_000

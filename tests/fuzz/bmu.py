@@ -3,6 +3,7 @@
 from orchestrator.config.load import load_map
 from orchestrator.devices.other_masters import MOST_OPEN
 from orchestrator.model import BatteryReading, Cause, Measurement
+from orchestrator.model.moment import moment
 from orchestrator.protocol.pages import parse_page
 from orchestrator.protocol.sdo import NMT_COB_ID, SdoMalformed, parse_reply
 from orchestrator.protocol.words import decode_word
@@ -100,7 +101,7 @@ class Session:
         self._shown = bench.node.view
         for name in BatteryReading.__slots__:
             value = getattr(bench.reading, name)
-            assert value is None or (value.value in self._ranges[name] and value.t_s <= bench.now_s), name
+            assert value is None or (value.value in self._ranges[name] and value.t_s <= moment(bench.now_s)), name
         assert link.online == (say(link.problem) == "")
         assert set(link.implausible) <= set(self._ranges)
         for text in (

@@ -5,6 +5,7 @@ from contextlib import suppress
 from orchestrator.devices.dialogue import SILENCE, Dialogue
 from orchestrator.errors import ProtocolError
 from orchestrator.model import ChargerReading
+from orchestrator.model.moment import moment
 from orchestrator.protocol.charger import parse_error, parse_status, parse_values, status_values
 from orchestrator.protocol.frame import MAX_DATA, MAX_FRAME, Frame, FrameDecoder, why_bad
 from orchestrator.protocol.standby import ANSWER_BYTES, stands_by
@@ -83,7 +84,7 @@ class Session:
         link = self.dialogue
         assert 0 <= link.missing <= MAX_FRAME and link.heard in SILENCE
         if reading is not None:
-            assert reading.t_s == self.asked_s
+            assert self.asked_s is not None and reading.t_s == moment(self.asked_s)
             fields = [getattr(reading, name) for name in ChargerReading.__slots__ if name != "illegal"]
             assert fields.count(None) == len(reading.illegal)
             self.asked_s = None

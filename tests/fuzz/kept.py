@@ -41,7 +41,7 @@ def _is_no_free_start(persisted: Persisted, memory: Memory) -> None:
     """What was latched or held is latched or held again."""
     assert type(memory.operator.paused) is bool and isinstance(memory.operator.hold, Cause | None)
     for name in persisted.faults:
-        assert name in memory.faults if name in ROW else memory.operator.hold
+        assert name in memory.faults or (name not in ROW and memory.operator.hold)
     assert not persisted.running or "found_running" in memory.faults
 
 

@@ -199,6 +199,13 @@ SCENES: dict[str, Script] = {
         h(9, "boot"),
         end_s=T + 24,
     ),
+    "cut off and not heard, killed at once": _scene(
+        h(0, "fault", 0, None, "charger_cut_off"),
+        h(0, "fault", 0, None, "bmu_silent"),
+        h(1, "kill both"),
+        h(2, "boot"),
+        end_s=T + 24,
+    ),
     # 12. Others on the bus.
     **{f"on the bus, {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
     "a temperature that is forged": _scene(

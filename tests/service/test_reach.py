@@ -28,14 +28,14 @@ def the_station(bays: int, max_mb: float, *, snapshots: bool = True, buses: int 
     [
         (
             the_station(1, 256.0),
-            "with the bay charging day and night, 256 MB hold about 23 days to replay; about 10 MB",
+            "with the bay charging day and night, 256 MB hold about 33 days to replay; about 7 MB",
         ),
         (
             the_station(16, 1000.0),
-            "with 16 bays charging day and night, 1000 MB hold about 9 days to replay; about 108",
+            "with 16 bays charging day and night, 1000 MB hold about 14 days to replay; about 66",
         ),
-        (the_station(64, 1000.0, buses=4), "1000 MB hold about 52 hours to replay; about 431 MB are written a day"),
-        (the_station(16, 1000.0, buses=16), "1000 MB hold about 7 days to replay"),
+        (the_station(64, 500.0, buses=4), "500 MB hold about 43 hours to replay; about 265 MB are written a day"),
+        (the_station(16, 1000.0, buses=16), "1000 MB hold about 12 days to replay"),
         (
             the_station(2, 20.0, snapshots=False),
             "20 MB hold the events of about 4 days, and nothing to replay; about 1",

@@ -225,8 +225,11 @@ def test_a_second_service_on_the_same_journal_ends_with_a_sentence(station: Stat
     _, service = station
     service.start()
     other = tmp_path / "other.yaml"
-    text = service.file.read_text(encoding="utf-8")
-    other.write_text(text.replace("run/orchestrator.sock", "run/other.sock"), encoding="utf-8")
+    document = json.loads(service.file.read_text(encoding="utf-8"))
+    document["control"]["socket"] = "run/other.sock"
+    for bay in document["bays"]:
+        bay["charger"]["port"] += "-other"
+    other.write_text(json.dumps(document), encoding="utf-8")
     command = [sys.executable, "-m", "orchestrator", "run", str(other)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert done.returncode != 0

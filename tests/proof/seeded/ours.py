@@ -67,6 +67,11 @@ OURS: tuple[Seed, ...] = (
         ("a record over lives",),
         (f"{WORKBENCH}replay/recording.py", 'BREAKS = frozenset({"run", "lost"})', 'BREAKS = frozenset({"lost"})'),
         (f"{WORKBENCH}replay/again.py", "if recorded.gap or recorded.memory.last_s is None:", "if recorded.gap:"),
+        (
+            f"{WORKBENCH}replay/again.py",
+            "elif ours is not None and ours.last_s == recorded.memory.last_s:",
+            "elif ours is not None:",
+        ),
     ),
     part(
         "a reboot loses events",

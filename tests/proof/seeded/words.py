@@ -18,7 +18,7 @@ WORDS: tuple[Seed, ...] = (
         "a restart ends the alarm",
         "words",
         "a charger that ran when the service died and is not heard raises no alarm",
-        ("cut off and not heard, then killed",),
+        ("cut off and not heard, killed at once",),
         (f"{CORE}alarm.py", "    unknown = memory.stop.unverified and", "    unknown = False and"),
         (
             f"{CORE}safestop.py",
