@@ -2,8 +2,8 @@
 
 from math import floor
 
-#: Less than any clock resolves: products of floats may lie this much below a whole number.
-_EPSILON = 1e-6
+#: In milliseconds: products of floats may lie this much below a whole number, after thirty years without a reboot.
+_EPSILON = 1e-4
 
 
 def moment(t_s: float) -> float:

@@ -82,9 +82,8 @@ class BayRunner:
         """Whether somebody is waiting for an answer."""
         return bool(self._requests or self._answers.waiting)
 
-    @property
     def has_news(self) -> bool:
-        """Whether the next decision cannot wait for the tick."""
+        """Whether the next decision cannot wait for the tick. Any thread may ask."""
         if self.decision is None or self.owes or self._internal:
             return True
         return self.policy.news.matters(self.decision, self._snapshot, self._charger.view, self._battery.view)

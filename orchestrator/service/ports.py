@@ -25,14 +25,21 @@ BEGINNINGS = ("port_not_opened", "port_opened")
 
 
 class ChargerPorts:
-    """The port of every bay, in their order. Each puts its bay's number into `news` when something has changed."""
+    """The port of every bay, in their order. When something has changed, each calls `changed` with its bay's number.
+
+    At first that puts the number into `news`; who reads it may put something in between that lets less through.
+    """
 
     def __init__(self, station: Station, guardian: GuardianLink) -> None:
         self.news: SimpleQueue[int | None] = SimpleQueue()
+        self.changed: Callable[[int], None] = self.news.put
         self.all = tuple(
-            charger_port(bay.charger, bay.limits, partial(self.news.put, number), guardian)
+            charger_port(bay.charger, bay.limits, partial(self._changed, number), guardian)
             for number, bay in enumerate(station.bays)
         )
+
+    def _changed(self, number: int) -> None:
+        self.changed(number)
 
     def start(self) -> None:
         """Stop every charger; returns once each open port has written its stop, or after STOPS_S.

@@ -1,27 +1,27 @@
 """The running service: one thread per serial port, one per CAN bus, and this loop, which wakes on every new reading.
 
-Theory of operation. Devices replace their view and put their bay's number into a queue; the loop makes a decision for
-every bay with news, and for every bay at least once a tick, so that *missing* readings are noticed as well. The loop
-waits only for the queue, and signals only put into it. At the end every bay is stopped and verified.
+Theory of operation. Devices replace their view, and if that is news that cannot wait, their thread puts the bay into a
+queue: waking the loop costs more than looking. The loop makes a decision for every bay with news, and for every bay at
+least once a tick, so that *missing* readings are noticed as well; news goes before ticks. The loop waits only for the
+queue, and signals only put into it. At the end every bay is stopped and verified.
 """
 
 import signal
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from queue import Empty
-from time import CLOCK_BOOTTIME, clock_gettime, monotonic, time
+from time import monotonic, time
 from types import FrameType
 
 from orchestrator.config.station import Station
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
-from orchestrator.devices.charger import ChargerPort
 from orchestrator.link.can import CanBus
 from orchestrator.model import Cause
 from orchestrator.model.moment import moment
 from orchestrator.service.bay import BayRunner
-from orchestrator.service.boot import boot_id
+from orchestrator.service.boot import boot_id, boottime
 from orchestrator.service.closing import close_all
 from orchestrator.service.console import Console
 from orchestrator.service.control import ControlSocket
@@ -46,9 +46,7 @@ LOCK_S = 0.3
 #: … and it has this long.
 LOAD_S = 3.0
 #: The time limits at the end for closing the control socket, writing changes, and closing everything else.
-CONTROL_S = 0.2
-KEEP_S = 2.5
-CLOSE_S = 2.5
+CONTROL_S, KEEP_S, CLOSE_S = 0.2, 2.5, 2.5
 
 
 class Supervisor:
@@ -72,7 +70,7 @@ class Supervisor:
         self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_persisted=self._on_persisted)
         self._buses: list[BatteryBus] = []
         self._bays: list[BayRunner] = []
-        self._build()
+        self._build(ports)
         self._strays = Strays(
             self._store, partial(stray_port, self._guardian, partial(self._wake.put, None)), self._say
         )
@@ -85,7 +83,7 @@ class Supervisor:
             station.control.socket, self._handler.answer, monotonic, self._say, self._language
         )
 
-    def _build(self) -> None:
+    def _build(self, ports: ChargerPorts) -> None:
         """Create the devices for every bay; nothing is opened yet."""
         nodes: dict[str, list[BatteryNode]] = {name: [] for name in self._station.can}
         buses = {
@@ -96,7 +94,7 @@ class Supervisor:
         alone = len(self._station.bays) == 1
         starts = Starts(0.0 if alone else self._station.stagger_s, self._station.source.at("stagger_s"))
         for number, (bay, port) in enumerate(zip(self._station.bays, self._ports, strict=True)):
-            poke: Callable[[], None] = partial(self._wake.put, number)
+            poke: Callable[[], None] = partial(self._changed, number)
             node = BatteryNode(bay.battery.can, bay.battery, budgets[bay.battery.can], poke)
             nodes[bay.battery.can].append(node)
             contactor, snapshots = open_contactor(bay, self._guardian), self._station.journal.snapshots
@@ -105,13 +103,10 @@ class Supervisor:
                 contactor=contactor, starts=starts, snapshots=snapshots, language=self._language,
             )  # fmt: skip
             self._bays.append(runner)
+        ports.changed = self._changed
         self._buses = [
             BatteryBus(bus, nodes[name], budgets[name], monotonic) for name, bus in buses.items() if nodes[name]
         ]
-
-    @property
-    def _devices(self) -> tuple[ChargerPort | BatteryBus, ...]:
-        return (*self._ports, *self._buses)
 
     def run(self) -> int:
         """Run until SIGTERM or SIGINT; returns 0 if every charger was then verified in standby, else 1.
@@ -148,8 +143,8 @@ class Supervisor:
             self._strays.begin()
         for bus in self._buses:
             bus.start()
-        name, socket = self._station.station, str(self._station.control.socket)
-        self._say(Cause.of("service_begins", station=name, bays=len(self._bays), socket=socket))
+        socket = str(self._station.control.socket)
+        self._say(Cause.of("service_begins", station=self._station.station, bays=len(self._bays), socket=socket))
         self._run_all()
 
     def _say(self, cause: Cause) -> None:
@@ -159,6 +154,11 @@ class Supervisor:
     def _run_all(self) -> None:
         for bay in self._bays:
             self._run(bay)
+
+    def _changed(self, number: int) -> None:
+        """A device of this bay has something new, in its thread."""
+        if self._bays[number].has_news():
+            self._wake.put(number)
 
     def _on_persisted(self, places: Collection[Place]) -> None:
         """A change on disk may let a charge begin, or answer a request."""
@@ -176,9 +176,7 @@ class Supervisor:
 
     def _turn(self) -> None:
         """Wait for news, then decide the bays for which it matters, and those without a decision for a tick."""
-        for number in self._news():
-            if self._bays[number].has_news:
-                self._run(self._bays[number])
+        self._decide(self._news(BEAT_S / 2))
         if self._reload_asked:
             self._reload_asked = False
             self._reload.ask()
@@ -186,9 +184,16 @@ class Supervisor:
         for bay in self._bays:
             if now_s >= bay.due_s:
                 self._run(bay)
+                self._decide(self._news())
         if now_s - self._beat_s >= BEAT_S:
             self._strays.look(now_s)
             self._beat(now_s)
+
+    def _decide(self, numbers: Iterable[int]) -> None:
+        """Decide these bays, unless that has been done meanwhile."""
+        for number in numbers:
+            if self._bays[number].has_news():
+                self._run(self._bays[number])
 
     def _run(self, bay: BayRunner) -> None:
         now_s = monotonic()
@@ -197,16 +202,18 @@ class Supervisor:
 
     def _beat(self, now_s: float) -> None:
         """Tell the guardian that every loop makes progress; end if the guardian is gone."""
-        workers = (*self._devices, self._control, self._journal, self._store)
+        workers = (*self._ports, *self._buses, self._control, self._journal, self._store)
         well = not any(worker.stalled(now_s) for worker in workers)
         self._beat_s = now_s
         self._lost = self._guardian.beat(now_s, well=well)
         self._ending = self._ending or self._lost
 
-    def _news(self) -> set[int]:
+    def _news(self, timeout_s: float = 0.0) -> set[int]:
+        """The bays with news; waits at most so long for the first."""
         numbers: set[int | None] = set()
         try:
-            numbers.add(self._wake.get(timeout=BEAT_S / 2))
+            if timeout_s:
+                numbers.add(self._wake.get(timeout=timeout_s))
             while True:
                 numbers.add(self._wake.get_nowait())
         except Empty:
@@ -229,7 +236,7 @@ class Supervisor:
         not_persisted = self._store.close(KEEP_S)
         for bay in self._bays:
             bay.answer()
-        close_all([worker.close for worker in (*self._devices, *self._strays.ports)], CLOSE_S)
+        close_all([worker.close for worker in (*self._ports, *self._buses, *self._strays.ports)], CLOSE_S)
         verdicts = [Cause.of("not_verified", chargers=tuple(unverified))] if unverified else []
         verdicts += [Cause.of("not_written", problem=not_persisted)] if not_persisted is not None else []
         self._say(Cause.of("ended", verdicts=tuple(verdicts)) if verdicts else Cause("ended_well"))
@@ -238,8 +245,3 @@ class Supervisor:
 
     def _unverified(self) -> list[str | Cause]:
         return [*(bay.name for bay in self._bays if not bay.verified), *self._strays.unverified]
-
-
-def boottime() -> float:
-    """Like `monotonic`, but it also runs while the machine is suspended."""
-    return clock_gettime(CLOCK_BOOTTIME)

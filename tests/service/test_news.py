@@ -27,18 +27,18 @@ from tests.service.bench import STEP_S, VOLTS, Bench
 def _bench(tmp_path: Path) -> Bench:
     bench = Bench(tmp_path)
     bench.charging()
-    assert not bench.bay.has_news
+    assert not bench.bay.has_news()
     return bench
 
 
 def charger_says(bench: Bench, **changes: Any) -> bool:
     bench.charger.reading = replace(bench.charger.reading, **changes)
-    return bench.bay.has_news
+    return bench.bay.has_news()
 
 
 def battery_says(bench: Bench, **values: float) -> bool:
     bench.battery.values |= values
-    return bench.bay.has_news
+    return bench.bay.has_news()
 
 
 @pytest.mark.parametrize(
@@ -114,9 +114,9 @@ def test_a_current_just_above_its_step_matters(bench: Bench) -> None:
 def test_a_device_that_falls_silent_or_is_in_trouble_matters(bench: Bench) -> None:
     link = bench.charger.link
     bench.charger.link = replace(link, misses=1)
-    assert bench.bay.has_news
+    assert bench.bay.has_news()
     bench.charger.link = replace(link, bad_pct=3.0, bad_frames=7)
-    assert not bench.bay.has_news
+    assert not bench.bay.has_news()
 
 
 @pytest.mark.parametrize(
@@ -150,12 +150,12 @@ def test_while_something_is_under_way_all_news_matters(bench: Bench) -> None:
     assert bay.decision is not None
     for decision in (replace(bay.decision, command=STOP), replace(bay.decision, state=State.QUALIFYING)):
         bay.decision = decision
-        assert bay.has_news
+        assert bay.has_news()
 
 
 def test_a_request_needs_a_decision(bench: Bench) -> None:
     bench.bay.ask(Asked(Request.STOP))
-    assert bench.bay.has_news
+    assert bench.bay.has_news()
 
 
 def test_at_rest_most_news_waits_too(tmp_path: Path) -> None:
