@@ -17,6 +17,7 @@ from orchestrator.config.station import Station
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
+from orchestrator.devices.charger import ChargerPort
 from orchestrator.link.can import CanBus
 from orchestrator.model import Cause
 from orchestrator.model.moment import moment
@@ -202,8 +203,8 @@ class Supervisor:
 
     def _beat(self, now_s: float) -> None:
         """Tell the guardian that every loop makes progress; end if the guardian is gone."""
-        workers = (*self._ports, *self._buses, self._control, self._journal, self._store)
-        well = not any(worker.stalled(now_s) for worker in workers)
+        devices: tuple[ChargerPort | BatteryBus, ...] = (*self._ports, *self._buses)
+        well = not any(worker.stalled(now_s) for worker in (*devices, self._control, self._journal, self._store))
         self._beat_s = now_s
         self._lost = self._guardian.beat(now_s, well=well)
         self._ending = self._ending or self._lost
@@ -236,7 +237,8 @@ class Supervisor:
         not_persisted = self._store.close(KEEP_S)
         for bay in self._bays:
             bay.answer()
-        close_all([worker.close for worker in (*self._ports, *self._buses, *self._strays.ports)], CLOSE_S)
+        ports = (*self._ports, *self._strays.ports)
+        close_all([*(port.close for port in ports), *(bus.close for bus in self._buses)], CLOSE_S)
         verdicts = [Cause.of("not_verified", chargers=tuple(unverified))] if unverified else []
         verdicts += [Cause.of("not_written", problem=not_persisted)] if not_persisted is not None else []
         self._say(Cause.of("ended", verdicts=tuple(verdicts)) if verdicts else Cause("ended_well"))
