@@ -58,7 +58,7 @@ def unclassed(part: Any) -> Iterator[Field[Any]]:  # noqa: ANN401 - any dataclas
 def _twin(cls: type[Any]) -> tuple[Callable[[Any], tuple[Any, ...]], type[Any]]:
     """A getter for all values of such a record, and a writable class with the same slots."""
     names = [one.name for one in fields(cls)]
-    return attrgetter(*names), make_dataclass(cls.__name__, names, slots=True, eq=False, repr=False, match_args=False)
+    return attrgetter(*names), make_dataclass(cls.__name__, names, slots=True)
 
 
 _TWINS: dict[type[Any], tuple[Callable[[Any], tuple[Any, ...]], type[Any]]] = {}

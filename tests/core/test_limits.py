@@ -474,5 +474,10 @@ def test_a_row_is_told_with_the_present_value_whatever_it_was_chosen_by() -> Non
         assert cause is not None
         assert cause.key == key
         assert words in say(cause)
+    cold = World(
+        bay(with_current(where=(Where(temperature_c=Range(0, 45), soc_pct=Range(0, 90), max_a=8.0),)))
+    ).charging()
+    rule = present("current.where[0]", cold.snapshot(None, ""), cold.memory, cold.rules)
+    assert rule is not None and rule.key == "current.where[0]"
     assert present("limits.current_a", world.snapshot(None, ""), world.memory, world.rules) is None
     assert present(key, world.snapshot(None, ""), Memory(), world.rules) is None  # nothing was decided yet

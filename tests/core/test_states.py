@@ -20,7 +20,7 @@ def test_every_state_has_a_row() -> None:
 
 @pytest.mark.parametrize("kind", Kind)
 def test_a_class_is_what_the_table_says_and_is_used(kind: Kind) -> None:
-    assert getattr(states, kind.name) == {state for state in State if kind in TABLE[state]}
+    assert getattr(states, kind.name) == states._of(kind) == {state for state in State if kind in TABLE[state]}
     assert sum(re.search(rf"\b{kind.name}\b", source) is not None for source in SOURCES) > 1, "nobody uses it"
 
 
