@@ -10,10 +10,11 @@ from orchestrator.core.active import OWN_ADVICE
 from orchestrator.core.checks import battery, charge, obedience, ourselves, reports, state_of_charge
 from orchestrator.core.faults import FAULTS, RANK, ROW, Check, Clear, FaultRow
 from orchestrator.core.latches import BACKOFF_S, CLEAN_S
+from orchestrator.core.memory import Memory, with_values
 from orchestrator.core.states import ENERGISED
 from orchestrator.core.witnesses import measured, pack, paired, standby
 from orchestrator.keys import Range, Source
-from orchestrator.model import STOP, Effect, Request, State
+from orchestrator.model import STOP, Cause, Effect, Request, State
 from orchestrator.text.catalogue import advise
 from tests.core.bays import IN, running_at_the_start
 from tests.core.fault_scenes import SCENES, Scene
@@ -71,6 +72,12 @@ def test_every_predicate_is_in_the_table_and_says_where_it_comes_from() -> None:
     others = {obedience.did_not_stop, state_of_charge.jump_ends_s, state_of_charge.exchange_ends_s}  # no predicates
     assert {row.check for row in FAULTS} - {standby.current_without_order} == predicates - others
     assert all(function.__doc__ for function in predicates)
+
+
+def test_what_was_seen_of_an_exchange_counts_for_a_while() -> None:
+    seen = with_values(Memory(), exchange=(100.0, Cause("soc_jump")))
+    assert state_of_charge.exchange_ends_s(seen) == 100.0 + state_of_charge.EXCHANGE_NEWS_S
+    assert state_of_charge.exchange_ends_s(Memory()) is None
 
 
 def test_every_row_has_a_scene() -> None:

@@ -137,11 +137,19 @@ def test_a_damaged_frame_is_dropped_and_says_what_was_expected(bad: bytes, why: 
     assert why_bad(bad) == why
 
 
-@pytest.mark.parametrize("head", ["AF FA 91", "AF FA 90 02", "AF FA 90 24"])
-def test_a_start_with_a_wrong_address_or_length_is_not_waited_for(head: str) -> None:
+@pytest.mark.parametrize(
+    ("head", "why"),
+    [
+        ("AF FA 91", "address 0x91, expected 0x90"),
+        ("AF FA 90 02", "length 0x02, expected 0x03 … 0x23"),
+        ("AF FA 90 24", "length 0x24, expected 0x03 … 0x23"),
+    ],
+)
+def test_a_start_with_a_wrong_address_or_length_is_not_waited_for(head: str, why: str) -> None:
     decoder = FrameDecoder()
     assert decoder.feed(bytes.fromhex(head)) == []
     assert (waiting(decoder), decoder.bad_frames) == (0, 1)
+    assert why_bad(bytes.fromhex(head)) == why
 
 
 @pytest.mark.parametrize(
