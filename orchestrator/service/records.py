@@ -163,7 +163,7 @@ class SnapshotRecorder:
 
     def begin(self, bay: BayConfig) -> None:
         """Start over with a complete line, with the policy now in force."""
-        self._config = json.loads(json.dumps(asdict(bay), default=str))
+        self._bay = bay
         self._whole_s: float | None = None  # when the last complete line was written; None: one is due
 
     def lines(self, now_s: float, snapshot: Snapshot, memory: Memory, state: State, *, news: bool) -> list[TimedLine]:
@@ -177,7 +177,7 @@ class SnapshotRecorder:
             return self.rest()
         if self._whole_s is None or now_s - self._whole_s >= WHOLE_S:
             lines = self.rest()
-            lines.append((now_s, ("snapshot", partial(_whole, snapshot, memory, self._config))))
+            lines.append((now_s, ("snapshot", partial(_whole, snapshot, memory, self._bay))))
             self._base, self._whole_s = snapshot, now_s
             return lines
         self._rows.append((now_s, snapshot))
@@ -193,6 +193,7 @@ class SnapshotRecorder:
         return [(rows[0][0], ("snapshot", partial(as_columns, base, rows)))]
 
 
-def _whole(snapshot: Snapshot, memory: Memory, config: object) -> dict[str, object]:
+def _whole(snapshot: Snapshot, memory: Memory, bay: BayConfig) -> dict[str, object]:
+    config = json.loads(json.dumps(asdict(bay), default=str))
     said = {one.name: bare(getattr(snapshot, one.name)) for one in fields(snapshot)}
     return {"whole": True, **said, "memory": bare(side_by_side(memory)), "config": config}
