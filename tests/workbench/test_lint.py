@@ -12,7 +12,7 @@ from orchestrator.workbench.prove.lint import LINT
 ODD = Path(__file__).parent / "odd"
 
 
-@pytest.mark.parametrize("name", ["policy", "quick", "narrow", "cells", "station"])
+@pytest.mark.parametrize("name", ["policy", "quick", "narrow", "cells", "physics", "station"])
 def test_each_is_told_at_its_key(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -29,6 +29,8 @@ def test_the_files_have_every_warning() -> None:
         "too near to full", "charging pauses outside", "is refused", "no current flows outside", "will flap",
         "too narrow", "never flow", "the charge is over at", "are a fault", "no charge begins",
         "deeply discharged packs are refused",
+        "leaves no room", "data sheet, not the discharging one", "protect nothing", "has no effect", "cold cells plate",
+        "the colder", "the hotter", "the fuller", "the older", "nearly empty", "is in force instead", "honest instruments",
         "are few for nmc", "is no deep discharge", "refuses packs that are not empty", "% everywhere", "V everywhere",
     ):  # fmt: skip
         assert words in said, words

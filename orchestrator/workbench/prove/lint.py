@@ -14,6 +14,7 @@ from orchestrator.core.checks.battery import HEAT_HYSTERESIS_K
 from orchestrator.core.resting import RECHARGE_DROP_PCT
 from orchestrator.keys import Range
 from orchestrator.workbench.baylint import station_lint
+from orchestrator.workbench.prove.physics import physics_lint
 
 Rows = tuple[Band, ...]
 
@@ -165,6 +166,7 @@ def policy_lint(values: Mapping[str, object]) -> Problems:
         yield from _charges(rows, target_pct)
     yield from _end(values)
     yield from _tables(values)
+    yield from physics_lint(values)
 
 
 LINT = {"policy": policy_lint, "station": station_lint}
