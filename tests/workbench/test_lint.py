@@ -30,7 +30,8 @@ def test_the_files_have_every_warning() -> None:
         "too narrow", "never flow", "the charge is over at", "are a fault", "no charge begins",
         "deeply discharged packs are refused",
         "leaves no room", "data sheet, not the discharging one", "protect nothing", "has no effect", "cold cells plate",
-        "the colder", "the hotter", "the fuller", "the older", "nearly empty", "is in force instead", "honest instruments",
+        "the colder", "the hotter", "the fuller", "the older", "nearly empty", "is in force instead",
+        "honest instruments",
         "are few for nmc", "is no deep discharge", "refuses packs that are not empty", "% everywhere", "V everywhere",
     ):  # fmt: skip
         assert words in said, words

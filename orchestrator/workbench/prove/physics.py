@@ -166,6 +166,6 @@ def _taper(
     if isinstance(amps, float) and last and min(last) <= amps:
         yield (
             f"finish.full.taper.{key}",
-            f"{amps:g} A is no less than a nearly full pack is allowed, {min(last):g} A: half of the step's current is in "
-            "force instead",
+            f"{amps:g} A is no less than a nearly full pack is allowed, {min(last):g} A: half of the step's current is "
+            "in force instead",
         )
