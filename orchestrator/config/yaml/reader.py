@@ -33,7 +33,7 @@ _SCALARS: dict[object, Callable[..., object]] = {
 
 
 class Reader:
-    """Reads one file's tree. `findings`, `values` and `marks` fill while it goes.
+    """Reads one file's tree. `findings`, `values`, `marks` and `lines` fill while it goes.
 
     `references`: for types that are named in the file but described in another one, how to get them; these return
     `INVALID` when they have reported a finding elsewhere and raise `UnfitError` for one at the name itself.
@@ -49,7 +49,7 @@ class Reader:
         self.findings: list[Finding] = []
         self.values: dict[str, object] = {}
         self.marks: dict[str, Mark] = {}
-        self._lines: dict[str, int] = {}
+        self.lines: dict[str, int] = {}
         self._file, self._digest = file, digest
         self._references = references or {}
         self._yesterday = yesterday or Yesterday()
@@ -154,7 +154,7 @@ class Reader:
 
     def _element(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
         self.marks[path] = node.mark
-        self._lines[path] = node.mark.line
+        self.lines[path] = node.mark.line
         return self._value(node, hint, path, key)
 
     def _mapping(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
@@ -168,7 +168,7 @@ class Reader:
 
     def _entry(self, name: Scalar, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - as above
         self.marks[path] = node.mark if node.mark.line == name.mark.line and not _empty(node) else name.mark
-        self._lines[path] = name.mark.line
+        self.lines[path] = name.mark.line
         return self._value(node, hint, path, key)
 
     # --- records ---------------------------------------------------------------------------------------------------
@@ -229,7 +229,7 @@ class Reader:
     def _build(self, record: type, values: dict[str, object], path: str) -> object:
         if any(field.name == "source" for field in dataclasses.fields(record)):
             prefix = f"{path}." if path else ""
-            lines = {at.removeprefix(prefix): line for at, line in self._lines.items() if at.startswith(prefix)}
+            lines = {at.removeprefix(prefix): line for at, line in self.lines.items() if at.startswith(prefix)}
             values["source"] = Source(self._file, lines, self._digest)
         return record(**values)
 

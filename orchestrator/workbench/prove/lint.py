@@ -12,8 +12,8 @@ from orchestrator.config.rules import Problems, Rule, problems
 from orchestrator.core.cells import CHEMISTRIES, EMPTY_PCT
 from orchestrator.core.checks.battery import HEAT_HYSTERESIS_K
 from orchestrator.core.resting import RECHARGE_DROP_PCT
-from orchestrator.keys import Range
-from orchestrator.workbench.baylint import station_lint
+from orchestrator.keys import Range, Source
+from orchestrator.workbench.baylint import bay_lint
 
 Rows = tuple[Band, ...]
 
@@ -157,7 +157,7 @@ _RULES = (
 )
 
 
-def policy_lint(values: Mapping[str, object]) -> Problems:
+def policy_lint(values: Mapping[str, object], _written: Source) -> Problems:
     """Probably unintended entries of a policy, by the paths of its keys."""
     yield from problems(_RULES, values)
     target_pct, rows = values.get("finish.target_soc_pct"), values.get("current.soc_pct.rows")
@@ -167,4 +167,4 @@ def policy_lint(values: Mapping[str, object]) -> Problems:
     yield from _tables(values)
 
 
-LINT = {"policy": policy_lint, "station": station_lint}
+LINT = {"policy": policy_lint, "station": bay_lint}
