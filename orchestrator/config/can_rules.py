@@ -1,11 +1,14 @@
 """What must hold for the CAN buses of one station, and for the filters that it may put on them."""
 
+import os
 from collections.abc import Callable, Mapping
 
 from orchestrator.config.rules import Problems
 from orchestrator.config.yaml.scalars import nearest
 
 BITRATES = (10_000, 1_000_000)  #: bit/s, CiA 301
+#: bit/s, those that CANopen devices know (CiA 301, 5.3).
+CANOPEN_BITRATES = (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)
 SIMULATED = ("virtual", "udp_multicast")  #: buses without a wire, hence without a bit rate
 #: python-can's own; others may come from its plug-ins, so that an unlike name is let through.
 INTERFACES = (
@@ -58,6 +61,31 @@ def _bus(bus: Mapping[str, object]) -> Problems:
             yield "", "the key 'bitrate' is missing: the bus's bit/s (the BMU's document does not say it), e.g. 250000"
     elif not isinstance(bitrate, int) or not BITRATES[0] <= bitrate <= BITRATES[1]:
         yield ".bitrate", f"{bitrate!r} is no bit rate; in bit/s, {BITRATES[0]} … {BITRATES[1]}, e.g. 250000"
+
+
+def nearest_bitrate(bitrate: int) -> int:
+    """The bit rate of CANopen's that is the fewest times larger or smaller."""
+    return min(CANOPEN_BITRATES, key=lambda rate: max(rate, bitrate) / min(rate, bitrate))
+
+
+def device_of(bus: Mapping[str, object]) -> str:
+    """The serial port of a CAN adapter that has one (slcan's channel may end in @ and its speed); "" for others."""
+    channel = bus.get("channel")
+    return channel.partition("@")[0] if isinstance(channel, str) and channel.startswith("/") else ""
+
+
+def shared_port_problems(
+    buses: Mapping[str, Mapping[str, object]], bays: Mapping[str, Mapping[str, object]]
+) -> Problems:
+    """No charger is on the serial port of a CAN adapter."""
+    adapters = {os.path.realpath(device): name for name, bus in buses.items() if (device := device_of(bus))}
+    for path, bay in bays.items():
+        port = bay.get("charger.port")
+        if isinstance(port, str) and (name := adapters.get(os.path.realpath(port))) is not None:
+            yield (
+                f"{path}.charger.port",
+                f"is the port of the CAN adapter {name} (can.{name}.channel): a charger needs a port of its own",
+            )
 
 
 def filter_problems(buses: Mapping[str, Mapping[str, object]], bays: Mapping[str, Mapping[str, object]]) -> Problems:

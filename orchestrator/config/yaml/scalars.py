@@ -19,6 +19,7 @@ _NULL = re.compile(r"~|null", re.IGNORECASE)
 _TRUE = {"true", "yes", "on", "y", "1"}
 _FALSE = {"false", "no", "off", "n", "0"}
 _RANGE = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:\.\.+|…|-|–|~|to|,|;|:|/)\s*([-+]?\d+(?:\.\d+)?)", re.ASCII)
+_URL = re.compile(r"[a-z][a-z\d+.-]*://", re.IGNORECASE)
 _MAX_DIGITS = 40  #: in a number; more is nonsense
 _ALIKE = 0.6  #: out of 1; below it, one word is not a typo of the other
 _MAX_WORD = 64  #: the longest word that is compared with others
@@ -117,8 +118,13 @@ def read_path(node: Scalar, key: KeyRule) -> str:
     text = read_str(node, key)
     if len(text) > _MAX_PATH:
         raise UnfitError(f"a path has at most {_MAX_PATH} characters, this one {len(text)}")
+    if key.is_path and _URL.match(text):
+        raise UnfitError(
+            f"{shown(text)} is a URL; write a device below /dev: only a port of this machine can be locked, have its "
+            "settings checked, and be told to stop when all else hangs"
+        )
     if key.is_path and "/" not in text:
-        example = f"/dev/{text}" if text.startswith(("tty", "gpiochip")) else "/dev/ttyUSB0"
+        example = f"/dev/{text}" if text.startswith(("tty", "gpiochip")) else "/dev/serial/by-path/…"
         raise UnfitError(f"{shown(text)} is not a whole path: write e.g. {example[:_MAX_DIGITS]}")
     return text
 

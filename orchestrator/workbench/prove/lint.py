@@ -14,6 +14,8 @@ from orchestrator.core.checks.battery import HEAT_HYSTERESIS_K
 from orchestrator.core.resting import RECHARGE_DROP_PCT
 from orchestrator.keys import Range, Source
 from orchestrator.workbench.baylint import bay_lint
+from orchestrator.workbench.disklint import disk_lint
+from orchestrator.workbench.wiringlint import wiring_lint
 
 Rows = tuple[Band, ...]
 
@@ -167,4 +169,10 @@ def policy_lint(values: Mapping[str, object], _written: Source) -> Problems:
     yield from _tables(values)
 
 
-LINT = {"policy": policy_lint, "station": bay_lint}
+def station_lint(values: Mapping[str, object], written: Source) -> Problems:
+    """Probably unintended entries of a station: its policies at its chargers, its wiring, its places on the disk."""
+    for lint in (bay_lint, wiring_lint, disk_lint):
+        yield from lint(values, written)
+
+
+LINT = {"policy": policy_lint, "station": station_lint}
