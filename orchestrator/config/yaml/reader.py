@@ -13,6 +13,7 @@ from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
 
 from orchestrator.config.yaml import scalars
+from orchestrator.config.yaml.numbers import decimals_meant, range_meant
 from orchestrator.config.yaml.scalars import UnfitError
 from orchestrator.config.yaml.schema import INVALID, Slot, join, slots, told_keys
 from orchestrator.config.yaml.tree import Entries, Items, Mark, Node, Refused, Scalar
@@ -120,8 +121,7 @@ class Reader:
 
     def _range(self, node: Node, path: str, key: KeyRule) -> object:
         if not isinstance(node, Items) or len(node.items) != 2:
-            meant = scalars.range_meant(node.text) if isinstance(node, Scalar) else ""
-            much = f", two numbers (2.5, not 2,5), not {len(node.items)}" if isinstance(node, Items) else ""
+            meant, much = range_meant(node)
             self.report(path, f"write {meant or '[low, high]'}{much}: {key.about}")
             return INVALID
         low, high = (self._element(item, float, f"{path}[{i}]", key) for i, item in enumerate(node.items))
@@ -138,6 +138,9 @@ class Reader:
             return INVALID
         if not node.items:
             self.report(path, f"needs at least one item: {key.about}")
+            return INVALID
+        if hint is float and (meant := decimals_meant(node)):
+            self.report(path, f"a decimal has a point, not a comma: write {meant}")
             return INVALID
         values = tuple(self._element(item, hint, f"{path}[{i}]", key) for i, item in enumerate(node.items))
         return INVALID if INVALID in values else values
