@@ -191,8 +191,9 @@ def _probe(arguments: argparse.Namespace) -> int:
 
 
 def _demo(arguments: argparse.Namespace) -> int:
+    from orchestrator.demo.run import demo
+
     try:
-        from orchestrator.demo.run import demo
+        return demo(arguments.fault, plain=arguments.plain)
     except ImportError as error:
         raise missing("the demo", error, "demo") from None
-    return demo(arguments.fault, plain=arguments.plain)
