@@ -39,8 +39,12 @@ def test_a_node_id_is_read_as_hexadecimal_where_that_is_possible(text: str, said
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("14,5 V", "write 14.5, not 14,5 V"),
-        ("5A", "only the number, without a unit: 5, not 5A"),  # never 0x5A
+        ("14,5 V", "only the number, without a unit: 14.5, not 14,5 V"),
+        ("5V", "only the number, without a unit: 5, not 5V"),
+        ("58 max", "only the number, without a unit: 58, not 58 max"),
+        ("55200 mV", "write 55.2, in V, not 55200 mV"),
+        ("0,0584 kV", "write 58.4, in V, not 0,0584 kV"),
+        ("5A", "5A is no number in V: write how many V are meant"),  # never 0x5A
         ("5V3", "'5V3' is not a number in V"),  # 5 would be wrong
         ("≤ 58.4", "only the number: 58.4, not ≤ 58.4"),
         ("58.4;", "write 58.4, not 58.4;"),
@@ -52,6 +56,31 @@ def test_a_node_id_is_read_as_hexadecimal_where_that_is_possible(text: str, said
 )
 def test_a_number_with_a_unit_is_told_how_to_be_written(text: str, said: str) -> None:
     assert why_no_number(Scalar(MARK, text), VOLTS) == said
+
+
+@pytest.mark.parametrize(
+    ("unit", "text", "said"),
+    [
+        ("s", "1 min", "write 60, in s, not 1 min"),
+        ("s", "500 ms", "write 0.5, in s, not 500 ms"),
+        ("h", "90 min", "write 1.5, in h, not 90 min"),
+        ("min", "2h", "write 120, in min, not 2h"),
+        ("h", "12 hours", "only the number, without a unit: 12, not 12 hours"),
+        ("Ah", "44000 mAh", "write 44, in Ah, not 44000 mAh"),
+        (
+            "A",
+            "0.5C",
+            "0.5C is no number in A: write how many A are meant; C belong to a key of their own, such as max_c",
+        ),
+        ("°C", "45℃", "only the number, without a unit: 45, not 45℃"),
+        ("%", "98 Percent", "only the number, without a unit: 98, not 98 Percent"),
+        ("MB", "1 GB", "write 1000, in MB, not 1 GB"),
+        ("", "13S", "only the number, without a unit: 13, not 13S"),
+        ("", "13s4p", "only the cells in series: 13, not 13s4p"),
+    ],
+)
+def test_another_unit_is_converted_and_never_dropped(unit: str, text: str, said: str) -> None:
+    assert why_no_number(Scalar(MARK, text), KeyRule("", unit=unit)) == said
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from itertools import pairwise
 from unicodedata import normalize
 
 from orchestrator.config.yaml.tree import Items, Node, Scalar
+from orchestrator.config.yaml.units import without_unit
 from orchestrator.keys import KeyRule
 
 NUMBER = re.compile(r"[-+]?(0|[1-9]\d*)(\.\d+)?", re.ASCII)
@@ -52,6 +53,8 @@ def why_no_number(node: Scalar, key: KeyRule, *, whole: bool = False) -> str:
         for pattern, say in _HABITS:
             if (match := pattern.fullmatch(text)) and (said := say(match)):
                 return said
+        if match := _WITH_UNIT.fullmatch(_COMMA.sub(r"\1.\2", text)):
+            return without_unit(text, match[1], match[2], key.unit)
     return f"{shown(node.text)} is not {kind}"
 
 
@@ -151,15 +154,13 @@ _HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
         lambda m: f"{m[0]} with a leading 0 may be read as octal: write {m[0].lstrip('0') or 0}",
     ),
     (re.compile(r"([-+]?\d+),(\d+)", re.A), lambda m: f"use a decimal point: {m[1]}.{m[2]}, not {m[0]}"),
-    (re.compile(r"([-+]?\d+),(\d+) *[^\d.,:_;\s][^;]*", re.A), lambda m: f"write {m[1]}.{m[2]}, not {m[0]}"),
     (re.compile(r"[-+]?\d[\d_.]*_[\d_.]*", re.A), lambda m: _instead(_number(m[0].replace("_", "")), m[0])),
     (re.compile(r"[-+]?[\d.]+e[-+]?\d+", re.I | re.A), lambda m: _instead(_number(m[0]), m[0])),
     (re.compile(r"[-+]?(\d+\.|\.\d+|0+\d+\.\d*)", re.A), lambda m: _instead(_number(m[0]), m[0])),
     (re.compile(r"[~<>=≤≥≈±] *([-+]?\d+(\.\d+)?)", re.A), lambda m: f"only the number: {m[1]}, not {m[0]}"),
     (re.compile(r"([-+]?[\d.]+)[;,.]", re.A), lambda m: _instead(_number(m[1]), m[0])),
     (re.compile(r"([-+]?[\d.]+ *; *)+[-+]?[\d.]+", re.A), lambda m: f"write {m[0].replace(';', ',')}, not {m[0]}"),
-    (
-        re.compile(r"(?!0[xo]|[\d.]+[eE][-+]?\d)([-+]?\d+(\.\d+)?) *[^\d.,:;_\s]\D*", re.A),
-        lambda m: f"only the number, without a unit: {m[1]}, not {m[0]}",
-    ),
+    (re.compile(r"(\d+)s\d+p", re.I | re.A), lambda m: f"only the cells in series: {m[1]}, not {m[0]}"),
 )
+_COMMA = re.compile(r"^([-+]?\d+),(\d+)", re.ASCII)
+_WITH_UNIT = re.compile(r"(?!0[xo]|[\d.]+[eE][-+]?\d)([-+]?\d+(?:\.\d+)?) *([^\d.,:;_\s]\D*)", re.ASCII)
