@@ -27,7 +27,7 @@ _MEASURE = (
 _NUMBERED = re.compile(r"/dev/tty(USB|ACM)\d+")
 _USB = re.compile(r"ttyUSB|ttyACM|/serial/by-id/|usb-")
 #: A name that somebody left for the reader to fill in, as the shipped examples do.
-_PLACEHOLDER = re.compile(r"CHECK|…|\.\.\.|<.*>")
+_PLACEHOLDER = re.compile(r"(^|/)CHECK(/|$)|…|\.\.\.|<.*>")
 
 
 def wiring_lint(values: Mapping[str, object], written: Source) -> Problems:
@@ -80,7 +80,7 @@ def _links(folder: Path) -> list[Path]:
 
 
 def _direction(port: str, rs485: Rs485) -> Problems:
-    if rs485 is Rs485.KERNEL and _USB.search(port):
+    if rs485 is Rs485.KERNEL and (_USB.search(port) or _USB.search(os.path.realpath(port))):
         text = "USB adapters switch the line's direction by themselves, and their drivers cannot: write off"
         yield "charger.rs485", text
 

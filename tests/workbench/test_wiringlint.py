@@ -33,6 +33,18 @@ def test_the_stable_name_of_an_adapter_that_is_plugged_in_is_said(tmp_path: Path
     assert unstable(str(port), (none,)).endswith("write its name below /dev/serial/by-path or /dev/serial/by-id")
 
 
+def test_an_adapter_is_recognised_behind_a_name_of_our_own(tmp_path: Path) -> None:
+    """As udev rules give one: the name says nothing, what it points to does."""
+    (tmp_path / "ttyUSB0").touch()
+    for name, device in (("bay-1", "ttyUSB0"), ("CHECKOUT", "ttyS1")):
+        (tmp_path / name).symlink_to(device)
+        station = tmp_path / "station.yaml"
+        text = (Path(__file__).parent / "odd" / "wiring-right.yaml").read_text(encoding="utf-8")
+        station.write_text(text.replace("/dev/ttyS1", str(tmp_path / name)), encoding="utf-8")
+        told = [finding.text.partition(":")[0] for finding in check([station], LINT)]
+        assert told == (["bays[1].charger.rs485"] if device == "ttyUSB0" else [])
+
+
 @pytest.mark.parametrize("example", STATIONS, ids=lambda path: path.stem)
 def test_a_copy_of_an_example_is_told_what_was_left_in(example: Path, tmp_path: Path) -> None:
     """The example itself is not: see `test_nothing_is_odd_about_what_ships`."""
