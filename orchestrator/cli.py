@@ -7,7 +7,8 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator import __version__
@@ -121,29 +122,34 @@ def _kinds(text: str) -> tuple[int, int]:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    from orchestrator.config.load import check
+    from orchestrator.config.load import examine
+    from orchestrator.show import own_language
+    from orchestrator.text.checked import summary
+    from orchestrator.workbench.prove.lint import LINT
+
+    checked = examine(arguments.file, LINT)
+    for finding in checked.findings:
+        print(finding, file=sys.stderr)
+    found = Counter(finding.severity for finding in checked.findings)
+    for severity, line in () if found["error"] else _around(arguments.file):
+        print(line, file=sys.stderr if severity else sys.stdout)
+        found[severity] += 1
+    looked_at = +Counter(checked.looked_at) or {"file": len(arguments.file)}
+    print(summary(looked_at, found["error"], found["warning"], own_language()), flush=True)
+    if found["error"]:
+        return 1
+    return prove_all(arguments.file, arguments.jobs) if arguments.exhaustive else 0
+
+
+def _around(files: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """What else there is to say of the stations in files without errors: its severity, "" for a note, and the line."""
     from orchestrator.config.occupied import occupied
     from orchestrator.devices.bus_load import slow_buses
     from orchestrator.service.reach import reach
-    from orchestrator.workbench.prove.lint import LINT
 
-    findings = check(arguments.file, LINT)
-    for finding in findings:
-        print(finding, file=sys.stderr)
-    if any(finding.severity == "error" for finding in findings):
-        return 1
-    errors = 0
-    for station in filter(None, map(_station, arguments.file)):
-        for error in occupied(station):
-            errors += 1
-            print(error, file=sys.stderr)
-        for warning in slow_buses(station):
-            print(warning, file=sys.stderr)
-    if errors:
-        return 1
-        for line in reach(station):
-            print(line)
-    return prove_all(arguments.file, arguments.jobs) if arguments.exhaustive else 0
+    for station in filter(None, map(_station, files)):
+        for severity, lines in (("error", occupied(station)), ("warning", slow_buses(station)), ("", reach(station))):
+            yield from ((severity, line) for line in lines)
 
 
 def _station(file: str) -> "Station | None":
@@ -185,8 +191,9 @@ def _probe(arguments: argparse.Namespace) -> int:
 
 
 def _demo(arguments: argparse.Namespace) -> int:
+    from orchestrator.demo.run import demo
+
     try:
-        from orchestrator.demo.run import demo
+        return demo(arguments.fault, plain=arguments.plain)
     except ImportError as error:
         raise missing("the demo", error, "demo") from None
-    return demo(arguments.fault, plain=arguments.plain)

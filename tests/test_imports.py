@@ -18,6 +18,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "keys": (),
     "model": (),
     "errors": ("model",),
+    "extras": (),
     # Core makes causes; only the edges turn them into sentences.
     "text": ("model",),
     "protocol": ("errors", "keys", "model"),
@@ -26,7 +27,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "core": ("config.amperes", "config.policy", "config.station", "errors", "keys", "model"),
     # What must work when nothing else does. Only the station file needs PyYAML.
     "lastresort": ("config.ports", "errors", "protocol.standby"),
-    "link": ("errors", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
+    "link": ("errors", "extras", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
     # The devices know the link only as a typing.Protocol: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": (
@@ -40,8 +41,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     "sim": ("model", "protocol.objects"),
     # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
-        "columns", "config", "core", "errors", "keys", "model", "protocol.objects", "service.parts", "service.records",
-        "service.rows", "sim.charger", "sim.chemistry", "sim.pack", "text",
+        "columns", "config", "core", "errors", "extras", "keys", "model", "protocol.objects", "service.parts",
+        "service.records", "service.rows", "sim.charger", "sim.chemistry", "sim.pack", "text",
     ),
     "columns": (),
     "show": ("columns", "model", "text"),

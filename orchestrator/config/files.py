@@ -13,7 +13,8 @@ from orchestrator.config.rules import Problems, problems
 from orchestrator.config.shipped import shipped_dir, shipped_names
 from orchestrator.config.station import Station
 from orchestrator.config.station_rules import station_problems
-from orchestrator.config.yaml.scalars import UnfitError, did_you_mean, nearest, shown
+from orchestrator.config.yaml.numbers import shown
+from orchestrator.config.yaml.scalars import UnfitError, did_you_mean, nearest
 from orchestrator.protocol.objects import ObjectMap
 
 

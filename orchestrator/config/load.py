@@ -1,7 +1,9 @@
 """Loads a `Station`, a `Policy`, an `ObjectMap` or a `Scenario` from a file, or reports every finding in it at once."""
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -13,20 +15,22 @@ from orchestrator.config.plainfile import read_plain
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems
 from orchestrator.config.station import Station
-from orchestrator.config.stationsteps import Steps, named_steps
+from orchestrator.config.stationsteps import Steps, bay_count, named_steps
 from orchestrator.config.yaml.reader import Reader
 from orchestrator.config.yaml.scalars import UnfitError, nearest
 from orchestrator.config.yaml.schema import INVALID
 from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Node, Refused, parse
 from orchestrator.config.yesterday import Yesterday
 from orchestrator.errors import ConfigError, Finding
+from orchestrator.keys import Source
 from orchestrator.protocol.objects import ObjectMap
 
 if TYPE_CHECKING:
     from orchestrator.config.scenario import Scenario
 
 T = TypeVar("T")
-Lint = Callable[[Mapping[str, object]], Problems]  #: a file's values by path → what is probably unintended
+#: A file's values by path, and the lines of the keys that it has → what is probably unintended.
+Lint = Callable[[Mapping[str, object], Source], Problems]
 #: This many hexadecimal digits distinguish two versions of a file.
 DIGEST = 12
 #: The kind of file expected wherever one is named.
@@ -60,7 +64,20 @@ def load_scenario(name_or_path: str | Path) -> "Scenario":
     return _load(SCENARIO, _find(SCENARIO, name_or_path, None), Scenario)
 
 
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What `examine` looked at, and found."""
+
+    findings: list[Finding]
+    looked_at: Mapping[str, int]  #: bays, and files by the key of their kind; maps only if they were named
+
+
 def check(paths: Iterable[str | Path], lint: Mapping[str, Lint] | None = None) -> list[Finding]:
+    """The findings of `examine`."""
+    return examine(paths, lint).findings
+
+
+def examine(paths: Iterable[str | Path], lint: Mapping[str, Lint] | None = None) -> Checked:
     """Everything wrong in these files and in the files that they name, sorted. Without an error the answer is yes.
 
     A file's kind is identified by its key `policy`, `station`, `map` or `scenario`. A file named twice is reported
@@ -70,7 +87,7 @@ def check(paths: Iterable[str | Path], lint: Mapping[str, Lint] | None = None) -
     loader = _Loader(places, lint=lint)
     for one in places:
         loader.check(one)
-    return sorted(set(loader.findings))
+    return Checked(sorted(set(loader.findings)), loader.looked_at)
 
 
 def _load(kind: Kind, where: Place, wanted: type[T], changes: Mapping[str, str] | None = None) -> T:
@@ -104,9 +121,11 @@ class _Loader:
         lint: Mapping[str, Lint] | None = None,
     ) -> None:
         self.findings: list[Finding] = []
+        self.looked_at: Counter[str] = Counter()
         self._lint = lint or {}
         self._changes = changes or {}
         self._shown = {os.path.realpath(one.path): one.shown for one in named}
+        self._named = frozenset(self._shown)
         self._trees: dict[str, Node | None] = {}
         self._digests: dict[str, str] = {}
         self._loaded: dict[tuple[str, str], object] = {}
@@ -143,13 +162,13 @@ class _Loader:
     def _read(self, kind: Kind, where: Place, node: Node | None) -> object:
         if node is None or isinstance(node, Refused):
             return INVALID
-        base = where.path.parent
+        base, real = where.path.parent, os.path.realpath(where.path)
         # Many bays name the same files: each name is looked for once.
         named: dict[type, Callable[[str], object]] = {
             Policy: cache(lambda text: self.load(POLICY, find(POLICY, text, base))),
             ObjectMap: cache(lambda text: self.load(MAP, find(MAP, text, base))),
         }
-        real = os.path.realpath(where.path)
+        self._count(kind, real, node)
         if kind is STATION:
             self._steps_a.update(named_steps(node, base))
         yesterday = Yesterday(node, self._steps_a.get(real, ())) if kind is POLICY else None
@@ -160,10 +179,16 @@ class _Loader:
             reader.report(path, text)
         bad = bool(reader.findings)
         if not bad and kind.key in self._lint:
-            for path, text in self._lint[kind.key](reader.values):
+            for path, text in self._lint[kind.key](reader.values, Source(self._name(where), reader.lines)):
                 reader.report(path, text, "warning")
         self.findings += reader.findings
         return INVALID if bad else value
+
+    def _count(self, kind: Kind, real: str, node: Node) -> None:
+        if kind is STATION:
+            self.looked_at["bay"] += bay_count(node)
+        elif kind is not MAP or real in self._named:  # a station names its maps in passing
+            self.looked_at[kind.key] += 1
 
     def _tree(self, where: Place) -> Node | None:
         real = os.path.realpath(where.path)

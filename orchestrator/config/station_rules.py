@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 
-from orchestrator.config.can_rules import bus_problems, filter_problems
+from orchestrator.config.can_rules import bus_problems, filter_problems, shared_port_problems
 from orchestrator.config.names import name_problem
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems, Rule, problems
@@ -23,7 +23,7 @@ Values = Mapping[str, object]
 def station_problems(values: Values) -> Problems:
     """All that the rules find in one station; what is a finding already is left out."""
     yield from problems(_STATION_RULES, values)
-    bays = _bays(values)
+    bays = bays_of(values)
     for path, bay in bays.items():
         for at, text in problems(_BAY_RULES, bay):
             yield f"{path}.{at}", text
@@ -36,9 +36,11 @@ def station_problems(values: Values) -> Problems:
             if (bus := bay.get("battery.can")) is not None and bus not in buses:
                 yield f"{path}.battery.can", f"the station has no CAN bus {bus!r}; {did_you_mean(str(bus), buses)}"
         yield from filter_problems(buses, bays)
+        yield from shared_port_problems(buses, bays)
 
 
-def _bays(values: Values) -> dict[str, dict[str, object]]:
+def bays_of(values: Values) -> dict[str, dict[str, object]]:
+    """The values of each bay by their paths below it."""
     bays: dict[str, dict[str, object]] = {}
     for path, value in values.items():
         if match := re.fullmatch(r"(bays\[\d+\])\.(.+)", path):

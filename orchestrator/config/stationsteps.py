@@ -1,4 +1,4 @@
-"""The charger steps used with each policy, taken from a station file's tree before that file is read."""
+"""What a station file's tree says before that file is read: the charger steps used with each policy, and its bays."""
 
 import os
 from collections.abc import Iterator
@@ -29,6 +29,11 @@ def named_steps(node: Node, base: Path) -> dict[str, Steps]:
             continue
         found[real] = tuple(min(pair) for pair in zip(found.get(real, steps), steps, strict=False))
     return found
+
+
+def bay_count(node: Node) -> int:
+    """How many bays the file has, even if it is not valid."""
+    return len(_items(_get(node, "bays")))
 
 
 def _get(node: Node | None, key: str) -> Node | None:

@@ -25,6 +25,8 @@ def demo(fault: str | None, *, plain: bool) -> int:
         return 0
     if fault is not None and fault not in known:
         raise OrchestratorError(f"no fault {fault!r}: {', '.join(known)}")
+    import orchestrator.sim.plant  # noqa: F401 - the plant's process needs an extra; without it, say so now
+
     screen = _screen(plain=plain)
     story = Story(fault)
     print(

@@ -4,6 +4,7 @@ import errno
 import termios
 from collections.abc import Iterator, Mapping
 
+from orchestrator.extras import pip_install
 from orchestrator.model import Cause
 
 Settings = Mapping[str, object]
@@ -93,7 +94,8 @@ def failure(name: str, settings: Settings, error: BaseException) -> Cause:
 def _unnumbered(error: BaseException) -> Cause:
     text = "; ".join(dict.fromkeys(str(link) for link in chain(error) if str(link)))
     if id_ := next((id_ for hint, id_ in _HINTS.items() if hint in text), None):
-        return Cause.of(id_, error=text)
+        install = {"install": pip_install("msgpack")} if id_ == "can_needs_msgpack" else {}
+        return Cause.of(id_, error=text, **install)
     kind = type(error).__name__
     return Cause.of("can_not_understood", error=f"{kind}: {text}" if text else kind)
 

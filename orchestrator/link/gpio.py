@@ -9,6 +9,7 @@ import errno
 from typing import TYPE_CHECKING, Self
 
 from orchestrator.errors import LinkError
+from orchestrator.extras import install_extra
 from orchestrator.model import Cause
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def need_gpiod() -> None:
     try:
         import gpiod  # noqa: F401, PLC0415 - only where a station has a contactor
     except ImportError:
-        raise LinkError(Cause("gpio_not_installed")) from None
+        raise LinkError(Cause.of("gpio_not_installed", install=install_extra("gpio"))) from None
 
 
 class OutputLine:

@@ -7,10 +7,13 @@ charger did because of them, and what the pack has become, stays.
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
+from typing import TYPE_CHECKING
 
 from orchestrator.sim import battery_faults, charger_faults, hostile
 from orchestrator.sim.can_wire import NodeFaults
-from orchestrator.sim.rig import Rig
+
+if TYPE_CHECKING:
+    from orchestrator.sim.rig import Rig  # it needs durand, and the names of faults do not
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,10 +21,10 @@ class Fault:
     """One fault: what it is in words, and what it does to a rig; `value` None means its usual strength."""
 
     about: str
-    happen: Callable[[Rig, float | None], None]
+    happen: "Callable[[Rig, float | None], None]"
 
 
-def _heal(rig: Rig, _: float | None) -> None:
+def _heal(rig: "Rig", _: float | None) -> None:
     charger, pack = rig.bay.charger, rig.bay.pack
     charger.reversed = charger.rogue = charger.ignores_stop = False
     charger.halted, charger.gain, charger.control_mode = None, 1.0, rig.as_built.control_mode

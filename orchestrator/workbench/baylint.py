@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from orchestrator.config.amperes import highest_step, max_ah, max_hours, row_a, tables
 from orchestrator.config.policy import Band, Policy, Where
 from orchestrator.config.rules import Problems
+from orchestrator.keys import Source
 from orchestrator.model import ControlMode
 
 #: A pack's capacity is about this factor below the most that a charge may take (`finish.max_ah`, as its help advises).
@@ -13,7 +14,7 @@ MARGIN = 1.1
 Steps = tuple[float, ...]
 
 
-def station_lint(values: Mapping[str, object]) -> Problems:
+def bay_lint(values: Mapping[str, object], _written: Source) -> Problems:
     """Warnings about each bay's policy in combination with its charger."""
     for path, policy in values.items():
         bay = path.removesuffix(".policy")

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import ModuleType
 
 from orchestrator.errors import OrchestratorError, UsageError
+from orchestrator.extras import install_extra
 
 #: A computation that takes longer shows its progress, this often.
 PROGRESS_S = 1.0
@@ -188,6 +189,4 @@ def _give(data: bytes, out: Path | None) -> None:
 
 def missing(what: str, error: ImportError, extra: str = "workbench") -> OrchestratorError:
     """The error that says which extra to install for a verb."""
-    return OrchestratorError(
-        f"{what} needs the package {error.name}: pip install 'charging-station-orchestrator[{extra}]'"
-    )
+    return OrchestratorError(f"{what} needs the package {error.name}: {install_extra(extra)}")

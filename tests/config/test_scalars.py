@@ -170,12 +170,6 @@ def test_a_value_for_a_library_that_yaml_readers_dispute_is_refused(text: str) -
         scalars.read_any(_plain(text), TEXT)
 
 
-@pytest.mark.parametrize("text", ["0..45", "0 - 45", "0…45", "0-45", "0 to 45", "0, 45", "0:45", "0/45"])
-def test_a_range_written_otherwise_is_understood_for_its_message(text: str) -> None:
-    assert scalars.range_meant(text) == "[0, 45]"
-    assert scalars.range_meant("hot") == ""
-
-
 def test_the_nearest_word_is_the_first_of_the_nearest() -> None:
     assert scalars.nearest("cano", ["can0", "can1"]) == "can0"
     assert scalars.nearest("SOC-PCT", ["soh_pct", "soc_pct"]) == "soc_pct"

@@ -39,8 +39,8 @@ language of `LC_ALL`, `LC_MESSAGES` or `LANG`, whatever the service writes; wher
 
 The same in every language are names: of bays, faults, states, effects, verbs, keys, and the heads of the table. Only in
 English are diagnostics: errors of files (FILE:LINE:COLUMN), of the command line and of a service that cannot be reached,
-what `check`, `probe`, `decode`, `replay` and the like print, the text of an exception, and what the last resort says
-(`estop`, the guardian), which must work when nothing else does. This page is made from the catalogue itself.
+what `check` (but for its last line), `probe`, `decode`, `replay` and the like print, the text of an exception, and what
+the last resort says (`estop`, the guardian), which must work when nothing else does. This page is made from the catalogue itself.
 
 """
 

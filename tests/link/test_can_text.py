@@ -2,6 +2,7 @@
 
 import errno
 import socket
+import sys
 import termios
 
 import can
@@ -36,7 +37,7 @@ def test_an_interface_that_is_down_comes_with_the_command_to_bring_it_up() -> No
         (raised(can.CanOperationError("x"), termios.error(errno.EIO, "x")), "plug it in again"),
         (PermissionError(errno.EACCES, "x"), "group dialout"),
         (OSError(errno.EAFNOSUPPORT, "x"), "modprobe can_raw"),
-        (can.CanInterfaceNotImplementedError("msgpack not installed"), "pip install msgpack"),
+        (can.CanInterfaceNotImplementedError("msgpack not installed"), f"{sys.executable} -m pip install msgpack ("),
         (TypeError("unexpected keyword argument 'bitrat'"), "'bitrat'"),
         (raised(can.CanOperationError("x"), OSError("Write timeout")), "takes nothing any more"),
         (socket.gaierror(-2, "Name or service not known"), "Name or service not known: check the bus's settings"),

@@ -9,8 +9,7 @@ import gpiod
 import pytest
 
 from orchestrator.errors import LinkError
-from orchestrator.link.gpio import OutputLine, describe
-from orchestrator.model import Cause
+from orchestrator.link.gpio import OutputLine, describe, need_gpiod
 from tests.core.said import say
 
 
@@ -68,5 +67,7 @@ def test_a_line_that_the_library_refuses(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_without_the_library_it_is_said_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gpiod", None)
-    (id_,) = failures("/dev/gpiochip0", 17)
-    assert "pip install 'charging-station-orchestrator[gpio]'" in say(Cause(id_))
+    for attempt in (need_gpiod, lambda: describe("/dev/gpiochip0", 17)):
+        with pytest.raises(LinkError) as caught:
+            attempt()
+        assert f"needs the package gpiod: {sys.executable} -m pip install 'gpiod<3,>=2.2'" in say(caught.value.cause)

@@ -51,5 +51,5 @@ def test_without_the_library_it_is_said_what_to_install(
     theirs.close()
     assert capsys.readouterr().err == (
         "orchestrator: the station file names a contactor, which needs the package gpiod: "
-        "pip install 'charging-station-orchestrator[gpio]'\n"
+        f"{sys.executable} -m pip install 'gpiod<3,>=2.2'\n"
     )

@@ -12,7 +12,7 @@ from orchestrator.workbench.prove.lint import LINT
 ODD = Path(__file__).parent / "odd"
 
 
-@pytest.mark.parametrize("name", ["policy", "quick", "narrow", "cells", "physics", "station"])
+@pytest.mark.parametrize("name", ["policy", "quick", "narrow", "cells", "physics", "station", "wiring", "places"])
 def test_each_is_told_at_its_key(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -33,8 +33,16 @@ def test_the_files_have_every_warning() -> None:
         "the colder", "the hotter", "the fuller", "the older", "nearly empty", "is in force instead",
         "honest instruments",
         "are few for nmc", "is no deep discharge", "refuses packs that are not empty", "% everywhere", "V everywhere",
+        "none of CANopen's", "after the next plug", "placeholder", "example's steps", "no BMU has the id",
+        "V is wider", "A is wider", "°C is wider", "switch the line's direction", "there is no",
     ):  # fmt: skip
         assert words in said, words
+
+
+def test_a_right_station_is_not_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same keys as in `wiring.yaml`, as they should be."""
+    monkeypatch.chdir(ODD)
+    assert check(["wiring-right.yaml"], LINT) == []
 
 
 def test_a_file_with_errors_gets_no_warnings(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ _EXPLANATIONS: tuple[tuple[str, str, bool, str], ...] = (
         "mapping values are not allowed here",
         "",
         False,
-        "a second ':' in one value, or a line indented deeper than its group: "
-        "put a text with ': ' in quotes, and begin all keys of one group in the same column",
+        "a second ':' in one value, a ':' without a space behind it in the line above, or a line indented deeper than "
+        "its group: put a text with ': ' in quotes, and begin all keys of one group in the same column",
     ),
     (
         r"found character '(?P<what>.)' that cannot start",

@@ -13,6 +13,7 @@ from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
 
 from orchestrator.config.yaml import scalars
+from orchestrator.config.yaml.numbers import decimals_meant, range_meant
 from orchestrator.config.yaml.scalars import UnfitError
 from orchestrator.config.yaml.schema import INVALID, Slot, join, slots, told_keys
 from orchestrator.config.yaml.tree import Entries, Items, Mark, Node, Refused, Scalar
@@ -33,7 +34,7 @@ _SCALARS: dict[object, Callable[..., object]] = {
 
 
 class Reader:
-    """Reads one file's tree. `findings`, `values` and `marks` fill while it goes.
+    """Reads one file's tree. `findings`, `values`, `marks` and `lines` fill while it goes.
 
     `references`: for types that are named in the file but described in another one, how to get them; these return
     `INVALID` when they have reported a finding elsewhere and raise `UnfitError` for one at the name itself.
@@ -49,7 +50,7 @@ class Reader:
         self.findings: list[Finding] = []
         self.values: dict[str, object] = {}
         self.marks: dict[str, Mark] = {}
-        self._lines: dict[str, int] = {}
+        self.lines: dict[str, int] = {}
         self._file, self._digest = file, digest
         self._references = references or {}
         self._yesterday = yesterday or Yesterday()
@@ -120,8 +121,7 @@ class Reader:
 
     def _range(self, node: Node, path: str, key: KeyRule) -> object:
         if not isinstance(node, Items) or len(node.items) != 2:
-            meant = scalars.range_meant(node.text) if isinstance(node, Scalar) else ""
-            much = f", two numbers (2.5, not 2,5), not {len(node.items)}" if isinstance(node, Items) else ""
+            meant, much = range_meant(node)
             self.report(path, f"write {meant or '[low, high]'}{much}: {key.about}")
             return INVALID
         low, high = (self._element(item, float, f"{path}[{i}]", key) for i, item in enumerate(node.items))
@@ -139,6 +139,9 @@ class Reader:
         if not node.items:
             self.report(path, f"needs at least one item: {key.about}")
             return INVALID
+        if hint is float and (meant := decimals_meant(node)):
+            self.report(path, f"a decimal has a point, not a comma: write {meant}")
+            return INVALID
         values = tuple(self._element(item, hint, f"{path}[{i}]", key) for i, item in enumerate(node.items))
         return INVALID if INVALID in values else values
 
@@ -154,7 +157,7 @@ class Reader:
 
     def _element(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
         self.marks[path] = node.mark
-        self._lines[path] = node.mark.line
+        self.lines[path] = node.mark.line
         return self._value(node, hint, path, key)
 
     def _mapping(self, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - any type expression
@@ -168,7 +171,7 @@ class Reader:
 
     def _entry(self, name: Scalar, node: Node, hint: Any, path: str, key: KeyRule) -> object:  # noqa: ANN401 - as above
         self.marks[path] = node.mark if node.mark.line == name.mark.line and not _empty(node) else name.mark
-        self._lines[path] = name.mark.line
+        self.lines[path] = name.mark.line
         return self._value(node, hint, path, key)
 
     # --- records ---------------------------------------------------------------------------------------------------
@@ -229,7 +232,7 @@ class Reader:
     def _build(self, record: type, values: dict[str, object], path: str) -> object:
         if any(field.name == "source" for field in dataclasses.fields(record)):
             prefix = f"{path}." if path else ""
-            lines = {at.removeprefix(prefix): line for at, line in self._lines.items() if at.startswith(prefix)}
+            lines = {at.removeprefix(prefix): line for at, line in self.lines.items() if at.startswith(prefix)}
             values["source"] = Source(self._file, lines, self._digest)
         return record(**values)
 

@@ -4,22 +4,21 @@ YAML's own type resolution is not used: it reads `on` as true, `1:30` as 90, `01
 as text. Here the key determines the type; anything that other YAML readers would read differently is refused.
 """
 
-import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from difflib import SequenceMatcher
 from enum import Enum
 
+from orchestrator.config.yaml.numbers import HEX, MAX_DIGITS, NUMBER, shown, why_no_number
 from orchestrator.config.yaml.tree import Scalar
 from orchestrator.keys import KeyRule
 
-_NUMBER = re.compile(r"[-+]?(0|[1-9]\d*)(\.\d+)?", re.ASCII)
-_HEX = re.compile(r"0x[\da-fA-F]+", re.ASCII)
 _NULL = re.compile(r"~|null", re.IGNORECASE)
 _TRUE = {"true", "yes", "on", "y", "1"}
 _FALSE = {"false", "no", "off", "n", "0"}
+_NOTHING = _FALSE | {"none"}  #: for the word `off`
 _RANGE = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:\.\.+|…|-|–|~|to|,|;|:|/)\s*([-+]?\d+(?:\.\d+)?)", re.ASCII)
-_MAX_DIGITS = 40  #: in a number; more is nonsense
+_URL = re.compile(r"[a-z][a-z\d+.-]*://", re.IGNORECASE)
 _ALIKE = 0.6  #: out of 1; below it, one word is not a typo of the other
 _MAX_WORD = 64  #: the longest word that is compared with others
 _MAX_PATH = 4096  #: bytes, Linux' PATH_MAX
@@ -77,21 +76,21 @@ def bounded(value: float, key: KeyRule) -> float:
 
 def read_float(node: Scalar, key: KeyRule) -> float:
     """A decimal number without exponent."""
-    if node.plain and len(node.text) <= _MAX_DIGITS and _NUMBER.fullmatch(node.text):
+    if node.plain and len(node.text) <= MAX_DIGITS and NUMBER.fullmatch(node.text):
         return bounded(float(node.text), key)
-    raise UnfitError(_why_no_number(node, key))
+    raise UnfitError(why_no_number(node, key))
 
 
 def read_int(node: Scalar, key: KeyRule) -> int:
     """A whole number, decimal or 0x… hexadecimal."""
-    if node.plain and len(node.text) <= _MAX_DIGITS:
-        if _HEX.fullmatch(node.text):
+    if node.plain and len(node.text) <= MAX_DIGITS:
+        if HEX.fullmatch(node.text):
             return int(bounded(int(node.text, 16), key))
-        if (match := _NUMBER.fullmatch(node.text)) and not match[2]:
+        if (match := NUMBER.fullmatch(node.text)) and not match[2]:
             return int(bounded(int(node.text), key))
         if match:
             raise UnfitError(f"{node.text} must be a whole number, e.g. {round(float(node.text))}")
-    raise UnfitError(_why_no_number(node, key))
+    raise UnfitError(why_no_number(node, key, whole=True))
 
 
 def read_bool(node: Scalar, _key: KeyRule) -> bool:
@@ -117,16 +116,18 @@ def read_path(node: Scalar, key: KeyRule) -> str:
     text = read_str(node, key)
     if len(text) > _MAX_PATH:
         raise UnfitError(f"a path has at most {_MAX_PATH} characters, this one {len(text)}")
+    if key.is_path and _URL.match(text):
+        raise UnfitError(
+            f"{shown(text)} is a URL; write a device below /dev: only a port of this machine can be locked, have its "
+            "settings checked, and be told to stop when all else hangs"
+        )
+    if key.is_path and text.startswith("dev/"):
+        raise UnfitError(f"write /{text}: a path without the first / begins at this file's directory")
     if key.is_path and "/" not in text:
-        example = f"/dev/{text}" if text.startswith(("tty", "gpiochip")) else "/dev/ttyUSB0"
-        raise UnfitError(f"{shown(text)} is not a whole path: write e.g. {example[:_MAX_DIGITS]}")
+        known = text.startswith(("tty", "gpiochip")) and not text.startswith(("ttyUSB", "ttyACM"))
+        example = f"/dev/{text}" if known else "/dev/serial/by-path/…"
+        raise UnfitError(f"{shown(text)} is not a whole path: write e.g. {example[:MAX_DIGITS]}")
     return text
-
-
-def range_meant(text: str) -> str:
-    """`[low, high]` for a range written in another notation; "" if it is not a range."""
-    match = _RANGE.fullmatch(text.strip()) if len(text) <= _MAX_DIGITS else None
-    return f"[{match[1]}, {match[2]}]" if match else ""
 
 
 def read_enum(node: Scalar, kind: type[Enum]) -> Enum:
@@ -134,6 +135,8 @@ def read_enum(node: Scalar, kind: type[Enum]) -> Enum:
     members = {member.name.lower(): member for member in kind}
     if node.text in members:
         return members[node.text]
+    if "off" in members and node.text.casefold() in _NOTHING:
+        raise UnfitError(f"write off, not {shown(node.text)}; allowed: {', '.join(members)}")
     raise UnfitError(f"{shown(node.text)} is not one of the words allowed here; {did_you_mean(node.text, members)}")
 
 
@@ -145,81 +148,15 @@ def read_any(node: Scalar, key: KeyRule) -> object:
         return None
     if node.text in ("true", "false"):
         return node.text == "true"
-    if _HEX.fullmatch(node.text) or ((match := _NUMBER.fullmatch(node.text)) and not match[2]):
+    if HEX.fullmatch(node.text) or ((match := NUMBER.fullmatch(node.text)) and not match[2]):
         return read_int(node, key)
-    if _NUMBER.fullmatch(node.text):
+    if NUMBER.fullmatch(node.text):
         return float(node.text)
     if node.text.casefold() in _TRUE | _FALSE:
         raise UnfitError(f'{node.text} is ambiguous: write true or false, or "{node.text}" in quotes for the text')
     if _AMBIGUOUS.fullmatch(node.text):
-        raise UnfitError(f"{_why_no_number(node, key)}; or in quotes for the text")
+        raise UnfitError(f"{why_no_number(node, key)}; or in quotes for the text")
     return node.text
 
 
 _AMBIGUOUS = re.compile(r"[-+]?(0\d+|0o\d+|0b[01]+|\d[\d_]*_\d*|\d+\.|\.\d+|\d+(\.\d*)?e[-+]?\d+|\.(nan|inf))", re.I)
-
-
-def shown(text: str) -> str:
-    """Text from the file, quoted and shortened for a message."""
-    return repr(text if len(text) <= _MAX_DIGITS else text[: _MAX_DIGITS - 1] + "…")
-
-
-def _number(text: str) -> str:
-    """The correct form of a number written in another notation; "" if it is not a number."""
-    try:
-        value = float(text)
-    except ValueError:
-        return ""
-    return f"{value:.10f}".rstrip("0").rstrip(".") if math.isfinite(value) and abs(value) < 1e15 else ""
-
-
-def _instead(number: str, text: str) -> str:
-    return f"write {number}, not {text}" if number else ""
-
-
-def _sexagesimal(match: re.Match[str]) -> str:
-    parts = [float(part) for part in match[0].split(":")]
-    whole = "h:min:s" if len(parts) > 2 else "h:min or min:s"
-    return f"{match[0]} looks like a time ({whole}) and would be read as {_base60(parts):g}: write one number"
-
-
-def _base60(parts: list[float]) -> float:
-    total = 0.0
-    for part in parts:
-        total = total * 60 + part
-    return total
-
-
-#: Number notations that we refuse, and the message for each; the first match is used.
-_HABITS: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
-    (re.compile(r"\d+(:\d+(\.\d+)?)+", re.A), _sexagesimal),
-    (re.compile(r"[-+]?\.(nan|inf)|[-+]?(nan|inf|infinity)", re.I), lambda m: f"{m[0]} is not a number to charge by"),
-    (re.compile(r"0x[\da-f]+", re.I | re.A), lambda m: f"write it in decimal: {int(m[0], 16)}, not {m[0]}"),
-    (re.compile(r"0o[0-7]+", re.A), lambda m: f"write it in decimal: {int(m[0], 8)}, not {m[0]}"),
-    (
-        re.compile(r"0\d+", re.A),
-        lambda m: f"{m[0]} with a leading 0 may be read as octal: write {m[0].lstrip('0') or 0}",
-    ),
-    (re.compile(r"([-+]?\d+),(\d+)", re.A), lambda m: f"use a decimal point: {m[1]}.{m[2]}, not {m[0]}"),
-    (re.compile(r"[-+]?\d[\d_.]*_[\d_.]*", re.A), lambda m: _instead(_number(m[0].replace("_", "")), m[0])),
-    (re.compile(r"[-+]?[\d.]+e[-+]?\d+", re.I | re.A), lambda m: _instead(_number(m[0]), m[0])),
-    (re.compile(r"[-+]?(\d+\.|\.\d+|0+\d+\.\d*)", re.A), lambda m: _instead(_number(m[0]), m[0])),
-    (
-        re.compile(r"(?!0[xo]|[\d.]+[eE][-+]?\d)([-+]?\d+(\.\d+)?) *[^\d.,:_\s].*", re.A),
-        lambda m: f"only the number, without a unit: {m[1]}, not {m[0]}",
-    ),
-)
-
-
-def _why_no_number(node: Scalar, key: KeyRule) -> str:
-    kind = f"a number in {key.unit}" if key.unit else "a number"
-    text = node.text
-    if not node.text.strip():
-        return f"needs {kind}: {key.about}"
-    if not node.plain and _NUMBER.fullmatch(text.strip()):
-        return f"write {text.strip()} without quotes"
-    if len(text) <= _MAX_DIGITS:
-        for pattern, say in _HABITS:
-            if (match := pattern.fullmatch(text.strip())) and (said := say(match)):
-                return said
-    return f"{shown(text)} is not {kind}"

@@ -181,25 +181,33 @@ class _Composer:
         else:
             self.root = node
 
-    def _pairs(self, children: list[Node]) -> Iterator[tuple[Scalar, Node]]:
+    def _pairs(self, children: list[Node]) -> list[tuple[Scalar, Node]]:
         seen: dict[str, Mark] = {}
+        pairs: list[tuple[Scalar, Node]] = []
         before: Node | None = None
         for name, value in zip(children[::2], children[1::2], strict=True):
             if not isinstance(name, Scalar):
                 if not isinstance(name, Refused):
                     self.refuse(name.mark, "a list or a mapping cannot be a key")
-            elif problem := _decimal_comma(before, name) or _unfit_key(name):
+            elif problem := _decimal_comma(before, name):
+                self.refuse(name.mark, problem)
+                if pairs and pairs[-1][1] is before:  # 14 of {max_a: 14,5} is not what was meant
+                    pairs[-1] = (pairs[-1][0], Refused(pairs[-1][1].mark))
+            elif problem := _unfit_key(name):
                 self.refuse(name.mark, problem)
             elif name.text in seen:
                 first = seen[name.text]
                 self.refuse(name.mark, f"{name.text!r} again: it stands already in line {first.line}; remove one")
             else:
                 seen[name.text] = name.mark
-                yield name, value
+                pairs.append((name, value))
             before = value
+        return pairs
 
 
 _COMMA = re.compile(r"[-+]?\d+,\d+", re.ASCII)
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}", re.ASCII)
+_NUMERIC = re.compile(r"[-+]?\d+(\.\d+)?", re.ASCII)
 _NOT_TEXT = re.compile(r"~|null|true|false|yes|no|on|off|y|n|[-+]?[.\d][\d_.,:]*(e[-+]?\d+)?|0x[\da-f]+", re.IGNORECASE)
 
 
@@ -208,7 +216,10 @@ def _decimal_comma(before: Node | None, name: Scalar) -> str:
     if not isinstance(before, Scalar) or not (before.plain and name.plain) or before.mark.line != name.mark.line:
         return ""
     parts = f"{before.text},{name.text}"
-    return f"use a decimal point: {parts.replace(',', '.')}, not {parts}" if _COMMA.fullmatch(parts) else ""
+    if not _COMMA.fullmatch(parts):
+        return ""
+    thousands = f"; if thousands are meant, {before.text}{name.text}" if _THOUSANDS.fullmatch(parts) else ""
+    return f"use a decimal point: {parts.replace(',', '.')}, not {parts}{thousands}"
 
 
 def _unfit_key(name: Scalar) -> str:
@@ -219,6 +230,8 @@ def _unfit_key(name: Scalar) -> str:
         return "a key is missing before ':'"
     if len(name.text) > MAX_KEY or not name.text.isprintable():
         return f"a key is one line of at most {MAX_KEY} characters, without control characters"
+    if name.plain and _NUMERIC.fullmatch(name.text):
+        return f"a number, {name.text}, where a key is needed: several numbers stand in brackets, [1.5, 2]"
     if name.plain and _NOT_TEXT.fullmatch(name.text):
         return f"the key {name.text} is not a word in YAML: use a name, or put it in quotes"
     return ""

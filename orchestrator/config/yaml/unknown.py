@@ -1,5 +1,6 @@
 """What somebody may have meant by a key that a record does not have."""
 
+import re
 from dataclasses import dataclass
 
 from orchestrator.config.yaml.scalars import nearest
@@ -24,5 +25,7 @@ def unknown_key(name: str, record: type, references: frozenset[type], *, guess: 
     where = [place.rpartition(".")[0] for place in places(record, references) if place.rpartition(".")[2] == name]
     if where:
         return Meant(f"it belongs below {' or '.join(where)}, indented; a{allowed}", None)
+    if (pair := re.fullmatch(r"(\w+)(?: *= *|[: ] *)(.*)", name)) and pair[1] in known:
+        return Meant(f"write {pair[1]}: {pair[2]}", None)
     near = nearest(name, known) if guess else ""
     return Meant(f"did you mean {near}? A{allowed}", known[near]) if near else Meant(f"a{allowed}", None)

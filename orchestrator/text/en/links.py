@@ -59,8 +59,7 @@ TEXTS: Mapping[str, str] = {
     "gpio_gone": "{chip} line {line}: not a GPIO chip, or one that is gone: check its name (gpiodetect lists them), or "
     "plug its adapter in again",
     "gpio_failed": "{chip} line {line}: cannot be driven ({error:word})",
-    "gpio_not_installed": "the station file names a contactor, which needs the package gpiod: pip install "
-    "'charging-station-orchestrator[gpio]'",
+    "gpio_not_installed": "the station file names a contactor, which needs the package gpiod: {install}",
     # a CAN bus
     "can_bus": "CAN bus {bus} ({wire})",
     "can_not_open": "is not open",
@@ -77,7 +76,7 @@ TEXTS: Mapping[str, str] = {
     "can_no_kernel": "{error:word}: this kernel has no raw CAN: modprobe can_raw, or use another interface",
     "can_queue_full": "the transmit queue is full, nobody acknowledges: check cable, terminators, bit rate, BMU's power",
     "can_failed": "{error:word}",
-    "can_needs_msgpack": "udp_multicast needs msgpack: pip install msgpack ({error})",
+    "can_needs_msgpack": "udp_multicast needs msgpack: {install} ({error})",
     "can_stalled": "the adapter takes nothing any more: unplug it and plug it in again ({error})",
     "can_not_understood": "{error}: check the bus's settings in the station file, and that the interface's driver is "
     "installed",

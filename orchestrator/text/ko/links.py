@@ -55,8 +55,7 @@ TEXTS: Mapping[str, str] = {
     "gpio_gone": "{chip} 라인 {line}: GPIO 칩이 아니거나 없어졌습니다: 이름을 확인하거나(gpiodetect로 확인) 어댑터를 다시 "
     "연결하십시오",
     "gpio_failed": "{chip} 라인 {line}: 구동할 수 없습니다({error:word})",
-    "gpio_not_installed": "스테이션 파일의 접촉기에는 gpiod 패키지가 필요합니다: pip install "
-    "'charging-station-orchestrator[gpio]'",
+    "gpio_not_installed": "스테이션 파일의 접촉기에는 gpiod 패키지가 필요합니다: {install}",
     # a CAN bus
     "can_bus": "CAN 버스 {bus}({wire})",
     "can_not_open": "열려 있지 않습니다",
@@ -72,7 +71,7 @@ TEXTS: Mapping[str, str] = {
     "can_no_kernel": "{error:word}: 이 커널에는 raw CAN이 없습니다: modprobe can_raw를 실행하거나 다른 인터페이스를 쓰십시오",
     "can_queue_full": "송신 대기열이 가득 찼고 수신 확인이 없습니다: 케이블, 종단 저항, 비트 레이트, BMU의 전원을 확인하십시오",
     "can_failed": "{error:word}",
-    "can_needs_msgpack": "udp_multicast에는 msgpack이 필요합니다: pip install msgpack ({error})",
+    "can_needs_msgpack": "udp_multicast에는 msgpack이 필요합니다: {install} ({error})",
     "can_stalled": "어댑터가 더 이상 아무것도 받아들이지 않습니다: 뽑았다가 다시 꽂으십시오({error})",
     "can_not_understood": "{error}: 스테이션 파일의 버스 설정과 인터페이스 드라이버의 설치를 확인하십시오",
     "can_internal": "CAN 버스 {bus}: 내부 에러: {error}",

@@ -12,9 +12,11 @@ from orchestrator.config.rules import Problems, Rule, problems
 from orchestrator.core.cells import CHEMISTRIES, EMPTY_PCT
 from orchestrator.core.checks.battery import HEAT_HYSTERESIS_K
 from orchestrator.core.resting import RECHARGE_DROP_PCT
-from orchestrator.keys import Range
-from orchestrator.workbench.baylint import station_lint
+from orchestrator.keys import Range, Source
+from orchestrator.workbench.baylint import bay_lint
+from orchestrator.workbench.disklint import disk_lint
 from orchestrator.workbench.prove.physics import physics_lint
+from orchestrator.workbench.wiringlint import wiring_lint
 
 Rows = tuple[Band, ...]
 
@@ -158,7 +160,7 @@ _RULES = (
 )
 
 
-def policy_lint(values: Mapping[str, object]) -> Problems:
+def policy_lint(values: Mapping[str, object], _written: Source) -> Problems:
     """Probably unintended entries of a policy, by the paths of its keys."""
     yield from problems(_RULES, values)
     target_pct, rows = values.get("finish.target_soc_pct"), values.get("current.soc_pct.rows")
@@ -167,6 +169,12 @@ def policy_lint(values: Mapping[str, object]) -> Problems:
     yield from _end(values)
     yield from _tables(values)
     yield from physics_lint(values)
+
+
+def station_lint(values: Mapping[str, object], written: Source) -> Problems:
+    """Probably unintended entries of a station: its policies at its chargers, its wiring, its places on the disk."""
+    for lint in (bay_lint, wiring_lint, disk_lint):
+        yield from lint(values, written)
 
 
 LINT = {"policy": policy_lint, "station": station_lint}

@@ -12,6 +12,7 @@ from orchestrator.columns import aligned, folded
 from orchestrator.config.load import load_policy
 from orchestrator.config.scenario import Scenario
 from orchestrator.errors import OrchestratorError, UsageError
+from orchestrator.extras import install_extra
 from orchestrator.workbench.simulate.figures import ROWS, Figures, figures
 from orchestrator.workbench.simulate.simulation import rules_of, simulate
 
@@ -111,9 +112,7 @@ def cluster(address: str) -> Iterator[Executor]:
     try:
         from distributed import Client  # noqa: PLC0415 - a separate extra, for those who have a cluster
     except ImportError:
-        raise ClusterError(
-            "--dask needs the package distributed: pip install 'charging-station-orchestrator[dask]'"
-        ) from None
+        raise ClusterError(f"--dask needs the package distributed: {install_extra('dask')}") from None
     try:
         client = Client(address, timeout=CONNECT_S)  # type: ignore[no-untyped-call]  # it has no annotations
     except (OSError, ValueError) as error:
