@@ -60,11 +60,21 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer runs and parts: less than two minutes")
     parser.add_argument("--only", action="append", choices=PARTS, help="only this part; may be repeated")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
+    parser.add_argument("--json", type=_writable, metavar="FILE", help="write the figures there, too")
     parser.add_argument(
         "--before", type=before.load, metavar="FILE", help="show what an earlier --json FILE says, and the change"
     )
     return parser.parse_args(argv)
+
+
+def _writable(name: str) -> Path:
+    """Tried before minutes are measured in vain."""
+    path = Path(name)
+    try:
+        path.open("a").close()
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"{name} cannot be written ({error.strerror})") from error
+    return path
 
 
 if __name__ == "__main__":

@@ -178,10 +178,19 @@ def test_a_file_of_another_kind_is_refused_with_a_sentence(content: bytes, wrong
     assert str(refused.value) == f"{path} {wrong}; {before.EXPECTED}"
 
 
-@pytest.mark.parametrize(("name", "why"), [("nowhere.json", "No such file or directory"), (".", "Is a directory")])
-def test_a_file_that_cannot_be_read_is_said_before_anything_is_measured(name: str, why: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("option", "name", "wrong"),
+    [
+        ("--before", "nowhere.json", f"cannot be read (No such file or directory); {before.EXPECTED}"),
+        ("--before", ".", f"cannot be read (Is a directory); {before.EXPECTED}"),
+        ("--json", "nowhere/figures.json", "cannot be written (No such file or directory)"),
+    ],
+)
+def test_a_file_that_is_of_no_use_is_said_before_anything_is_measured(
+    option: str, name: str, wrong: str, tmp_path: Path
+) -> None:
     path = tmp_path / name
-    command = [sys.executable, "-m", "benchmarks", "--before", str(path)]
+    command = [sys.executable, "-m", "benchmarks", option, str(path)]
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
     assert run.returncode == 2 and not run.stdout and "Traceback" not in run.stderr
-    assert run.stderr.endswith(f"error: argument --before: {path} cannot be read ({why}); {before.EXPECTED}\n")
+    assert run.stderr.endswith(f"error: argument {option}: {path} {wrong}\n")
