@@ -150,6 +150,11 @@ def test_what_cannot_be_compared_has_no_change(tmp_path: Path) -> None:
     assert table(results, list(earlier.columns(results, 1.0))).partition("\n")[0].split()[-2:] == ["before", "change"]
 
 
+def test_the_earlier_run_in_the_repository_can_be_put_beside() -> None:
+    earlier = before.load(str(ROOT / "benchmarks" / "before.json"))
+    assert earlier.medians["CPU, 64 bays, 1 bus", "%"]
+
+
 @pytest.mark.parametrize(
     ("content", "wrong"),
     [
