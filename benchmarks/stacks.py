@@ -16,7 +16,7 @@ LINE = re.compile(r"thread \(\w+\)(?:: (?P<thread>[^;]*))?;(?P<frames>.+) (?P<sa
 LINE_NUMBER = re.compile(r":\d+\)$")
 FUNCTIONS = 12  #: of each role, in each list
 FEWEST = 20  #: samples that are worth a list
-TRUNK = 0.9  #: a function in nearly every stack is the thread's loop and says nothing
+TRUNK = 0.8  #: what is in most stacks of a thread is its loop, and says nothing
 
 
 @dataclass(slots=True)
