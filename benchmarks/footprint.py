@@ -8,7 +8,7 @@ import json
 import os
 import statistics
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -47,8 +47,8 @@ def measure(effort: Effort) -> Iterator[Result]:
         yield from _memory(f"{MANY} bays", many)
         yield Result(f"RSS, {MANY} bays, guardian", "MiB", Series("ours", many.guardian_mib), goal=Goal(p99=13.4))
         yield _each_further_bay(one, many, MANY, plain, plain_sixteen)
-    yield Result("CPU, 1 bay", "%", Series("ours", one.cpu_pct), Series("naive", plain.cpu_pct))
-    yield Result("CPU, 16 bays", "%", Series("ours", sixteen.cpu_pct), Series("naive", plain_sixteen.cpu_pct))
+    yield _busy("CPU, 1 bay", one.cpu_pct, Series("naive", plain.cpu_pct))
+    yield _busy("CPU, 16 bays", sixteen.cpu_pct, Series("naive", plain_sixteen.cpu_pct))
     if not effort.quick:
         yield from _processor(1, many, windows)
         yield from _processor(4, _use(ours, MANY, 4, windows), windows)
@@ -69,10 +69,15 @@ def _each_further_bay(one: Use, many: Use, bays: int, naive_one: Use, naive_sixt
 def _processor(buses: int, use: Use, windows: int) -> Iterator[Result]:
     """All bays together and per bay, against the same traffic in bare loops."""
     bare = _use(_bare(use.reads_per_s / buses), MANY, buses, windows)
-    title = f"CPU, {MANY} bays, {buses} bus{'es' if buses > 1 else ''}, {use.reads_per_s:.0f} SDO/s"
-    yield Result(title, "%", Series("ours", use.cpu_pct), Series("bare loops", bare.cpu_pct), Goal(median=25.0))
+    on = f"{buses} bus{'es' if buses > 1 else ''}"
+    beside = f"bare loops, {use.reads_per_s:.0f} SDO/s"
+    yield _busy(f"CPU, {MANY} bays, {on}", use.cpu_pct, Series(beside, bare.cpu_pct), Goal(median=25.0))
     each, bare_each = ([pct / MANY for pct in one.cpu_pct] for one in (use, bare))
-    yield Result("… of that, each bay", "%", Series("ours", each), Series("bare loops", bare_each))
+    yield _busy(f"… of that, each bay, {on}", each, Series(beside, bare_each))
+
+
+def _busy(what: str, cpu_pct: Sequence[float], beside: Series, goal: Goal | None = None) -> Result:
+    return Result(what, "%", Series("ours", cpu_pct), beside, goal, processor_time=True)
 
 
 def _bare(reads_per_s: float) -> Side:
@@ -92,7 +97,7 @@ def _use(side: Side, bays: int, buses: int, windows: int) -> Use:
 
 def _watch(process: PlantProcess, running: Controllers, windows: int) -> Use:
     use, pids = Use(), running.pids
-    begin_s, reads = time.monotonic(), _reads(process)
+    begin_s, reads = time.monotonic(), sdo_requests(process)
     for _ in range(windows):
         window_s, spent_s = time.monotonic(), sum(map(_cpu_s, pids))
         time.sleep(WINDOW_S)
@@ -101,11 +106,12 @@ def _watch(process: PlantProcess, running: Controllers, windows: int) -> Use:
         use.controller_mib.append(controller_mib)
         use.guardian_mib += guardian_mib
     running.check()
-    use.reads_per_s = (_reads(process) - reads) / (time.monotonic() - begin_s)
+    use.reads_per_s = (sdo_requests(process) - reads) / (time.monotonic() - begin_s)
     return use
 
 
-def _reads(process: PlantProcess) -> int:
+def sdo_requests(process: PlantProcess) -> int:
+    """Of all bays, since the start."""
     return sum(bay["sdo_requests"] for bay in process.ask({"query": "state"})["bays"])
 
 

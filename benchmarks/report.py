@@ -1,10 +1,8 @@
 """The results of measurements, and the table for people."""
 
 import json
-import os
-import platform
 import statistics
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, inf, isfinite
@@ -61,9 +59,9 @@ class Goal:
         """For the table."""
         parts = []
         if self.median is not None:
-            parts.append(f"≤ {_figure(self.median)} {unit}")
+            parts.append(f"≤ {figure(self.median)} {unit}")
         if self.p99 is not None:
-            parts.append(f"p99 ≤ {_figure(self.p99)} {unit}")
+            parts.append(f"p99 ≤ {figure(self.p99)} {unit}")
         if self.share is not None:
             parts.append(f"≤ {Fraction(self.share).limit_denominator(10)} of it")
         return ", ".join(parts)
@@ -78,6 +76,7 @@ class Result:
     ours: Series
     other: Series | None = None
     goal: Goal | None = None
+    processor_time: bool = False  #: proportional to the gateway factor; most others are periods, waits and memory
 
     @property
     def met(self) -> bool | None:
@@ -115,45 +114,29 @@ def _times(value: float | None, share: float) -> float | None:
     return None if value is None else value * share
 
 
-def _figure(value: float) -> str:
+def figure(value: float) -> str:
+    """With as many digits as are worth reading."""
     digits = 0 if value >= 100 else 1 if value >= 10 else 2 if value >= 0.1 else 3
     return f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
 
 
 def _figures(series: Series, unit: str) -> tuple[str, str, str]:
-    said = ["never" if value is None else f"{_figure(value)} {unit}" for value in (series.median, series.p99)]
+    said = ["never" if value is None else f"{figure(value)} {unit}" for value in (series.median, series.p99)]
     return said[0], said[1], str(series.n)
 
 
-def table(results: Iterable[Result]) -> str:
-    """Aligned columns."""
-    rows = [COLUMNS, *(result.cells() for result in results)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
+def table(results: Sequence[Result], more: Sequence[tuple[str, ...]] | None = None) -> str:
+    """Aligned columns; `more` has further ones, with their heading."""
+    rows: list[tuple[str, ...]] = [COLUMNS, *(result.cells() for result in results)]
+    if more is not None:
+        rows = [row + further for row, further in zip(rows, more, strict=True)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     )
 
 
-def machine() -> dict[str, object]:
-    """Where this was measured."""
-    return {
-        "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)),
-        "python": platform.python_version(),
-        "kernel": platform.release(),
-        "load": round(os.getloadavg()[0], 2),
-    }
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.machine()
-    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
-
-
-def write_json(path: Path, results: Sequence[Result]) -> None:
+def write_json(path: Path, facts: Mapping[str, object], results: Sequence[Result]) -> None:
     """Everything, for programs that compare two runs."""
-    document = {"machine": machine(), "results": [result.facts() for result in results]}
+    document = {"machine": facts, "results": [result.facts() for result in results]}
     path.write_text(json.dumps(document, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")

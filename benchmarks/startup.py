@@ -71,7 +71,7 @@ def measure(effort: Effort) -> Iterator[Result]:
     slots = [begin[POLL] - begin[STOP] for begin in begins]
     yield Result("exec → first status poll", "s", Series("ours", polls), beside, Goal(median=0.5))
     yield Result("exec → first byte, a stop", "s", Series("ours", stops), beside)
-    yield Result("… processor time until then", "ms", Series("ours", spent))
+    yield Result("… processor time until then", "ms", Series("ours", spent), processor_time=True)
     yield Result("first stop → first poll: two slots", "s", Series("ours", slots))
     yield Result(f"exec → a stop on the last of {MANY} ports", "s", Series("ours", many))
     yield from parts
@@ -83,6 +83,7 @@ def _parts(station: str, runs: int, environment: Mapping[str, str]) -> list[Resu
             f"processor time alone: {what}",
             "ms",
             Series("ours", _times([sys.executable, "-c", code, station], runs, environment)),
+            processor_time=True,
         )
 
     return [row(what, code) for what, code in PARTS.items()]
