@@ -1,4 +1,6 @@
-"""The command line: `orchestrator VERB`. Exit status 0: success; 1: the answer is no; 2: usage error.
+"""The command line: `orchestrator VERB`. Exit status 0: success; 1: the answer is no; 2: no answer.
+
+Nothing answers a usage error, and nobody answers where no service runs.
 
 Each verb imports its dependencies when it runs, so that none waits for another's libraries.
 """
@@ -11,7 +13,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator import __version__
-from orchestrator.errors import CauseError, ConfigError, HexError, OrchestratorError, ServiceError, UsageError
+from orchestrator.errors import (
+    CauseError,
+    ConfigError,
+    HexError,
+    NoServiceError,
+    OrchestratorError,
+    ServiceError,
+    UsageError,
+)
 from orchestrator.service.verbs import add_service_verbs
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
@@ -29,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except OrchestratorError as error:
         print(f"orchestrator: {_said(error)}", file=sys.stderr)
-        return 2 if isinstance(error, UsageError | HexError) else 1
+        return 2 if isinstance(error, UsageError | HexError | NoServiceError) else 1
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of our output has gone, e.g. `head`

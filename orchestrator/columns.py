@@ -1,5 +1,6 @@
 """Text for a terminal: its width, how a long line is folded, and tables that fit."""
 
+import os
 import re
 import shutil
 import sys
@@ -23,9 +24,37 @@ def own_width() -> int:
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
 
 
+def own_height() -> int:
+    """How many lines the terminal can redraw in place; 0 where it is none, or cannot move its cursor."""
+    return shutil.get_terminal_size().lines if _is_able() else 0
+
+
+def own_colour() -> bool:
+    """Whether to use colour: not in a file or a pipe, and not where somebody does not want it (no-color.org)."""
+    return _is_able() and not os.environ.get("NO_COLOR")
+
+
+def _is_able() -> bool:
+    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+
+
 def width_of(text: str) -> int:
     """The number of terminal columns it takes: a Korean letter takes two."""
     return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
+
+
+def cut(line: str, width: int) -> Iterator[str]:
+    """The line in pieces of at most this width (0: unlimited): the last resort for a word longer than the screen."""
+    if not width or width_of(line) <= width:
+        yield line
+        return
+    now = ""
+    for one in line:
+        if now and width_of(now + one) > width:
+            yield now
+            now = ""
+        now += one
+    yield now
 
 
 def folded(line: str, width: int, head: str = "") -> str:
