@@ -75,13 +75,17 @@ def folded(line: str, width: int, head: str = "") -> str:
 
 
 def beside(cells: Sequence[str], widths: Sequence[int], width: int = 0) -> str:
-    """The cells in columns of these widths; columns beyond `width` (0: unlimited) continue on indented lines."""
+    """The cells in columns of these widths; columns beyond `width` (0: unlimited) continue on indented lines.
+
+    They move together where all of them fit only then.
+    """
     lines, now = [], ""
+    gap = 1 if sum(widths) + GAP * (len(widths) - 1) > width >= sum(widths) + len(widths) - 1 else GAP
     for cell, columns in zip(cells, widths, strict=True):
         if width and now.strip() and width_of(now) + columns > width:
             lines.append(now.rstrip())
             now = " " * 4
-        now += cell + " " * (columns - width_of(cell) + GAP)
+        now += cell + " " * (columns - width_of(cell) + gap)
     return "\n".join([*lines, now])
 
 

@@ -1,6 +1,7 @@
 """What the status says of a bay: its line in the table, its details, what to do about it, and how urgently."""
 
 import os
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
@@ -30,7 +31,11 @@ Bay = Mapping[str, object]
 
 
 def own_language() -> str:
-    """The language of this terminal's user; "" if unset."""
+    """The language of this terminal's user; "" if unset. Where Korean cannot be shown, English."""
+    try:
+        "가".encode(sys.stdout.encoding)
+    except UnicodeError:
+        return "en"
     return language_of(os.environ)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import cast
 
 from orchestrator.columns import own_colour, own_width
-from orchestrator.errors import ServiceError, UsageError
+from orchestrator.errors import NoServiceError, ServiceError, UsageError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain
@@ -32,13 +32,21 @@ def status(arguments: argparse.Namespace) -> int:
     path = find_socket(arguments.socket)
     if arguments.watch:
         watch(path, arguments)
-    document = look(path, arguments)
+    document = _checked(path, arguments) if arguments.check else look(path, arguments)
     if arguments.json:
         print_json(document)
     else:
         found = blocks(document, own_language(), own_width(), time.strftime(CLOCK), problems=arguments.problems)
         print(painted(found, colour=own_colour()), flush=True)
     return int(arguments.check and needs_a_person(document))
+
+
+def _checked(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
+    """The same, where an answer of no is none, too: an unknown bay must not look like one that needs a person."""
+    try:
+        return look(path, arguments)
+    except ServiceError as error:
+        raise NoServiceError(str(error), error.told) from None
 
 
 def look(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
