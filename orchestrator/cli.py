@@ -142,17 +142,14 @@ def _check(arguments: argparse.Namespace) -> int:
         print(finding, file=sys.stderr)
     if any(finding.severity == "error" for finding in findings):
         return 1
-    errors = 0
-    for station in filter(None, map(_station, arguments.file)):
-        for error in occupied(station):
-            errors += 1
-            print(error, file=sys.stderr)
-        for warning in slow_buses(station):
-            print(warning, file=sys.stderr)
+    stations = list(filter(None, map(_station, arguments.file)))
+    errors = [error for station in stations for error in occupied(station)]
+    for told in (*errors, *(warning for station in stations for warning in slow_buses(station))):
+        print(told, file=sys.stderr)
     if errors:
         return 1
-        for line in reach(station):
-            print(line)
+    for line in (line for station in stations for line in reach(station)):
+        print(line)
     return prove_all(arguments.file, arguments.jobs) if arguments.exhaustive else 0
 
 
