@@ -41,7 +41,7 @@ def test_the_head_line_counts_what_people_care_about() -> None:
     station = [*[bay(number) for number in range(5, 66)], TRIPPED, LOOSE, full]
     assert head(*station) == f"64 bays: 61 charging, 2 need you, 1 full; 882 A, 44 kW · {CLOCK}"
     assert head(*station, language="ko") == (
-        f"베이 64개: 충전 중 61, 조치 필요 2, 충전 완료 1 / 882 A, 44 kW · {CLOCK}"
+        f"베이 64개: 충전 중 61, 조치 필요 2, 충전 완료 1 · 882 A, 44 kW · {CLOCK}"
     )
     assert head(TRIPPED) == f"1 bay: 1 needs you; 14 A, 0.7 kW · {CLOCK}"
     assert head(TRIPPED, LOOSE).startswith("2 bays: 2 need you; 28 A, 1.4 kW")

@@ -91,7 +91,7 @@ TEXTS: Mapping[str, str] = {
     "old_figure": "{figure}(이전 값)",
     # the head line of the status, and its end
     "gist": "{bays}: {counts:word}{flow} · {clock}",
-    "gist_flow": " / {amps} A, {kilowatts} kW",
+    "gist_flow": " · {amps} A, {kilowatts} kW",
     "count_bay": "베이 {number}개",
     "count_bays": "베이 {number}개",
     "count_charging": "충전 중 {number}",
