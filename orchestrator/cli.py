@@ -6,7 +6,6 @@ Each verb imports its dependencies when it runs, so that none waits for another'
 """
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -164,20 +163,22 @@ def _station(file: str) -> "Station | None":
 
 
 def _schema(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import json_text
     from orchestrator.config.files import KINDS
     from orchestrator.config.json_schema import json_schema
 
     kind = next(kind for kind in KINDS if kind.key == arguments.kind)
-    print(json.dumps(json_schema(kind), ensure_ascii=False, indent=1))
+    print(json_text(json_schema(kind), indent=1))
     return 0
 
 
 def _decode(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import json_text
     from orchestrator.protocol.explain import explain
 
     explained = explain(" ".join(arguments.hex), arguments.kinds)
     if arguments.json:
-        print(json.dumps([item.facts for item in explained], ensure_ascii=False))
+        print(json_text([item.facts for item in explained]))
     else:
         print("\n\n".join(item.text for item in explained))
     return 0 if all(item.ok for item in explained) else 1

@@ -1,5 +1,6 @@
-"""Text for a terminal: its width, how a long line is folded, and tables that fit."""
+"""Text for a terminal: its width and letters, how a long line is folded, and tables that fit."""
 
+import json
 import os
 import re
 import shutil
@@ -32,6 +33,12 @@ def own_height() -> int:
 def own_colour() -> bool:
     """Whether to use colour: not in a file or a pipe, and not where somebody does not want it (no-color.org)."""
     return _is_able() and not os.environ.get("NO_COLOR")
+
+
+def json_text(value: object, indent: int | None = None) -> str:
+    """JSON in letters that the output can show: it must stay what it is, whatever the encoding."""
+    utf_8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+    return json.dumps(value, ensure_ascii=not utf_8, indent=indent)
 
 
 def _is_able() -> bool:

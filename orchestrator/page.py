@@ -84,6 +84,8 @@ def fitted(found: Sequence[Block], height: int, language: str = "") -> list[Bloc
         kept.append(block)
         room -= _height(block)
         left -= block.bays
+    while len(kept) > 1 and not kept[-1].bays and not kept[-1].level:  # a table's head without a table
+        kept.pop()
     if not kept and found:  # not even the first: as much of it as there is room for
         kept = [Block("\n".join(found[0].text.split("\n")[:room]), found[0].level)] if room else []
     return [*kept, Block(say(counted("count_more", left), language))] if left else kept

@@ -49,8 +49,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     "page": ("columns", "gist", "model", "show", "text"),
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
-        "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort", "link",
-        "model", "protocol", "service", "show", "sim", "text", "workbench",
+        "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",
+        "link", "model", "protocol", "service", "show", "sim", "text", "workbench",
     ),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip

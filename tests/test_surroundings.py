@@ -1,5 +1,6 @@
 """Files in the working directory, and the kind of terminal or pipe, change nothing."""
 
+import json
 import os
 import subprocess
 import sys
@@ -132,6 +133,16 @@ def test_no_terminal_is_too_poor(words: tuple[str, ...], encoding: str, tmp_path
     done = run("module", tmp_path, *words, env={"PYTHONIOENCODING": encoding})
     assert "Traceback" not in done.stderr
     assert done.stdout or done.stderr or done.returncode == 0
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "euc-kr"])
+@pytest.mark.parametrize(
+    "words", [("schema", "policy"), ("decode", "--json", "AF FA 90 04 10 90 00 34 AF A0")], ids=str
+)
+def test_json_stays_what_it_is_on_every_terminal(words: tuple[str, ...], encoding: str, tmp_path: Path) -> None:
+    rich, poor = (run("module", tmp_path, *words, env={"PYTHONIOENCODING": name}) for name in ("utf-8", encoding))
+    assert json.loads(poor.stdout) == json.loads(rich.stdout)
+    assert not rich.stdout.isascii(), "else this shows nothing"
 
 
 @pytest.mark.parametrize("words", [("demo", "--fault", "list"), ("schema", "station"), ("check", "none.yaml")], ids=str)

@@ -5,14 +5,15 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
 from orchestrator.errors import NoServiceError, ServiceError, UsageError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import Cause
-from orchestrator.model.cause import plain
+from orchestrator.model.cause import plain, said
 from orchestrator.service.chosen import Chosen, choose, is_plain, unknown
 from orchestrator.service.client import MAX_REQUEST
 from orchestrator.service.where import find_socket
@@ -24,6 +25,8 @@ from orchestrator.text.document import in_language, language_of_answer, refusals
 #: disobedient charger is uncontrollable after 3 s.
 STOPS = ("stop", "pause")
 STANDBY_S, LOOK_S = 4.0, 0.1
+#: The causes of names that no bay has.
+UNKNOWN = ("bay_unknown", "bays_unknown")
 #: What a request may take besides its names.
 FRAME = 100
 
@@ -34,10 +37,11 @@ def request(arguments: argparse.Namespace) -> int:
     _check_use(arguments, port)
     path = find_socket(arguments.socket)
     try:
-        results, missing, language = _asked(arguments, port, path)
+        answers = _asked(arguments, port, path)
     except NoServiceError as error:
         without = "; to stop chargers without a service: orchestrator estop" if verb in STOPS else ""
         raise NoServiceError(f"{error}{without}") from None
+    results, missing, language = answers.results, answers.missing, answers.language
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified: dict[str, str] = {}
     if verb in STOPS:
@@ -65,28 +69,61 @@ def _check_use(arguments: argparse.Namespace, port: str | None) -> None:
         raise UsageError("reset: --except goes with bays or --all, not with --port")
 
 
-def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> tuple[dict[str, str], list[Cause], str]:
+@dataclass(slots=True)
+class _Answers:
     """Each bay's answer, "" meaning yes; what was asked in vain; and the language to say it in."""
-    verb, own = arguments.verb, own_language()
-    if port is not None:
-        answer = ask(path, {"verb": verb, "bays": None, "port": os.path.abspath(port)})  # noqa: PTH100 - not resolved
-        return refusals(answer, language_of_answer(answer, own)), [], language_of_answer(answer, own)
+
+    language: str
+    results: dict[str, str] = field(default_factory=dict)
+    missing: list[Cause] = field(default_factory=list)
+
+    def take(self, answer: Mapping[str, object]) -> None:
+        self.language = language_of_answer(answer, self.language)
+        told, strangers = refusals(answer, self.language), _strangers(answer)
+        self.missing += [said(told[name]) for name in strangers]
+        self.results |= {name: why for name, why in told.items() if name not in strangers}
+
+
+def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answers:
+    """Ask the service, in as many requests as the names need."""
+    verb, answers = arguments.verb, _Answers(own_language())
     words = None if arguments.all else arguments.bay
-    parts: list[list[str] | None] = [None] if words is None else list(_parts(words))
-    missing: list[Cause] = []
-    if arguments.excepted or not is_plain(words or ()) or len(parts) > 1:
-        document = ask(path, {"verb": "status"})
-        known = [str(bay["name"]) for bay in cast("list[dict[str, object]]", document["bays"])]
-        chosen = choose(words, arguments.excepted, known)
-        missing = _missing(chosen, known, verb, language_of_answer(document, own))
-        parts = list(_parts(chosen.bays))
-    results: dict[str, str] = {}
-    language = own
-    for part in parts:
-        answer = ask(path, {"verb": verb, "bays": part})
-        language = language_of_answer(answer, own)
-        results |= refusals(answer, language)
-    return results, missing, language
+    if port is not None:
+        answers.take(ask(path, {"verb": verb, "bays": None, "port": os.path.abspath(port)}))  # noqa: PTH100 - not resolved
+        return answers
+    if not arguments.excepted and is_plain(words or ()) and len(list(_parts(words or ()))) <= 1:
+        try:
+            answers.take(ask(path, {"verb": verb, "bays": words}))
+            return answers
+        except ServiceError as error:
+            if verb != "stop" or not _is_unknown(error.told):
+                raise  # else a service not restarted since an update leaves all of it undone
+    document = ask(path, {"verb": "status"})
+    answers.language = language_of_answer(document, answers.language)
+    known = [str(bay["name"]) for bay in cast("list[dict[str, object]]", document["bays"])]
+    chosen = choose(words, arguments.excepted, known)
+    answers.missing += _missing(chosen, known, verb, answers.language)
+    failed: ServiceError | None = None
+    for part in _parts(chosen.bays):
+        try:
+            answers.take(ask(path, {"verb": verb, "bays": part}))
+        except ServiceError as error:
+            if verb != "stop":
+                raise
+            failed = error  # said once the other parts have been tried
+    if failed:
+        raise failed
+    return answers
+
+
+def _strangers(answer: Mapping[str, object]) -> list[str]:
+    """What the service itself answers of names that it does not know."""
+    causes = cast("Mapping[str, object]", answer.get("causes", {}))
+    return [name for name, cause in causes.items() if _is_unknown(cause)]
+
+
+def _is_unknown(cause: object) -> bool:
+    return isinstance(cause, Mapping) and cause.get("id") in UNKNOWN
 
 
 def _missing(chosen: Chosen, known: Sequence[str], verb: str, language: str) -> list[Cause]:

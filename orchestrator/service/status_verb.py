@@ -1,13 +1,11 @@
 """`orchestrator status`: once, or again and again."""
 
 import argparse
-import json
-import sys
 import time
 from pathlib import Path
 from typing import cast
 
-from orchestrator.columns import own_colour, own_width
+from orchestrator.columns import json_text, own_colour, own_width
 from orchestrator.errors import NoServiceError, ServiceError, UsageError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import Cause
@@ -19,6 +17,8 @@ from orchestrator.show import level_of, own_language
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import language_of_answer
 
+#: How long to wait for an answer.
+ANSWER_S = 5.0
 #: The time of day on the reader's clock.
 CLOCK = "%H:%M:%S"
 
@@ -34,7 +34,7 @@ def status(arguments: argparse.Namespace) -> int:
         watch(path, arguments)
     document = _checked(path, arguments) if arguments.check else look(path, arguments)
     if arguments.json:
-        print_json(document)
+        print(json_text(document), flush=True)
     else:
         found = blocks(document, own_language(), own_width(), time.strftime(CLOCK), problems=arguments.problems)
         print(painted(found, colour=own_colour()), flush=True)
@@ -49,11 +49,11 @@ def _checked(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
         raise NoServiceError(str(error), error.told) from None
 
 
-def look(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
+def look(path: Path, arguments: argparse.Namespace, within_s: float = ANSWER_S) -> dict[str, object]:
     """The status document with the bays that the command line means. ServiceError if one of them is unknown."""
     words, excepted = arguments.bay, arguments.excepted
     one = words[0] if len(words) == 1 and is_plain(words) and not excepted else None
-    document = ask(path, {"verb": "status", "bay": one})
+    document = ask(path, {"verb": "status", "bay": one}, within_s)
     document.pop("ok")
     bays = cast("list[dict[str, object]]", document["bays"])
     if one is None and (words or excepted):
@@ -66,9 +66,3 @@ def look(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
     if arguments.problems and arguments.json:
         bays = [bay for bay in bays if level_of(bay)]
     return {**document, "bays": bays}
-
-
-def print_json(document: dict[str, object]) -> None:
-    """The document on one line, in characters that the output can take."""
-    utf_8 = sys.stdout.encoding.lower().replace("-", "") == "utf8"
-    print(json.dumps(document, ensure_ascii=not utf_8), flush=True)

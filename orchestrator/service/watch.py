@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
-from orchestrator.columns import own_colour, own_height, own_width
+from orchestrator.columns import json_text, own_colour, own_height, own_width
 from orchestrator.errors import NoServiceError, ServiceError
 from orchestrator.model import Cause
 from orchestrator.model.cause import said
-from orchestrator.page import Block, blocks, fitted, painted
-from orchestrator.service.status_verb import CLOCK, look, print_json
+from orchestrator.page import PLAIN, Block, blocks, fitted, painted
+from orchestrator.service.status_verb import CLOCK, look
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import language_of_answer
 
-#: The refresh interval.
-WATCH_S = 1.0
+#: The refresh interval, and how long to wait for an answer before saying that there is none.
+WATCH_S, WITHIN_S = 1.0, 3.0
 #: Terminal codes: to the first line; clear this line; clear all below.
 HOME, LINE, BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 
@@ -30,7 +30,7 @@ def watch(path: Path, arguments: argparse.Namespace) -> NoReturn:
     try:
         while True:
             try:
-                document = look(path, arguments)
+                document = look(path, arguments, WITHIN_S)
             except ServiceError as error:
                 if not view.answered_at:  # one that has never answered may be the wrong one
                     raise
@@ -58,7 +58,7 @@ class _View:
             self._note(Cause("answers_again"))
         self.answered_at, self.lost, self._last = time.strftime(CLOCK), False, document
         if self.arguments.json:
-            print_json(document)
+            print(json_text(document), flush=True)
         else:
             self._draw([])
 
@@ -75,7 +75,7 @@ class _View:
     def leave(self) -> None:
         """Give the terminal back: the shell continues below."""
         if own_height() and not self.arguments.json:
-            print(flush=True)
+            print(PLAIN if own_colour() else "", flush=True)
 
     def _draw(self, first: Sequence[Block]) -> None:
         """These blocks, and the last answer below them, at the time when it came."""

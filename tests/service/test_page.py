@@ -185,6 +185,7 @@ def test_never_more_lines_than_the_terminal_has(height: int) -> None:
 def test_what_fits_is_left_as_it_is() -> None:
     found = blocks({"bays": [bay(1), TRIPPED]}, "en", 200, CLOCK)
     assert fitted(found, 4) == found
-    assert [block.text for block in fitted(found, 3, "ko")] == [found[0].text, found[1].text, "… 외 2개"]
+    assert [block.text for block in fitted(found, 3, "ko")] == [found[0].text, "… 외 2개"]  # no head without a table
+    assert [block.text for block in fitted(found[:3], 3)] == [block.text for block in found[:3]]
     assert fitted([Block("one\ntwo\nthree")], 2) == [Block("one")]
     assert fitted([], 5) == []

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -56,7 +57,7 @@ def test_a_script_learns_whether_somebody_must_look(station: Station) -> None:
     assert cli(service, "status", "--check").returncode == 1
     assert cli(service, "status", "--check", "bay-[13]").returncode == 0
     gist, head, *bays = cli(service, "status", "--problems").stdout.splitlines()
-    assert gist.startswith("4 bays: 2 charging, 1 needs you, 1 offline; 28 A, 1.")
+    assert re.match(r"4 bays: 2 charging, 1 needs you, 1 offline; [\d.]+ A, [\d.]+ kW · ", gist)
     assert head.startswith("   BAY") and [line[:8] for line in bays] == ["!  bay-2"]
     document = json.loads(cli(service, "status", "--problems", "--json", "--check").stdout)
     assert [bay["name"] for bay in document["bays"]] == ["bay-2"]
@@ -94,7 +95,7 @@ def test_bays_are_shown_by_names_patterns_and_exceptions(station: Station) -> No
 @pytest.mark.parametrize(
     ("words", "stderr"),
     [
-        (["bay-9", "bay-1"], f"bay-9: no bay 'bay-9' here: {KNOWN}\n"),
+        (["bay-9", "bay-1"], f"no bay 'bay-9' here: {KNOWN}\n"),
         (["x*", "bay-[1]"], f"no bay 'x*' here: {KNOWN}\n"),
         (["--all", "--except", "bay-[2-4]", "bay-9"], f"no bay 'bay-9' here: {KNOWN}\n"),
     ],
