@@ -7,9 +7,12 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from typing import cast
 
 import pytest
 
+from orchestrator.errors import ServiceError
+from orchestrator.lastresort.asking import ask
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
 from tests.whole.station import Document, Service, die_with_parent, orchestrator, whole_station
@@ -111,6 +114,19 @@ def test_a_stop_is_never_left_undone_for_what_is_unknown(station: Station, words
     assert done.stderr == stderr
     assert states(service)[0] == "HELD"
     assert states(service)[2] == "CHARGING"
+
+
+def test_programs_that_ask_the_service_are_served_alike(station: Station) -> None:
+    _, service = station
+    service.ask("start", "bay-1")
+    service.wait("CHARGING")
+    answer = ask(service.socket, {"verb": "stop", "bays": ["bay-9", ["bay-1"], "bay-1"]})
+    results = cast("dict[str, str]", answer["results"])
+    assert results.pop("bay-1") == ""
+    assert results == {"bay-9, ['bay-1']": f"'bay-9', '['bay-1']' 베이가 없습니다: {KNOWN}"}
+    with pytest.raises(ServiceError, match="bay-9"):
+        ask(service.socket, {"verb": "start", "bays": ["bay-9", "bay-1"]})
+    service.wait("HELD")
 
 
 @pytest.mark.parametrize("verb", ["start", "reset", "pause"])
