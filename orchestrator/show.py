@@ -33,7 +33,7 @@ Bay = Mapping[str, object]
 def own_language() -> str:
     """The language of this terminal's user; "" if unset. Where Korean cannot be shown, English."""
     try:
-        "가".encode(sys.stdout.encoding)
+        "가".encode(sys.stdout.encoding or "utf-8")
     except UnicodeError:
         return "en"
     return language_of(os.environ)

@@ -18,6 +18,8 @@ from orchestrator.text.catalogue import say
 
 #: The next decision handles a request; the answer comes when it is on disk, or after 2 s. Later means a hung loop.
 ANSWER_S = 3.0
+#: An answer names no more unknown bays: its length is bounded.
+MOST_UNKNOWN = 20
 
 
 class RequestHandler:
@@ -86,7 +88,7 @@ class RequestHandler:
         wrong = [name for name in names if name not in known]
         if wrong and (verb != Request.STOP or len(wrong) == len(names)):
             self._named(wrong[0], verb)
-        told = [f"{name!s:.80}" for name in wrong]
+        told = [f"{name!s:.80}" for name in wrong[:MOST_UNKNOWN]] + ["…"] * (len(wrong) > MOST_UNKNOWN)
         meant = dict.fromkeys(self._bays[known.index(name)] for name in names if name in known)
         return list(meant), {", ".join(told): unknown(told, known)} if told else {}
 
