@@ -14,6 +14,8 @@ WORD = re.compile(r"orchestrator \S+ \S+|\d\S* (?:°C|Ah|Wh|V|A|%|s|min|h|K)\S*|
 
 #: Where a cell may be folded: between words, and inside a key or a path; a figure keeps its unit.
 PART = re.compile(r"(?:\d[\d.:]* \S+|[(./]*(?:[^\s./]|\.(?=ya?ml))+[./]*|\S)\s*")
+#: Behind these a path is cut, where it must be.
+BREAKS = "/-:"
 #: A cell is folded to this, a heading also to the width of what stands below it.
 MOST_CELL, MOST_HEADING = 24, 12
 #: Between two columns.
@@ -58,8 +60,10 @@ def cut(line: str, width: int) -> Iterator[str]:
     now = ""
     for one in line:
         if now and width_of(now + one) > width:
-            yield now
-            now = ""
+            at = max(now.rfind(sign) + 1 for sign in BREAKS)
+            at = at if at > len(now) // 2 else len(now)
+            yield now[:at]
+            now = now[at:]
         now += one
     yield now
 

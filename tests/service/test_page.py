@@ -163,6 +163,8 @@ def test_a_word_longer_than_the_screen_is_cut() -> None:
     assert list(cut("가나다", 3)) == ["가", "나", "다"]
     assert list(cut("abc", 3)) == list(cut("abc", 0)) == ["abc"]
     assert list(cut("", 3)) == [""]
+    assert list(cut("/dev/serial/by-path/usb-0", 14)) == ["/dev/serial/", "by-path/usb-0"]
+    assert list(cut("/abcdefghijk", 8)) == ["/abcdefg", "hijk"]
 
 
 def test_columns_move_together_where_that_makes_them_fit() -> None:
