@@ -1,5 +1,6 @@
 """`orchestrator`, and `python -m orchestrator`: two verbs that must not wait for imports, then the rest."""
 
+import _codecs
 import _signal  # type: ignore[import-not-found]  # the core of `signal`, without that module's import time
 import os
 import sys
@@ -7,6 +8,9 @@ import sys
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+#: What a terminal shows for the signs that its encoding lacks, each as wide as the sign: columns stay aligned.
+POOR = {"°": " ", "…": "~", "–": "-", "→": ">", "·": "-", "×": "x", "“": '"', "”": '"', "‘": "'", "’": "'"}
 
 
 def main() -> int:
@@ -65,15 +69,32 @@ def _fill_standard_streams() -> None:
     """Make sure that printing never fails.
 
     Point free descriptors 0 to 2 at /dev/null: a serial port opened on one of them would receive our messages. A
-    terminal that cannot show °, → or Korean shows them escaped.
+    terminal that cannot show °, → or Korean shows something else as wide.
     """
+    _codecs.register_error("poor", _replaced)
     while (fd := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(fd, True)  # noqa: FBT003 - it takes no keyword
     os.close(fd)
     sys.stdout = sys.stdout or open(1, "w", closefd=False)  # noqa: SIM115 - None where it was closed
     sys.stderr = sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115 - as above
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]  # they are text streams
+        stream.reconfigure(errors="poor")  # type: ignore[union-attr]  # they are text streams
+
+
+def _replaced(error: UnicodeError) -> tuple[str, int]:
+    """Something to show for letters that an encoding lacks. Bytes of a file name that are no text stay legible."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    letters = error.object[error.start : error.end]
+    return "".join(map(_poor, letters)), error.end
+
+
+def _poor(letter: str) -> str:
+    from unicodedata import east_asian_width
+
+    if "\ud800" <= letter <= "\udfff":
+        return f"\\u{ord(letter):04x}"
+    return POOR.get(letter, "??" if east_asian_width(letter) in "WF" else "?")
 
 
 def _flush() -> None:

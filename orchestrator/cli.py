@@ -1,10 +1,11 @@
-"""The command line: `orchestrator VERB`. Exit status 0: success; 1: the answer is no; 2: usage error.
+"""The command line: `orchestrator VERB`. Exit status 0: success; 1: the answer is no; 2: no answer.
+
+Nothing answers a usage error, and nobody answers where no service runs.
 
 Each verb imports its dependencies when it runs, so that none waits for another's libraries.
 """
 
 import argparse
-import json
 import os
 import sys
 from collections import Counter
@@ -12,7 +13,15 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator import __version__
-from orchestrator.errors import CauseError, ConfigError, HexError, OrchestratorError, ServiceError, UsageError
+from orchestrator.errors import (
+    CauseError,
+    ConfigError,
+    HexError,
+    NoServiceError,
+    OrchestratorError,
+    ServiceError,
+    UsageError,
+)
 from orchestrator.service.verbs import add_service_verbs
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
@@ -30,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
     except OrchestratorError as error:
         print(f"orchestrator: {_said(error)}", file=sys.stderr)
-        return 2 if isinstance(error, UsageError | HexError) else 1
+        return 2 if isinstance(error, UsageError | HexError | NoServiceError) else 1
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of our output has gone, e.g. `head`
@@ -163,20 +172,22 @@ def _station(file: str) -> "Station | None":
 
 
 def _schema(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import json_text
     from orchestrator.config.files import KINDS
     from orchestrator.config.json_schema import json_schema
 
     kind = next(kind for kind in KINDS if kind.key == arguments.kind)
-    print(json.dumps(json_schema(kind), ensure_ascii=False, indent=1))
+    print(json_text(json_schema(kind), indent=1))
     return 0
 
 
 def _decode(arguments: argparse.Namespace) -> int:
+    from orchestrator.columns import json_text
     from orchestrator.protocol.explain import explain
 
     explained = explain(" ".join(arguments.hex), arguments.kinds)
     if arguments.json:
-        print(json.dumps([item.facts for item in explained], ensure_ascii=False))
+        print(json_text([item.facts for item in explained]))
     else:
         print("\n\n".join(item.text for item in explained))
     return 0 if all(item.ok for item in explained) else 1

@@ -1,5 +1,7 @@
-"""Text for a terminal: its width, how a long line is folded, and tables that fit."""
+"""Text for a terminal: its width and letters, how a long line is folded, and tables that fit."""
 
+import json
+import os
 import re
 import shutil
 import sys
@@ -12,6 +14,8 @@ WORD = re.compile(r"orchestrator \S+ \S+|\d\S* (?:°C|Ah|Wh|V|A|%|s|min|h|K)\S*|
 
 #: Where a cell may be folded: between words, and inside a key or a path; a figure keeps its unit.
 PART = re.compile(r"(?:\d[\d.:]* \S+|[(./]*(?:[^\s./]|\.(?=ya?ml))+[./]*|\S)\s*")
+#: Behind these a path is cut, where it must be.
+BREAKS = "/-:"
 #: A cell is folded to this, a heading also to the width of what stands below it.
 MOST_CELL, MOST_HEADING = 24, 12
 #: Between two columns.
@@ -23,9 +27,45 @@ def own_width() -> int:
     return shutil.get_terminal_size().columns if sys.stdout.isatty() else 0
 
 
+def own_height() -> int:
+    """How many lines the terminal can redraw in place; 0 where it is none, or cannot move its cursor."""
+    return shutil.get_terminal_size().lines if _is_able() else 0
+
+
+def own_colour() -> bool:
+    """Whether to use colour: not in a file or a pipe, and not where somebody does not want it (no-color.org)."""
+    return _is_able() and not os.environ.get("NO_COLOR")
+
+
+def json_text(value: object, indent: int | None = None) -> str:
+    """JSON in letters that the output can show: it must stay what it is, whatever the encoding."""
+    utf_8 = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+    return json.dumps(value, ensure_ascii=not utf_8, indent=indent)
+
+
+def _is_able() -> bool:
+    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+
+
 def width_of(text: str) -> int:
     """The number of terminal columns it takes: a Korean letter takes two."""
     return sum(2 if east_asian_width(one) in "WF" else 1 for one in text)
+
+
+def cut(line: str, width: int) -> Iterator[str]:
+    """The line in pieces of at most this width (0: unlimited): the last resort for a word longer than the screen."""
+    if not width or width_of(line) <= width:
+        yield line
+        return
+    now = ""
+    for one in line:
+        if now and width_of(now + one) > width:
+            at = max(now.rfind(sign) + 1 for sign in BREAKS)
+            at = at if at > len(now) // 2 else len(now)
+            yield now[:at]
+            now = now[at:]
+        now += one
+    yield now
 
 
 def folded(line: str, width: int, head: str = "") -> str:
@@ -46,13 +86,17 @@ def folded(line: str, width: int, head: str = "") -> str:
 
 
 def beside(cells: Sequence[str], widths: Sequence[int], width: int = 0) -> str:
-    """The cells in columns of these widths; columns beyond `width` (0: unlimited) continue on indented lines."""
+    """The cells in columns of these widths; columns beyond `width` (0: unlimited) continue on indented lines.
+
+    They move together where all of them fit only then.
+    """
     lines, now = [], ""
+    gap = 1 if sum(widths) + GAP * (len(widths) - 1) > width >= sum(widths) + len(widths) - 1 else GAP
     for cell, columns in zip(cells, widths, strict=True):
         if width and now.strip() and width_of(now) + columns > width:
             lines.append(now.rstrip())
             now = " " * 4
-        now += cell + " " * (columns - width_of(cell) + GAP)
+        now += cell + " " * (columns - width_of(cell) + gap)
     return "\n".join([*lines, now])
 
 

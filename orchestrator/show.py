@@ -1,14 +1,13 @@
-"""The status document as text for a terminal: first what to do, then one line per bay, and why."""
+"""What the status says of a bay: its line in the table, its details, what to do about it, and how urgently."""
 
 import os
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import cast
 
-from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
-from orchestrator.text.document import in_language, language_of_answer
 from orchestrator.text.language import language_of
 
 HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
@@ -21,10 +20,8 @@ CUT_THE_MAINS = frozenset({
 })  # fmt: skip
 #: States in which an obedient charger is in standby.
 RESTING = frozenset({"IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"})
-#: The levels of `alarm`, worst first; the table sorts bays by them, all others last.
+#: The levels of `alarm` that need a person, worst first.
 LEVELS = ("danger", "attention")
-#: In a narrower column nobody reads why: it goes below its bay.
-LEAST_WHY = 40
 #: The most current that standby may show, at the charger and at the BMU.
 STANDBY_A, BMU_A = 0.5, 1.0
 #: Values whose ages differ by no more than this are of one moment.
@@ -34,23 +31,12 @@ Bay = Mapping[str, object]
 
 
 def own_language() -> str:
-    """The language of this terminal's user; "" if unset."""
+    """The language of this terminal's user; "" if unset. Where Korean cannot be shown, English."""
+    try:
+        "가".encode(sys.stdout.encoding or "utf-8")
+    except UnicodeError:
+        return "en"
     return language_of(os.environ)
-
-
-def page(document: Mapping[str, object], language: str = "", width: int = 0) -> str:
-    """The whole status: what to do, the bays, and what is wrong with the station itself.
-
-    Its lines are folded to `width` columns; 0 leaves each as long as it is.
-    """
-    language = language_of_answer(document, language)
-    document = in_language(document, language)
-    lines = [folded(_labelled("alarm", text, language), width) for text in strays(document, language)]
-    lines.append(table(cast("Sequence[Bay]", document["bays"]), language, width))
-    problems = (
-        cast("Mapping[str, object]", document.get(part, {})).get("problem") for part in ("journal", "persisted")
-    )
-    return "\n".join([*lines, *(_labelled("warning", str(problem), language) for problem in problems if problem)])
 
 
 def strays(document: Mapping[str, object], language: str = "") -> list[str]:
@@ -62,22 +48,6 @@ def strays(document: Mapping[str, object], language: str = "") -> list[str]:
         if not one["verified"]
     ]
     return [say(cause, language) for cause in causes]
-
-
-def table(bays: Sequence[Bay], language: str = "", width: int = 0) -> str:
-    """All bays, aligned, those that need a person first; below each bay its further details."""
-    bays = sorted(bays, key=lambda bay: (bay["state"] != "UNCONTROLLABLE", _level(bay)))
-    rows = [HEAD, *(_row(bay, language) for bay in bays)]
-    widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
-    lines = [folded(_labelled("alarm", what_to_do(bay, language), language), width) for bay in bays if is_alarming(bay)]
-    for row, bay in zip(rows, [None, *bays], strict=True):
-        cells = beside(row[:-1], widths, width)
-        narrow = width and width - width_of(cells) < LEAST_WHY
-        lines.append(cells.rstrip() if narrow else folded(row[-1], width, cells).rstrip())
-        if bay is not None:
-            below = [row[-1], *_below(bay, language)] if narrow else _below(bay, language)
-            lines.extend(folded(f"  {line}", width) for line in below)
-    return "\n".join(lines)
 
 
 def other_faults(bay: Bay) -> list[Mapping[str, object]]:
@@ -99,13 +69,24 @@ def _told(cause: object) -> Iterator[tuple[object, ...]]:
 
 def is_alarming(bay: Bay) -> bool:
     """Whether a charger may be running out of control."""
-    return _level(bay) == 0 or bay["state"] == "UNCONTROLLABLE"
+    return level_of(bay) == "danger"
 
 
-def _level(bay: Bay) -> int:
-    """The bay's index in `LEVELS`. A service not restarted since an update may still report true for danger."""
-    level = "danger" if bay.get("alarm") is True else bay.get("alarm")
-    return LEVELS.index(level) if level in LEVELS else len(LEVELS)
+def level_of(bay: Bay) -> str:
+    """How urgently the bay needs a person: one of `LEVELS`, or "" if it needs nobody.
+
+    A service not restarted since an update may still report true for danger.
+    """
+    level = bay.get("alarm")
+    if level is True or bay["state"] == "UNCONTROLLABLE":
+        return "danger"
+    return str(level) if level in LEVELS else ""
+
+
+def urgency(bay: Bay) -> tuple[bool, int]:
+    """The key by which bays are sorted: those that need a person first, the worst before all."""
+    level = level_of(bay)
+    return bay["state"] != "UNCONTROLLABLE", LEVELS.index(level) if level else len(LEVELS)
 
 
 def stands_by(bay: Bay) -> bool:
@@ -136,15 +117,17 @@ def what_to_do(bay: Bay, language: str = "") -> str:
     return say(Cause.of(id_, bay=bay["name"], port=port, state=bay["state"], reason=bay["reason"]), language)
 
 
-def _below(bay: Bay, language: str) -> Iterator[str]:
+def below(bay: Bay, language: str) -> Iterator[str]:
+    """Its further details: other faults, what is old, a policy that waits."""
     yield from (f"{fault['effect']}: {fault['text']}" for fault in other_faults(bay))
     if old := "; ".join(say(one, language) for one in _old_values(bay)):
-        yield _labelled("old", old, language)
+        yield labelled("old", old, language)
     if cast("Mapping[str, object]", bay.get("policy", {})).get("waiting_sha256"):
-        yield _labelled("policy_note", say(Cause("policy_waits"), language), language)
+        yield labelled("policy_note", say(Cause("policy_waits"), language), language)
 
 
-def _labelled(id_: str, what: str, language: str) -> str:
+def labelled(id_: str, what: str, language: str) -> str:
+    """Behind one of the table's labels."""
     return say(Cause.of(id_, what=what), language)
 
 
@@ -172,7 +155,8 @@ def _part(bay: Bay, name: str) -> Mapping[str, object]:
     return cast("Mapping[str, object]", bay[name])
 
 
-def _row(bay: Bay, language: str) -> tuple[str, ...]:
+def row(bay: Bay, language: str) -> tuple[str, ...]:
+    """Its cells in the table, below `HEAD`."""
     battery, charger = _part(bay, "battery"), _part(bay, "charger")
     old, step = _old(bay), bay["step"]
     return (

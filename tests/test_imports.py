@@ -31,7 +31,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     # The devices know the link only as a typing.Protocol: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": (
-        "columns", "config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model",
+        "columns", "config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "page",
         "protocol", "show", "text",
     ),
     "commissioning": (
@@ -45,11 +45,13 @@ EDGES: dict[str, tuple[str, ...]] = {
         "service.records", "service.rows", "sim.charger", "sim.chemistry", "sim.pack", "text",
     ),
     "columns": (),
-    "show": ("columns", "model", "text"),
+    "show": ("model", "text"),
+    "gist": ("model", "show"),
+    "page": ("columns", "gist", "model", "show", "text"),
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
-        "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort", "link",
-        "model", "protocol", "service", "show", "sim", "text", "workbench",
+        "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",
+        "link", "model", "protocol", "service", "show", "sim", "text", "workbench",
     ),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
@@ -254,6 +256,7 @@ def test_what_is_allowed_is_not_complained_about(name: str, source: str) -> None
 #: Parts that make causes. A sentence in them could be neither translated nor compared.
 SILENT = (
     "core", "devices", "interlock", "link", "model", "protocol.sdo", "protocol.words", "service", "show",
+    "gist", "page",
 )  # fmt: skip
 WORD, WORDS = re.compile("[('\"]?[A-Za-z]?[a-z]+['a-z]*[.,;:)'\"]*"), 3
 #: Errors of the program, of files and of the command line are for who mends them, and in English.
@@ -270,8 +273,9 @@ SAID = frozenset({
     ("service.sentences", ""),  # what the second format said
     ("service.stateformat", "it is nested deeper"),  # about a file
     *(("service.verbs", said) for said in (  # the command line, and a service that cannot be reached
-        "let a bay charge", "stop charging", "clear latched faults", "orchestrator: ", "; to stop chargers without",
+        "let a bay charge", "stop charging", "clear latched faults", "names, or patterns",
     )),
+    ("service.request_verb", "; to stop chargers without"),
     ("link.gpio", "used by "),  # what `probe` shows of a line
     ("service.reach", ""),  # what `check` says of a file
     ("service.bay", " in "),  # where an exception of our own was raised

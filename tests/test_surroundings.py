@@ -1,5 +1,6 @@
 """Files in the working directory, and the kind of terminal or pipe, change nothing."""
 
+import json
 import os
 import subprocess
 import sys
@@ -134,6 +135,14 @@ def test_no_terminal_is_too_poor(words: tuple[str, ...], encoding: str, tmp_path
     assert done.stdout or done.stderr or done.returncode == 0
 
 
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "euc-kr"])
+@pytest.mark.parametrize("words", [("schema", "policy"), ("schema", "station")], ids=str)
+def test_json_stays_what_it_is_on_every_terminal(words: tuple[str, ...], encoding: str, tmp_path: Path) -> None:
+    rich, poor = (run("module", tmp_path, *words, env={"PYTHONIOENCODING": name}) for name in ("utf-8", encoding))
+    assert json.loads(poor.stdout) == json.loads(rich.stdout)
+    assert not rich.stdout.isascii(), "else this shows nothing"
+
+
 @pytest.mark.parametrize("words", [("demo", "--fault", "list"), ("schema", "station"), ("check", "none.yaml")], ids=str)
 def test_an_output_that_takes_nothing_is_told_without_a_traceback(words: tuple[str, ...], tmp_path: Path) -> None:
     with Path("/dev/full").open("wb") as full:
@@ -150,7 +159,7 @@ def test_an_output_that_takes_nothing_is_told_without_a_traceback(words: tuple[s
 
 def test_streams_that_are_closed_are_no_error(tmp_path: Path) -> None:
     script = '"$0" -m orchestrator "$@" <&- >&- 2>&-'
-    for words, status in ((("schema", "station"), 0), (("status", "--watch"), 1), (("check", "none.yaml"), 1)):
+    for words, status in ((("schema", "station"), 0), (("status", "--watch"), 2), (("check", "none.yaml"), 1)):
         done = subprocess.run(
             ["/bin/sh", "-c", script, sys.executable, *words],
             env={**os.environ, "PYTHONPATH": str(ROOT), "ORCHESTRATOR_SOCKET": "none.sock"},

@@ -8,6 +8,7 @@ from orchestrator.model import Cause, Request
 from orchestrator.model.cause import plain
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import BayRunner
+from orchestrator.service.chosen import unknown
 from orchestrator.service.journal import Journal
 from orchestrator.service.reception import Answer, Later
 from orchestrator.service.status import station_status
@@ -17,6 +18,8 @@ from orchestrator.text.catalogue import say
 
 #: The next decision handles a request; the answer comes when it is on disk, or after 2 s. Later means a hung loop.
 ANSWER_S = 3.0
+#: An answer names no more unknown bays: its length is bounded.
+MOST_UNKNOWN = 20
 
 
 class RequestHandler:
@@ -51,8 +54,8 @@ class RequestHandler:
             names, port = request.get("bays"), request.get("port")
             if verb == Request.RESET and isinstance(port, str):
                 return self._drop(port)
-            bays = self._bays if names is None else [self._named(name, verb) for name in _names(names)]
-            return self._ask(list(dict.fromkeys(bays)), Request(verb))
+            bays, others = (self._bays, {}) if names is None else self._meant(_names(names), verb)
+            return self._ask(bays, Request(verb), others)
         raise RequestError(Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", *map(str, Request))))
 
     def _drop(self, port: str) -> Later:
@@ -76,11 +79,21 @@ class RequestHandler:
             if bay.name == name:
                 return bay
         known = tuple(bay.name for bay in self._bays)
-        unknown = Cause.of("bay_unknown", bay=f"{name!s:.80}", bays=known)
-        raise RequestError(unknown.with_(then=Cause.of("done_nowhere", verb=verb)) if verb else unknown)
+        cause = unknown([f"{name!s:.80}"], known)
+        raise RequestError(cause.with_(then=Cause.of("done_nowhere", verb=verb)) if verb else cause)
 
-    def _ask(self, bays: Sequence[BayRunner], request: Request) -> Later:
-        """Pass the request to each bay; their answers come later, "" means yes."""
+    def _meant(self, names: list[object], verb: str) -> tuple[list[BayRunner], dict[str, Cause]]:
+        """The bays with these names, each once, and what the others are told: a stop is not left undone for them."""
+        known = [bay.name for bay in self._bays]
+        wrong = [name for name in names if name not in known]
+        if wrong and (verb != Request.STOP or len(wrong) == len(names)):
+            self._named(wrong[0], verb)
+        told = [f"{name!s:.80}" for name in wrong[:MOST_UNKNOWN]] + ["…"] * (len(wrong) > MOST_UNKNOWN)
+        meant = dict.fromkeys(self._bays[known.index(name)] for name in names if name in known)
+        return list(meant), {", ".join(told): unknown(told, known)} if told else {}
+
+    def _ask(self, bays: Sequence[BayRunner], request: Request, others: Mapping[str, Cause] | None = None) -> Later:
+        """Pass the request to each bay; their answers come later, "" means yes, with those to `others`."""
         asked = {bay.name: Asked(request) for bay in bays}
         for bay in bays:
             bay.ask(asked[bay.name])
@@ -92,7 +105,7 @@ class RequestHandler:
             if not all(one.done.is_set() for one in asked.values()) and self._clock() < end_s:
                 return None
             answers = {name: one.answer if one.done.is_set() else late for name, one in asked.items()}
-            return self._results(answers)
+            return self._results({**answers, **(others or {})})
 
         return results
 

@@ -57,3 +57,11 @@ def test_what_the_service_itself_has_made_is_no_mistake(tmp_path: Path, capsys: 
         assert checked(tmp_path, "s", "journal") == 0
     assert checked(tmp_path, "not/yet/s", "not/yet/journal") == 0
     assert errors(capsys) == []
+
+
+def test_a_station_without_errors_is_told_how_far_back_its_journal_will_reach(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert checked(tmp_path, "socket", "journal") == 0
+    told = capsys.readouterr().out
+    assert "journal: with the bay charging day and night, " in told and told.count("\n") == 1

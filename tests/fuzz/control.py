@@ -111,8 +111,12 @@ def _is_what_was_asked(request: Mapping[str, object], said: dict[str, Any]) -> N
         )
         return
     assert request["verb"] in set(Request)
-    bays: Any = request.get("bays")
-    assert list(said["results"]) == list(BAYS if bays is None else dict.fromkeys(bays))
+    bays: Any = BAYS if request.get("bays") is None else request["bays"]
+    strangers = [name for name in bays if name not in BAYS]
+    assert not strangers or request["verb"] == Request.STOP, "only a stop is carried out beside an unknown name"
+    known = [name for name in bays if name in BAYS]
+    assert list(said["results"])[: len(set(known))] == list(dict.fromkeys(known))
+    assert len(said["results"]) == len(set(known)) + bool(strangers)
     assert all(isinstance(answer, str) for answer in said["results"].values())
 
 
@@ -126,6 +130,7 @@ TARGET = Target(
     kind_of_word,
     [
         *(json.dumps({"verb": verb, "bays": ["bay-1"]}).encode() + b"\n" for verb in VERBS),
+        *(json.dumps({"verb": verb, "bays": ["bay-9", "bay-1", "x"]}).encode() + b"\n" for verb in VERBS),
         *(json.dumps({"verb": verb, "bay": "bay-2"}).encode() + b"\n" for verb in VERBS),
         b'{"verb": "stop"}\n', b"{}\n", b"[]\n", b'{"verb": "status", "bay": null}\n{"verb": "stop"}\n',
     ],

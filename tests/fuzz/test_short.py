@@ -156,8 +156,8 @@ def any_json(patch: Patch) -> None:
 def asks_one_only(patch: Patch) -> None:
     ask = RequestHandler._ask
 
-    def once(self: RequestHandler, bays: list[Any], request: Any) -> Later:
-        return ask(self, bays[:1], request)
+    def once(self: RequestHandler, bays: list[Any], *more: Any) -> Later:
+        return ask(self, bays[:1], *more)
 
     patch.setattr(RequestHandler, "_ask", once)
 

@@ -1,13 +1,14 @@
 """The table printed by `orchestrator status`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 import pytest
 
 from orchestrator.columns import width_of
 from orchestrator.model import Cause
-from orchestrator.show import HEAD, figure, page, stands_by, strays, table, what_to_do
+from orchestrator.page import page
+from orchestrator.show import HEAD, figure, stands_by, strays, what_to_do
 from orchestrator.text.catalogue import fields
 
 
@@ -23,6 +24,10 @@ def bay(**changes: object) -> dict[str, object]:
         "faults": [],
         **changes,
     }
+
+
+def table(bays: Sequence[Mapping[str, object]], language: str = "", width: int = 0) -> str:
+    return page({"bays": bays, "language": language}, language, width)
 
 
 EMPTY = bay(
@@ -114,7 +119,7 @@ def test_what_needs_a_person_comes_first() -> None:
         "ALARM: CUT THE MAINS of bay-9's charger (/dev/ttyUSB9): UNCONTROLLABLE: it runs on",
         "ALARM: CUT THE MAINS of bay-5's charger (its port is not known): OFFLINE: silent",
     ]
-    assert [line.split()[0] for line in lines[2:]] == ["BAY", "bay-9", "bay-5", "bay-7", "bay-1"]
+    assert [line[:9].rstrip() for line in lines[2:]] == ["   BAY", "!! bay-9", "!! bay-5", "!  bay-7", "   bay-1"]
 
 
 def test_what_needs_a_person_is_said_once() -> None:
@@ -126,7 +131,7 @@ def test_what_needs_a_person_is_said_once() -> None:
     text = table([bay(state="UNCONTROLLABLE", reason=reason, cause={"id": "uncontrollable"}, faults=faults)])
     assert text.lower().count("mains") == 1
     assert text.splitlines()[2].endswith("  see ALARM")
-    assert text.splitlines()[3:] == ["  WARN: a noisy line"]
+    assert text.splitlines()[3:] == ["     WARN: a noisy line"]
 
 
 STOPPED = bay(
@@ -201,7 +206,7 @@ def test_advice_that_the_reason_begins_with_is_not_said_twice() -> None:
     assert what_to_do(told) == "bay-1: CUT THE MAINS of this charger (/dev/x): it runs on"
 
 
-def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_what_is_wrong_with_the_station() -> None:
+def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_with_what_is_wrong_with_the_station() -> None:
     stray = {"bay": "bay-7", "port": "/dev/old", "state": "STOPPING", "verified": False, "problem": "no such port"}
     document = {
         "bays": [],
@@ -212,9 +217,9 @@ def test_the_page_begins_with_chargers_that_are_no_bays_any_more_and_ends_with_w
     assert page(document).splitlines() == [
         "ALARM: CUT THE MAINS of the charger on /dev/old, which was bay-7's: it may be running, nobody has seen that "
         "it stands by: no such port",
-        "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY",
         "WARNING: disk full",
         "WARNING: its disk hangs",
+        "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY",
     ]
     assert strays({}) == []
     assert page({"bays": [], "journal": {"problem": ""}}) == "BAY  STATE  SOC  PACK  CURRENT  TEMP  STEP  WHY"

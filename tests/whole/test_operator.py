@@ -52,8 +52,11 @@ def test_status_shows_every_bay_and_why(station: Station) -> None:
     _, service = station
     table = service.cli("status")
     assert table.returncode == 0
-    assert table.stdout.splitlines()[0].split() == ["BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY"]
-    assert "bay-1" in table.stdout
+    gist, head, *bays = table.stdout.splitlines()
+    assert re.fullmatch(r"4 bays: 2 charging, 1 needs you, 1 offline; 2\d A, 1\.\d kW · \d\d:\d\d:\d\d", gist)
+    assert head.split() == ["BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY"]
+    assert [line[:8] for line in bays if "bay-" in line[:8]] == ["!  bay-3", "   bay-1", "   bay-2", "   bay-4"]
+    assert "\x1b" not in table.stdout
     assert "5 (14.0 A)  step 5 (14.0 A): the highest step, nothing limits it" in table.stdout
     one = service.cli("status", "bay-2", "--json")
     document = json.loads(one.stdout)
@@ -123,8 +126,9 @@ def test_a_stop_that_is_not_obeyed_begins_with_what_to_do(station: Station) -> N
     assert done.stderr.startswith(f"bay-2: CUT THE MAINS of this charger ({plant.bays[1]['port']})")
     assert done.stdout == "bay-2: stop accepted\n"
     table = service.cli("status").stdout.splitlines()
-    assert table[0].startswith("ALARM: bay-2: CUT THE MAINS of this charger (")
-    assert [line.split()[0] for line in table if line.startswith("bay-")] == ["bay-2", "bay-3", "bay-1", "bay-4"]
+    assert table[1].startswith("ALARM: bay-2: CUT THE MAINS of this charger (")
+    bays = [line[:8] for line in table if line[3:6] == "bay"]
+    assert bays == ["!! bay-2", "!  bay-3", "   bay-1", "   bay-4"]
     plant.inject("heal", 2)
     service.wait("TRIPPED", ["bay-2"])
     assert service.cli("stop", "bay-2").returncode == 0
@@ -169,7 +173,7 @@ def test_wrong_use_is_told(station: Station) -> None:
         with pytest.raises(ServiceError, match=r"unknown verb|'bays' is a list"):
             ask(service.socket, strange)
     nowhere = orchestrator("status", "--socket", str(service.directory / "no.sock"))
-    assert nowhere.returncode == 1
+    assert nowhere.returncode == 2
     assert "no service answers on" in nowhere.stderr
     none = orchestrator("status", env={"ORCHESTRATOR_SOCKET": ""})
     assert none.returncode == 2
@@ -233,7 +237,7 @@ def test_an_adapter_that_is_unplugged_and_plugged_in_again(station: Station) -> 
     assert "no such port" in bay["reason"]
     assert bay["charger"]["old"] is True and bay["charger"]["age_s"] > 2
     table = service.cli("status", "bay-1").stdout
-    assert table.startswith("ALARM: bay-1: CUT THE MAINS of this charger (")
+    assert table.splitlines()[1].startswith("ALARM: bay-1: CUT THE MAINS of this charger (")
     assert " A (old)" in table and "OLD: the charger's " in table and "; the BMU sees " in table
     plant.inject("heal")
     service.wait("SUSPENDED")
@@ -265,7 +269,7 @@ def test_who_watches_goes_on_when_the_service_is_started_anew(tmp_path: Path) ->
             wait_until(lambda: '"station"' in file.read_text(), 10, "the first status")
             service.signal(signal.SIGTERM)
             service.ended()
-            wait_until(lambda: "still watching: no service answers" in file.read_text(), 10, "the loss")
+            wait_until(lambda: "orchestrator: no answer since " in file.read_text(), 10, "the loss")
             service.start()
             wait_until(lambda: "the service answers again\n" in file.read_text(), 10, "the return")
             watch.send_signal(signal.SIGINT)

@@ -43,7 +43,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
         ("tests/test_surroundings.py::test_no_terminal_is_too_poor",),
         (
             "orchestrator/__main__.py",
-            '        stream.reconfigure(errors="backslashreplace")',
+            '        stream.reconfigure(errors="poor")',
             '        stream.reconfigure(errors="strict")',
         ),
     ),

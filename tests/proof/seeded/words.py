@@ -37,7 +37,7 @@ WORDS: tuple[Seed, ...] = (
         "orchestrator stop exits with 0 whatever the result of the stop",
         ("tests/whole/test_operator.py::test_a_stop_that_is_not_obeyed_begins_with_what_to_do",),
         (
-            f"{SERVICE}verbs.py",
+            f"{SERVICE}request_verb.py",
             "        unverified = _wait_for_standby(path, looked_at, language, every=arguments.all)\n",
             "        unverified = {}\n",
         ),
