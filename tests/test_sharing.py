@@ -1,14 +1,16 @@
 """Files are shared out by kind, and in their order."""
 
 import os
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from tests.conftest import LONG
 from tests.sharing import NICE, WAITING, Sharing, pytest_configure
-from tests.sources import ROOT
 
+ROOT = Path(__file__).resolve().parent.parent
 FILES = ("tests/whole/a.py", "tests/core/b.py", "tests/guardian/c.py", "tests/whole/d.py", "tests/proof/e.py")
 #: Of each file; a worker with no more than two left gets the next file.
 TESTS = 3
@@ -92,4 +94,8 @@ def test_those_that_compute_give_way(
 
 @pytest.mark.parametrize("name", WAITING)
 def test_what_waits_is_there(name: str) -> None:
-    assert (ROOT.parent / name).exists()
+    assert (ROOT / name).exists()
+
+
+def test_what_is_long_is_there() -> None:
+    assert [name for name in LONG if not any((place / name).exists() for place in (ROOT, ROOT / "tests"))] == []
