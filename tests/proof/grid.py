@@ -307,7 +307,7 @@ def cells(phases: Callable[[int], tuple[Phase, ...]]) -> Iterator[Cell]:
 def play(cell: Cell, used: Used) -> Ended:
     """From the start to the operator's stop."""
     situation = SITUATIONS[cell.state]
-    the_station = station([ControlMode.MANUAL], [POLICIES["demo" if situation.is_toy else "48v"]], sweep_s=0.3)
+    the_station = station([ControlMode.MANUAL], [POLICIES["demo" if situation.is_toy else "48v"]], sweep_s=0.5)
     line = "bytewise" if cell.phase is Phase.HALF else "real"  # where nobody looks, a reply need not come in pieces
     with world(the_station, [situation.nature(line)], end_s=120.0 + cell.row.for_s) as made:
         run = Run(cell, made, used)
