@@ -1,4 +1,4 @@
-"""`pytest -p tests.sharing -n 6`: which worker gets which file. Some compute, one per core, and the others wait.
+"""`pytest -p tests.sharing -n 7`: which worker gets which file. Some compute, one per core, and the others wait.
 
 Tests with real processes wait most of their time and must be served at once when they do not; tests that compute can
 wait at any time. So each worker takes files of its own kind, in the order of the collection, and of the other kind when
