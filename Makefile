@@ -14,8 +14,10 @@ help:  ## show this list
 demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, about a minute
 	$(BIN)/orchestrator demo $(ARGS)
 
-test: .venv/dev.stamp  ## all tests, three files at a time; ARGS='tests/core -k taper' chooses some
-	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
+# Modules are compiled once, not in each worker and in each of some thousand processes: the variable would forbid it.
+test: export PYTHONDONTWRITEBYTECODE :=
+test: .venv/dev.stamp  ## all tests, seven files at a time; ARGS='tests/core -k taper' chooses some
+	$(BIN)/python -m pytest -n 7 -p tests.sharing --dist loadfile --no-loadscope-reorder $(ARGS)
 
 # Measuring makes tests that compute three times as slow, so it is done with the tests of these parts alone, and with as
 # few as reach everything: two of the core's only try much more of the same, and two files start whole stations and

@@ -12,11 +12,17 @@ from hypothesis import settings
 
 from tests.ids import name_of
 
-#: The longest tests start first, so that the run does not end waiting for them alone.
+#: The longest files start first, so that the run does not end waiting for them alone: those that wait (`sharing.py`),
+#: and those that compute.
 LONG = (
-    "proof/test_explore.py", "whole/test_faults.py", "proof/test_seeded_bugs.py", "workbench/test_exhaustive.py",
-    "proof/test_grid.py", "whole/test_survives.py", "proof/test_environment.py", "whole/test_operator.py",
-    "proof/test_nth_call.py", "whole/test_ends.py", "guardian/test_estop.py", "core/test_witnesses.py",
+    "whole/test_operator.py", "whole/test_survives.py", "tests/test_benchmarks.py", "whole/test_ends.py",
+    "whole/test_beginning.py", "guardian/test_kills.py", "guardian/test_estop.py", "guardian/test_emergency.py",
+    "guardian/test_laststop.py", "whole/test_demo.py", "whole/test_charge.py", "guardian/test_estop_alone.py",
+    "whole/test_others.py", "whole/test_start.py", "whole/test_faults.py", "whole/test_korean.py",
+    "proof/test_seeded_bugs.py", "proof/test_grid.py", "proof/test_explore.py", "proof/test_campaign.py",
+    "workbench/test_exhaustive.py", "workbench/test_leap.py", "core/test_decide.py", "proof/test_nth_call.py",
+    "proof/test_environment.py", "tests/test_surroundings.py", "workbench/test_ordinary_charges.py",
+    "fuzz/test_short.py", "proof/test_others_on_the_bus.py", "core/test_persisted.py",
 )  # fmt: skip
 
 for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
@@ -34,4 +40,5 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """With files in parallel, the longest first."""
-    items.sort(key=lambda item: next((at for at, name in enumerate(LONG) if item.path.as_posix().endswith(name)), 99))
+    places = {name: at for at, name in enumerate(LONG)}
+    items.sort(key=lambda item: places.get("/".join(item.path.parts[-2:]), len(LONG)))

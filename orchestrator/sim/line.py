@@ -4,6 +4,7 @@ import random
 import termios
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 #: One byte at 19200 baud with start and stop bit (§2.2.2).
 BYTE_S = 10 / 19200
@@ -39,7 +40,7 @@ LINES = {
 
 def is_clear(settings: Sequence[object]) -> bool:
     """Whether a port with these settings (of `termios.tcgetattr`) passes bytes to and from a charger unchanged."""
-    iflag, oflag, cflag, lflag, _, speed = (int(value) for value in settings[:6])  # type: ignore[call-overload]
+    iflag, oflag, cflag, lflag, _, speed = cast("Sequence[int]", settings[:6])
     framed = cflag & (termios.CSIZE | termios.PARENB | termios.CSTOPB | termios.CRTSCTS | termios.CREAD)
     changed = iflag & (termios.ISTRIP | termios.ICRNL | termios.IXON) or oflag & termios.OPOST or lflag & termios.ICANON
     return speed == termios.B19200 and framed == termios.CS8 | termios.CREAD and not changed

@@ -203,7 +203,7 @@ def measures_again(world: World) -> None:
 
 
 def waits(seconds: float) -> Act:
-    return lambda world: world.run(seconds, dt_s=1.0)
+    return lambda world: world.run(seconds, dt_s=4.0)
 
 
 def returns_as_another(world: World) -> None:

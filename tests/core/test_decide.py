@@ -1,7 +1,6 @@
 """`decide()` with any possible input: it never raises, never changes its arguments, never runs blindly."""
 
 from collections.abc import Callable
-from copy import deepcopy
 from dataclasses import fields, replace
 from functools import cache, partial
 from math import isfinite
@@ -215,9 +214,9 @@ def test_whatever_comes_it_decides_soberly(data: st.DataObject, control: Control
     for _ in range(data.draw(st.integers(1, 6))):
         now_s += data.draw(st.sampled_from([0.0, 0.02, 0.25, 1.0, 4.0, 100.0, 1e6]))
         snapshot = data.draw(nearly_good(now_s, world) if data.draw(st.integers(0, 5)) else snapshots(now_s))
-        kept, seen = deepcopy(memory), deepcopy(snapshot)
+        kept, seen = repr(memory), repr(snapshot)
         decision, after = decide(now_s, snapshot, memory, rules)
-        assert (repr(memory), repr(snapshot)) == (repr(kept), repr(seen)), "an argument was changed"
+        assert (repr(memory), repr(snapshot)) == (kept, seen), "an argument was changed"
         assert repr(decide(now_s, snapshot, memory, rules)) == repr((decision, after)), "not the same twice"
         check(memory, now_s, snapshot, decision, rules)
         memory = after

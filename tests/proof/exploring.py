@@ -11,6 +11,7 @@ from orchestrator.config.shipped import shipped_names
 from orchestrator.core.machine import TABLE
 from orchestrator.core.rules import Rules
 from orchestrator.model import ControlMode, State
+from orchestrator.workbench.prove.endings import ENDINGS
 from orchestrator.workbench.prove.exhaustive import prove
 from orchestrator.workbench.prove.explore import Walk
 from orchestrator.workbench.prove.inputs import StationInputs
@@ -59,6 +60,16 @@ def small(of: Rules) -> StationInputs:
         if name in SMALL_BATTERIES or any(name.startswith(start) for start in SMALL_BATTERIES)
     }  # fmt: skip
     return replace(whole, chargers=chargers, batteries=batteries)
+
+
+def few(of: Rules) -> StationInputs:
+    """The batteries that the endings speak of and those that are too warm: enough to come to all kinds of places."""
+    whole = small(of)
+    named = {ending.battery for ending in ENDINGS}
+    batteries = {
+        name: one for name, one in whole.batteries.items() if name in named or "temperature" in name or "hot" in name
+    }
+    return replace(whole, batteries=batteries)
 
 
 def walk_on(inputs: StationInputs) -> Walk:

@@ -61,7 +61,7 @@ class Situation:
     def is_toy(self) -> bool:
         return self.soc_pct is None or self.speed > 1
 
-    def nature(self) -> Nature:
+    def nature(self, line: str = "bytewise") -> Nature:
         pack = PACKS["demo"]()
         if self.soc_pct is not None:
             pack = Pack()
@@ -69,7 +69,7 @@ class Situation:
         if self.speed > 1:
             pack = replace(PACKS["demo"]())
             pack.set_soc(self.soc_pct or 0.0)
-        return Nature(pack, line="bytewise", speed=self.speed)
+        return Nature(pack, line=line, speed=self.speed)
 
 
 #: Not an action: continue when the charger runs.
@@ -307,8 +307,9 @@ def cells(phases: Callable[[int], tuple[Phase, ...]]) -> Iterator[Cell]:
 def play(cell: Cell, used: Used) -> Ended:
     """From the start to the operator's stop."""
     situation = SITUATIONS[cell.state]
-    the_station = station([ControlMode.MANUAL], [POLICIES["demo" if situation.is_toy else "48v"]], sweep_s=0.3)
-    with world(the_station, [situation.nature()], end_s=120.0 + cell.row.for_s) as made:
+    the_station = station([ControlMode.MANUAL], [POLICIES["demo" if situation.is_toy else "48v"]], sweep_s=0.5)
+    line = "bytewise" if cell.phase is Phase.HALF else "real"  # where nobody looks, a reply need not come in pieces
+    with world(the_station, [situation.nature(line)], end_s=120.0 + cell.row.for_s) as made:
         run = Run(cell, made, used)
         with patch.object(latches, "FAULTS", run.rows()):
             return run.run()

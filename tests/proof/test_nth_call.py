@@ -6,7 +6,7 @@ from orchestrator.link import serial as serial_module
 from tests.proof.nth_call import ERRORS, Case, cases, charge
 
 #: Every Nth of all failures; `make campaign` plays them all.
-SAMPLE = 60
+SAMPLE = 100
 
 
 @pytest.fixture(name="sample", scope="module")

@@ -1,6 +1,6 @@
 """The checker itself: for each of its properties, a core with a bug it must catch, with the counterexample."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import inf
 from typing import Any
@@ -26,7 +26,7 @@ from orchestrator.workbench.prove.exhaustive import here
 from orchestrator.workbench.prove.explore import Explorer
 from orchestrator.workbench.prove.lasting import reaches, settles
 from orchestrator.workbench.prove.properties import PROPERTIES
-from tests.proof.exploring import rules, small, walk_on
+from tests.proof.exploring import few, rules, small, walk_on
 
 Patch = pytest.MonkeyPatch
 
@@ -233,18 +233,32 @@ BUGS: dict[str, Callable[[Patch], None]] = {
 }
 
 
+#: A property is looked at on the way. An ending is looked for from so many places, and where that shows nothing, more.
+PLACES = (20, 120, 400)
+#: Seen only with a battery that no ending speaks of.
+RARE = ("voltage limit", "unordered", "no livelock")
+
+
+def explored(name: str) -> Iterator[Explorer]:
+    """Explorations that may have found it, ever longer ones."""
+    on_the_way = name in {rule.name for rule in PROPERTIES} | {"no exception"}
+    for most in (None,) if on_the_way else PLACES:
+        walk = walk_on((small if name in RARE else few)(rules(current_a=12.0)))
+        explorer = Explorer(walk, here(walk))
+        if most is None:
+            explorer.run(until=name)
+        else:
+            explorer.run(most=most)
+            reaches(explorer, [ending for ending in ENDINGS if ending.name == name])
+            settles(explorer) if name == "no livelock" else None
+        yield explorer
+
+
 @pytest.mark.parametrize("name", BUGS)
 def test_the_bug_is_caught(name: str, monkeypatch: Patch) -> None:
     BUGS[name](monkeypatch)
-    walk = walk_on(small(rules(current_a=12.0)))
-    explorer = Explorer(walk, here(walk))
-    if name in {rule.name for rule in PROPERTIES} | {"no exception"}:
-        explorer.run(until=name)
-    else:
-        explorer.run(most=400)
-        reaches(explorer, [ending for ending in ENDINGS if ending.name == name])
-        settles(explorer) if name == "no livelock" else None
-    assert name in explorer.found, f"not seen; seen: {list(explorer.found)}"
+    explorer = next((one for one in explored(name) if name in one.found), None)
+    assert explorer is not None, "not seen"
     story = str(explorer.found[name])
     assert "t = " in story, "a counterexample has a story"
 

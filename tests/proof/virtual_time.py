@@ -17,8 +17,9 @@ from greenlet import getcurrent, greenlet
 
 #: A clock never shows the same time twice; this is also the cost of reading it.
 TICK_S = 1e-6
-#: More moments than this within a millisecond: a thread spins without waiting.
+#: More moments than this within so short a time: a thread spins without waiting.
 BUSY = 20_000
+MOMENT_S = 0.001
 
 
 class StuckError(BaseException):
@@ -58,7 +59,8 @@ class Time:
         self._order = count()
         self._main = self._running = Runner(getcurrent())
         self._runners: list[Runner] = [self._main]
-        self._busy_from = (self.now_s, 0)
+        self._busy = 0  #: moments so far until …
+        self._idle_s = self.now_s
 
     # --- for those that live in it ------------------------------------------------------------------------------------
 
@@ -138,10 +140,17 @@ class Time:
 
     def _next(self) -> Runner:
         """Run moments until one belongs to a thread; to the main one if nothing can happen any more."""
+        moments = self._moments
         try:
             while self.failure is None:
-                at_s, _, what, turn = heappop(self._moments)
-                self._pass(at_s)
+                at_s, _, what, turn = heappop(moments)
+                if at_s > self.now_s:
+                    self.now_s = at_s
+                if self.now_s > self._idle_s:
+                    self._idle_s, self._busy = self.now_s + MOMENT_S, 0
+                self._busy += 1
+                if self._busy > BUSY or self.now_s > self.end_s:
+                    raise StuckError(self._why_stuck())
                 if isinstance(what, Handle):
                     if what.callback is not None:
                         what.callback(*what.args)
@@ -155,14 +164,7 @@ class Time:
             self.failure = self.failure or error
         return self._main
 
-    def _pass(self, at_s: float) -> None:
-        self.now_s = max(self.now_s, at_s)
+    def _why_stuck(self) -> str:
         if self.now_s > self.end_s:
-            raise StuckError(f"the world has not ended by {self.end_s:g} s")
-        since_s, moments = self._busy_from
-        if self.now_s - since_s > 0.001:
-            self._busy_from = (self.now_s, 0)
-        elif moments > BUSY:
-            raise StuckError(f"{BUSY} moments without any time passing, at {self.now_s:.3f} s")
-        else:
-            self._busy_from = (since_s, moments + 1)
+            return f"the world has not ended by {self.end_s:g} s"
+        return f"{BUSY} moments without any time passing, at {self.now_s:.3f} s"

@@ -19,7 +19,7 @@ from orchestrator.workbench.prove.endings import ENDINGS
 from orchestrator.workbench.prove.exhaustive import bay_of, bays_in, here
 from orchestrator.workbench.prove.explore import Explorer
 from orchestrator.workbench.prove.lasting import reaches, settles
-from tests.proof.exploring import small, walk_on
+from tests.proof.exploring import few, small, walk_on
 
 ROOT = Path(__file__).parent
 #: Policy → what it breaks, and the end of the counterexample. All three pass every rule of `check`.
@@ -76,8 +76,8 @@ def test_the_page_of_policies_shows_the_story_that_is_told(monkeypatch: pytest.M
 
 @pytest.mark.parametrize("policy", shipped_names("policies"))
 def test_a_shipped_policy_ends_every_charge_and_wakes_every_pack(policy: str) -> None:
-    """Whatever its hold at the top, and wherever its stages of precharge meet."""
-    walk = walk_on(small(Rules.of(bay_of(load_policy(f"policies/{policy}.yaml")))))
+    """Whatever its hold at the top, and wherever its stages of precharge meet; `make campaign` has all inputs."""
+    walk = walk_on(few(Rules.of(bay_of(load_policy(f"policies/{policy}.yaml")))))
     explorer = Explorer(walk, here(walk))
     explorer.run(most=110)
     assert State.CHARGING in {node.place.memory.state for node in explorer.nodes}
@@ -96,7 +96,7 @@ def test_the_command_explores_on_every_core(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The complete run, on a bay with few inputs: the same findings as in one process."""
-    monkeypatch.setattr(exhaustive, "StationInputs", SimpleNamespace(of=small))
+    monkeypatch.setattr(exhaustive, "StationInputs", SimpleNamespace(of=few))
     monkeypatch.setattr(processes, "get_context", lambda _: get_context("fork"))  # children have those few too
     assert main(["check", "--exhaustive", "--jobs", "2", str(ROOT / "broken" / "automatic.yaml")]) == 1
     said, told = capsys.readouterr()
