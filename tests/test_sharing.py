@@ -1,6 +1,7 @@
 """Files are shared out by kind, and in their order."""
 
 import os
+import signal
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import LONG
+from tests.conftest import ENDS, LONG, pytest_runtest_setup
 from tests.sharing import NICE, WAITING, Sharing, give_way, pytest_runtest_logstart
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -108,3 +109,11 @@ def test_what_waits_is_there(name: str) -> None:
 
 def test_what_is_long_is_there() -> None:
     assert [name for name in LONG if not any((place / name).exists() for place in (ROOT, ROOT / "tests"))] == []
+
+
+def test_no_test_leaves_signals_to_the_next_that_its_processes_would_not_hear() -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
+    pytest_runtest_setup()
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & set(ENDS)
