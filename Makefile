@@ -16,8 +16,8 @@ demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, abou
 
 # Modules are compiled once, not in each worker and in each of some thousand processes: the variable would forbid it.
 test: export PYTHONDONTWRITEBYTECODE :=
-test: .venv/dev.stamp  ## all tests, seven files at a time; ARGS='tests/core -k taper' chooses some
-	$(BIN)/python -m pytest -n 7 -p tests.sharing --dist loadfile --no-loadscope-reorder $(ARGS)
+test: .venv/dev.stamp  ## all tests, six files at a time; ARGS='tests/core -k taper' chooses some
+	$(BIN)/python -m pytest -n 6 -p tests.sharing --dist loadfile --no-loadscope-reorder $(ARGS)
 
 # Measuring makes tests that compute three times as slow, so it is done with the tests of these parts alone, and with as
 # few as reach everything: two of the core's only try much more of the same, and two files start whole stations and

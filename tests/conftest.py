@@ -25,12 +25,27 @@ LONG = (
     "fuzz/test_short.py", "proof/test_others_on_the_bus.py", "core/test_persisted.py",
 )  # fmt: skip
 
-for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM):
-    if signal.getsignal(number) is signal.SIG_IGN:
-        signal.signal(number, signal.default_int_handler if number is signal.SIGINT else signal.SIG_DFL)
+#: What ends a service, or has it read its files again.
+ENDS = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM)
+
+
+def enable_signals() -> None:
+    """As a process that is started from a terminal has them: children inherit what is ignored or blocked."""
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
+    for number in ENDS:
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler if number is signal.SIGINT else signal.SIG_DFL)
+
+
+enable_signals()
 
 settings.register_profile("all", deadline=None)
 settings.load_profile("all")
+
+
+def pytest_runtest_setup() -> None:
+    """What runs in this process may have changed them, and any file may come next."""
+    enable_signals()
 
 
 def pytest_make_parametrize_id(val: object) -> str | None:

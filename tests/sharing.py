@@ -1,12 +1,13 @@
-"""`pytest -p tests.sharing -n 7`: which worker gets which file. Some compute, one per core, and the others wait.
+"""`pytest -p tests.sharing -n 6`: which worker gets which file. Some compute, one per core, and the others wait.
 
 Tests with real processes wait most of their time and must be served at once when they do not; tests that compute can
 wait at any time. So each worker takes files of its own kind, in the order of the collection, and of the other kind when
-there are no more of its own. Those that begin by computing give way to all other processes (`nice`): the cores are
+there are no more of its own. Whoever has begun to compute gives way to all other processes (`nice`): the cores are
 busy from the beginning to the end, and what happens in real time hardly notices.
 """
 
 import os
+from functools import cache
 
 import pytest
 from xdist.scheduler import LoadFileScheduling
@@ -42,8 +43,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> Sharing:
     return Sharing(config, log)
 
 
-def pytest_configure() -> None:
-    """Called in each worker, before it collects."""
-    worker = os.environ.get("PYTEST_XDIST_WORKER")
-    if worker is not None and computes(worker, int(os.environ["PYTEST_XDIST_WORKER_COUNT"])):
-        os.nice(NICE)
+@cache
+def give_way() -> None:
+    """Once and for good: nobody but root gets a priority back."""
+    os.nice(NICE)
+
+
+def pytest_runtest_logstart(nodeid: str) -> None:
+    """Called before each test; a worker that takes files of the other kind has seen the last of its own."""
+    if "PYTEST_XDIST_WORKER" in os.environ and not waits(nodeid):
+        give_way()

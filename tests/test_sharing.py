@@ -1,14 +1,16 @@
 """Files are shared out by kind, and in their order."""
 
 import os
+import signal
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from tests.conftest import LONG
-from tests.sharing import NICE, WAITING, Sharing, pytest_configure
+from tests.conftest import ENDS, LONG, pytest_runtest_setup
+from tests.sharing import NICE, WAITING, Sharing, give_way, pytest_runtest_logstart
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = ("tests/whole/a.py", "tests/core/b.py", "tests/guardian/c.py", "tests/whole/d.py", "tests/proof/e.py")
@@ -80,15 +82,23 @@ def _made_nicer_by(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return by
 
 
-@pytest.mark.parametrize(("worker", "nice"), [("gw0", [NICE]), ("gw1", [NICE]), ("gw2", []), (None, [])])
-def test_those_that_compute_give_way(
-    worker: str | None, nice: list[int], made_nicer_by: list[int], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("worker", "files", "nice"),
+    [("gw0", FILES[1:2] * 2, [NICE]), ("gw2", FILES[:1], []), ("gw2", FILES[:2], [NICE]), (None, FILES, [])],
+)
+def test_who_computes_gives_way_once(
+    worker: str | None,
+    files: tuple[str, ...],
+    nice: list[int],
+    made_nicer_by: list[int],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv("PYTEST_XDIST_WORKER_COUNT", "6")
-    monkeypatch.setenv("PYTEST_XDIST_WORKER", worker or "")
-    if worker is None:
-        monkeypatch.delenv("PYTEST_XDIST_WORKER")
-    pytest_configure()
+    monkeypatch.setattr("tests.sharing.give_way", cache(give_way.__wrapped__))  # this worker's own stays done
+    monkeypatch.delenv("PYTEST_XDIST_WORKER", raising=False)
+    if worker is not None:
+        monkeypatch.setenv("PYTEST_XDIST_WORKER", worker)
+    for file in files:
+        pytest_runtest_logstart(f"{file}::test")
     assert made_nicer_by == nice
 
 
@@ -99,3 +109,11 @@ def test_what_waits_is_there(name: str) -> None:
 
 def test_what_is_long_is_there() -> None:
     assert [name for name in LONG if not any((place / name).exists() for place in (ROOT, ROOT / "tests"))] == []
+
+
+def test_no_test_leaves_signals_to_the_next_that_its_processes_would_not_hear() -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
+    pytest_runtest_setup()
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ()) & set(ENDS)

@@ -39,6 +39,7 @@ def station_document(directory: Path, cans: Sequence[Mapping[str, object]], bays
     per_bus = -(-bays // len(cans))
     return {
         "station": "whole",
+        "stagger_s": 0,  # all charges begin at once
         "can": {f"can{number}": dict(keys) for number, keys in enumerate(cans)},
         "bays": [
             {

@@ -77,8 +77,7 @@ STOPPED_BY = "stopped by the operator"
 
 
 def leisurely(document: Document) -> None:
-    """One emulator serves them all and must not become the slow device itself. All of them start at once."""
-    document["stagger_s"] = 0
+    """One emulator serves them all and must not become the slow device itself."""
     for bay in document["bays"]:
         bay["battery"]["sweep_s"] = 0.2
 

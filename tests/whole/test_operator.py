@@ -22,7 +22,8 @@ Station = tuple[PlantProcess, Service]
 
 
 def one_automatic(document: Document) -> None:
-    """The third bay's charger is configured as automatic; the fourth one's port does not exist."""
+    """The third bay's charger is configured as automatic; the fourth one's port does not exist. Charges take turns."""
+    del document["stagger_s"]
     document["bays"][2]["charger"]["control"] = "automatic"
     document["bays"][3]["charger"]["port"] += "-missing"
 
