@@ -29,7 +29,7 @@ def test_it_ends_with_what_it_looked_at_and_found(capsys: pytest.CaptureFixture[
     assert last_line(capsys, one_bay, two_bays, MAP, SCENARIO) == (
         "3 bays, 2 policies, 1 object map, 1 scenario: no errors, no warnings"
     ), "a policy that both name is one"
-    assert last_line(capsys, Path(__file__).parent / "odd" / "policy.yaml") == "1 policy: no errors, 9 warnings"
+    assert last_line(capsys, Path(__file__).parent / "odd" / "policy.yaml") == "1 policy: no errors, 10 warnings"
     assert last_line(capsys, BROKEN / "station-buses.yaml") == "2 bays, 1 policy: 7 errors"
     assert last_line(capsys, BROKEN / "yaml-empty.yaml") == "1 file: 1 error"
     assert last_line(capsys, BROKEN / "station-empty-bays.yaml") == "1 file: 4 errors", "there is no bay in it"

@@ -100,7 +100,7 @@ def test_the_command_explores_on_every_core(
     monkeypatch.setattr(processes, "get_context", lambda _: get_context("fork"))  # children have those few too
     assert main(["check", "--exhaustive", "--jobs", "2", str(ROOT / "broken" / "automatic.yaml")]) == 1
     said, told = capsys.readouterr()
-    assert said.startswith(f"{ROOT}/broken/automatic.yaml, bay-1: 33 properties, 2 BROKEN; ")
+    assert f"\n{ROOT}/broken/automatic.yaml, bay-1: 33 properties, 2 BROKEN; " in said
     assert "bay-1: charges: a healthy battery is charged" in told
     assert "charges, as measured" in told
     assert "decisions explored" not in told  # progress is for terminals
