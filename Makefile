@@ -14,10 +14,12 @@ help:  ## show this list
 demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, about a minute
 	$(BIN)/orchestrator demo $(ARGS)
 
-# Modules are compiled once, not in each worker and in each of some thousand processes: the variable would forbid it.
+# Modules are compiled once and beforehand, not by each worker and each of some thousand processes (which the variable
+# would make them do): the first services would start so slowly beside it that they miss their own deadlines.
 test: export PYTHONDONTWRITEBYTECODE :=
-test: .venv/dev.stamp  ## all tests, six files at a time; ARGS='tests/core -k taper' chooses some
-	$(BIN)/python -m pytest -n 6 -p tests.sharing --dist loadfile --no-loadscope-reorder $(ARGS)
+test: .venv/dev.stamp  ## all tests, five files at a time; ARGS='tests/core -k taper' chooses some
+	$(BIN)/python -m compileall -q -j 0 orchestrator benchmarks tests
+	$(BIN)/python -m pytest -n 5 -p tests.sharing --dist loadfile --no-loadscope-reorder $(ARGS)
 
 # Measuring makes tests that compute three times as slow, so it is done with the tests of these parts alone, and with as
 # few as reach everything: two of the core's only try much more of the same, and two files start whole stations and
