@@ -12,17 +12,17 @@ from hypothesis import settings
 
 from tests.ids import name_of
 
-#: The longest files start first, so that the run does not end waiting for them alone: those that wait (`sharing.py`),
-#: and those that compute.
+#: The longest files start first, so that the run does not end waiting for them alone: those that wait for real processes
+#: and those that compute in turn, so that both are under way at any time.
 LONG = (
-    "whole/test_operator.py", "whole/test_survives.py", "tests/test_benchmarks.py", "whole/test_ends.py",
-    "whole/test_beginning.py", "guardian/test_kills.py", "guardian/test_estop.py", "guardian/test_emergency.py",
-    "guardian/test_laststop.py", "whole/test_demo.py", "whole/test_charge.py", "guardian/test_estop_alone.py",
-    "whole/test_others.py", "whole/test_start.py", "whole/test_faults.py", "whole/test_korean.py",
-    "proof/test_seeded_bugs.py", "proof/test_grid.py", "proof/test_explore.py", "proof/test_campaign.py",
-    "workbench/test_exhaustive.py", "workbench/test_leap.py", "core/test_decide.py", "proof/test_nth_call.py",
-    "proof/test_environment.py", "tests/test_surroundings.py", "workbench/test_ordinary_charges.py",
-    "fuzz/test_short.py", "proof/test_others_on_the_bus.py", "core/test_persisted.py",
+    "whole/test_operator.py", "proof/test_seeded_bugs.py", "whole/test_survives.py", "proof/test_grid.py",
+    "tests/test_benchmarks.py", "proof/test_explore.py", "whole/test_ends.py", "proof/test_campaign.py",
+    "whole/test_beginning.py", "workbench/test_exhaustive.py", "guardian/test_kills.py", "workbench/test_leap.py",
+    "guardian/test_estop.py", "core/test_decide.py", "guardian/test_emergency.py", "proof/test_nth_call.py",
+    "guardian/test_laststop.py", "proof/test_environment.py", "whole/test_demo.py", "tests/test_surroundings.py",
+    "whole/test_charge.py", "workbench/test_ordinary_charges.py", "guardian/test_estop_alone.py",
+    "fuzz/test_short.py", "whole/test_others.py", "proof/test_others_on_the_bus.py", "whole/test_start.py",
+    "core/test_persisted.py", "whole/test_faults.py", "whole/test_korean.py",
 )  # fmt: skip
 
 #: What ends a service, or has it read its files again.
