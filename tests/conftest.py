@@ -12,8 +12,8 @@ from hypothesis import settings
 
 from tests.ids import name_of
 
-#: The longest files start first, so that the run does not end waiting for them alone: those that wait for real processes
-#: and those that compute in turn, so that both are under way at any time.
+#: The longest files start first, so that the run does not end waiting for them alone: in turn one that waits for real
+#: processes and one that computes, so that both are under way at any time.
 LONG = (
     "whole/test_operator.py", "proof/test_seeded_bugs.py", "whole/test_survives.py", "proof/test_grid.py",
     "tests/test_benchmarks.py", "proof/test_explore.py", "whole/test_ends.py", "proof/test_campaign.py",
