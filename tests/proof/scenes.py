@@ -29,6 +29,12 @@ def h(t_s: float, what: str, bay: int = -1, value: float | None = None, detail: 
     return Hazard(T + t_s, what, bay, value, detail)
 
 
+def _unheard(killed_s: float) -> Script:
+    """A running charger and its BMU fall silent, and the whole service is killed and started again."""
+    silent = (h(0, "fault", 0, None, "charger_cut_off"), h(0, "fault", 0, None, "bmu_silent"))
+    return _scene(*silent, h(killed_s, "kill both"), h(killed_s + 1, "boot"), end_s=T + 24)
+
+
 SCENES: dict[str, Script] = {
     "nothing happens": _scene(end_s=T + 8),
     # 1. The line is not ours alone.
@@ -192,20 +198,8 @@ SCENES: dict[str, Script] = {
     "cut off, then killed": _scene(
         h(0, "fault", 0, None, "charger_cut_off"), h(8, "kill both"), h(9, "boot"), end_s=T + 24
     ),
-    "cut off and not heard, then killed": _scene(
-        h(0, "fault", 0, None, "charger_cut_off"),
-        h(0, "fault", 0, None, "bmu_silent"),
-        h(8, "kill both"),
-        h(9, "boot"),
-        end_s=T + 24,
-    ),
-    "cut off and not heard, killed at once": _scene(
-        h(0, "fault", 0, None, "charger_cut_off"),
-        h(0, "fault", 0, None, "bmu_silent"),
-        h(1, "kill both"),
-        h(2, "boot"),
-        end_s=T + 24,
-    ),
+    "cut off and not heard, then killed": _unheard(killed_s=8),
+    "cut off and not heard, killed at once": _unheard(killed_s=1),
     # 12. Others on the bus.
     **{f"on the bus, {name}": _scene(h(0, "tool", 0, None, name), end_s=T + 14) for name in TOOLS},
     "a temperature that is forged": _scene(
