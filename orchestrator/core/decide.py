@@ -15,7 +15,7 @@ from orchestrator.core.machine import fire
 from orchestrator.core.memory import Memory, Sequence
 from orchestrator.core.next_transition import next_transition
 from orchestrator.core.operator import handle_request, held_back
-from orchestrator.core.parts import changed
+from orchestrator.core.parts import changed, made
 from orchestrator.core.rules import Rules
 from orchestrator.core.safestop import must_stop, stands_by
 from orchestrator.core.sequence import next_command
@@ -72,18 +72,10 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
     command, sequence = _command(f, setpoint, faults)
     closed = closes(f.memory.state, closed=f.memory.closed, standby=f.standby)
     memory = changed(f.memory, cause=cause, sequence=sequence, closed=closed, looked_s=now_s, last_s=now_s)
-    decision = Decision(
-        state=memory.state,
-        cause=memory.cause,
-        command=command,
-        setpoint=setpoint,
-        step=chosen,
-        faults=faults,
-        alarm=alarm(memory, faults),
-        closed=closed,
-        session=ended or memory.session,
-        answer=refusal,
-    )
+    decision = made(
+        Decision, memory.state, cause, command, setpoint, chosen, faults, alarm(memory, faults), closed,
+        ended or memory.session, refusal,
+    )  # fmt: skip
     return decision, memory
 
 

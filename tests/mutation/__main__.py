@@ -2,8 +2,8 @@
 
 mutmut makes and tries the mutants; pyproject.toml sets the modules and tests. The results go to docs/mutation.md, where
 people write the reasons for survivors. Arguments select mutants, such as `orchestrator.protocol.frame.*`; the default
-is new mutants and those of changed functions. Each is tried with the quick tests; survivors without a reason are tried
-again with the slow ones.
+is new mutants and those of changed functions. Each is tried with a few likely tests; survivors without a reason are
+tried again with all that reach them.
 """
 
 import json
@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from tests.mutation.mutants import SLOW_TESTS, Mutant
+from tests.mutation.mutants import ALL_TESTS, Mutant
 from tests.mutation.page import GOAL_PCT, Reasons, page, reasons, score
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -26,7 +26,7 @@ def main(patterns: Sequence[str]) -> int:
     known = reasons(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
     _mutmut("run", "--max-children", "1", *patterns)
     if living := [mutant.name for mutant in _unexplained(_mutants(), known)]:
-        os.environ[SLOW_TESTS] = "yes"
+        os.environ[ALL_TESTS] = "yes"
         _mutmut("run", "--max-children", "1", *living)
     mutants = list(_mutants())
     PAGE.write_text(page(mutants, known), encoding="utf-8")

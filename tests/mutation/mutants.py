@@ -7,8 +7,8 @@ from typing import Self
 #: mutmut's exit codes: 1 and 3 are pytest's, the others mean that CPU time or time ran out.
 KILLED = (1, 3)
 TIMED_OUT = (-24, 24, 36, 152, 255)
-#: Set in mutmut's environment for a trial with the slow tests instead of the quick ones.
-SLOW_TESTS = "MUTATION_SLOW_TESTS"
+#: Set in mutmut's environment for a trial with all tests instead of the likeliest few.
+ALL_TESTS = "MUTATION_ALL_TESTS"
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@
 - Hypothesis does not shrink failing examples, the slowest part by far, and tries the same examples for
   each mutant.
 - The first failing test ends a mutant's trial. So the tests that ended recent trials come first, then the quick ones.
-  Slow tests run in a separate trial, on the survivors: `SLOW_TESTS` in the environment.
+  In a first trial only the likeliest few run, because to collect the thousands that reach most functions takes longer
+  than to run these. All run in a separate trial, on the survivors: `ALL_TESTS` in the environment.
 - Test ids are plain ASCII. mutmut collects repeatedly in one process, pytest escapes other characters in ids
   again each time and then finds no such test, and mutmut counts that as a killed mutant.
 - A function with mutants runs directly during a trial, not through mutmut's trampoline, which looks up at each call
@@ -14,8 +15,9 @@
 import json
 import os
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from functools import update_wrapper
+from functools import cache, update_wrapper
 from inspect import isgeneratorfunction
 from math import inf
 from pathlib import Path
@@ -27,7 +29,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, settings
 from mutmut.mutation import trampoline
 
-from tests.mutation.mutants import SLOW_TESTS
+from tests.mutation.mutants import ALL_TESTS
 
 settings.register_profile(
     "mutation",
@@ -56,7 +58,9 @@ ELSEWHERE: Mapping[str, Sequence[str]] = {
         "orchestrator/lastresort/guardian.py", "orchestrator/lastresort/contactors.py"
     ),
 }  # fmt: skip
-#: A longer test is slow, measured with mutmut's trampolines in the code.
+#: The likeliest tests: so many that ended recent trials, and that reach the fewest functions.
+RECENT, CLOSEST = 60, 140
+#: None of the closest takes longer.
 QUICK_S = 0.3
 #: A longer one waits for something the mutant prevents.
 HANGS_S = 20.0
@@ -108,6 +112,47 @@ if not hasattr(trampoline, "wrap_in_trampoline_slowly"):
     trampoline.wrap_in_trampoline = _wrap
 
 
+@cache
+def _seconds() -> Mapping[str, float]:
+    """Of each test, with mutmut's trampolines in the code."""
+    seconds: dict[str, float] = _stats()["duration_by_test"]
+    return seconds
+
+
+@cache
+def _reach() -> Mapping[str, int]:
+    """How many functions with mutants each test reaches."""
+    return Counter(test for tests in _stats()["tests_by_mangled_function_name"].values() for test in tests)
+
+
+def _stats() -> dict[str, Any]:
+    if not STATS.exists():
+        return {"duration_by_test": {}, "tests_by_mangled_function_name": {}}
+    return json.loads(STATS.read_text(encoding="utf-8"))  # type: ignore[no-any-return]  # mutmut's own file
+
+
+def _ago() -> Mapping[str, int]:
+    """Each test that ended a trial, the most recent first, with its number."""
+    names = KILLERS.read_text(encoding="utf-8").splitlines() if KILLERS.exists() else []
+    return {name: number for number, name in enumerate(dict.fromkeys(reversed(names)))}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before anything is collected: the likeliest few of the tests that reach the mutant."""
+    if not _on_trial():
+        for known in (_seconds, _reach):  # by the processes of the trials, which are forked from this one
+            known.cache_clear()
+            known()
+        return
+    if ALL_TESTS in os.environ:
+        return
+    ago, reach, seconds = _ago(), _reach(), _seconds()
+    recent = sorted((name for name in config.args if name in ago), key=ago.__getitem__)[:RECENT]
+    quick = [name for name in config.args if seconds.get(name, 0.0) <= QUICK_S] or config.args
+    closest = sorted(quick, key=lambda name: (reach.get(name, 0), seconds.get(name, 0.0)))[:CLOSEST]
+    config.args[:] = dict.fromkeys([*recent, *closest])
+
+
 def pytest_sessionstart() -> None:
     if mutant := _on_trial():
         _stand(mutant)
@@ -116,14 +161,10 @@ def pytest_sessionstart() -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if not _on_trial():
         return
-    seconds = json.loads(STATS.read_text(encoding="utf-8"))["duration_by_test"] if STATS.exists() else {}
-    names = KILLERS.read_text(encoding="utf-8").splitlines() if KILLERS.exists() else []
-    ago = {name: number for number, name in enumerate(dict.fromkeys(reversed(names)))}
-    slow = SLOW_TESTS in os.environ
-    chosen = [item for item in items if (seconds.get(item.nodeid, 0.0) > QUICK_S) == slow] or items
-    for item in chosen:
+    ago, seconds = _ago(), _seconds()
+    for item in items:
         item.add_marker(pytest.mark.timeout(HANGS_S), append=False)
-    items[:] = sorted(chosen, key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
+    items.sort(key=lambda item: (ago.get(item.nodeid, inf), seconds.get(item.nodeid, 0.0)))
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

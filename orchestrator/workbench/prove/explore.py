@@ -30,7 +30,7 @@ class Inputs(Protocol):
         """Everything that may happen next in a state, one thing at a time."""
 
     def pairs(self, state: State) -> Iterable[Move]:
-        """Every combination of a charger's and a battery's next input."""
+        """Every combination of a charger's and a battery's next input that is not among the moves."""
 
     def constants(self) -> Iterable[tuple[str, str]]:
         """Charger and battery of each situation that may last for ever."""
