@@ -18,6 +18,7 @@ from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.journal import Journal
+from orchestrator.service.news import TICK_S, due_s
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
 from orchestrator.service.records import SnapshotRecorder, TimedLine, decision_lines, transition
@@ -25,9 +26,6 @@ from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status, contactor_fields, told
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
-
-#: A bay without news is decided this often, so that stale values are noticed; less often where no current flows.
-TICK_S, QUIET_TICK_S = 0.2, 0.5
 
 
 class BayRunner:
@@ -166,7 +164,7 @@ class BayRunner:
         # In a quiet state no current flows and none is about to: what a BMU reports changes slowly.
         closely = decision.state not in QUIET
         self.decision, self._internal, self.last_s = decision, "", now_s
-        self.due_s = now_s + (TICK_S if closely or decision.command is not None else QUIET_TICK_S)
+        self.due_s = due_s(now_s, decision, self._memory, snapshot)
         if self._closely is not closely:
             self._closely = closely
             self._battery.attend(closely=closely)

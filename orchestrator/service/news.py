@@ -3,7 +3,8 @@
 Theory of operation. While a bay charges or rests, its devices report slightly other volts and amperes several times a
 second, and nearly all of that changes no decision. What does is known: a report that says anything else than before, a
 value that reaches a bound, or one that has moved further than a policy's tolerances. A tick is short, so what is not
-told here is still decided on in time; in all other states every piece of news is.
+told here is still decided on in time; in all other states every piece of news is. A tick is longer where nothing is on
+its way: at rest, and in a charge in which no fault is seen. Even then no value gets too old unnoticed.
 """
 
 from collections.abc import Iterable
@@ -11,9 +12,20 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Self
 
+from orchestrator.core.facts import CHARGER_STALE_S, FAST_STALE_S
+from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import ENERGISED, QUIET
-from orchestrator.model import BatteryLink, BatteryReading, ChargerLink, ChargerReading, Decision, Measurement, Snapshot
+from orchestrator.model import (
+    BatteryLink,
+    BatteryReading,
+    ChargerLink,
+    ChargerReading,
+    Decision,
+    Measurement,
+    Snapshot,
+    State,
+)
 
 STEADY = ENERGISED | QUIET
 #: A change by this much since the last decision is news: below what two honest instruments may differ by.
@@ -25,6 +37,9 @@ CHARGER_LINK = attrgetter(*(name for name in ChargerLink.__slots__ if name not i
 BATTERY_LINK = attrgetter(*(name for name in BatteryLink.__slots__ if name not in ("heartbeat_t_s", "bad_frames")))
 
 Bounds = tuple[float, ...]
+
+#: A bay without news is decided this often, and this often where nothing is on its way.
+TICK_S, CALM_TICK_S = 0.2, 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,3 +103,18 @@ def _moved(before: float, now: float, by: float, bounds: Iterable[float]) -> boo
         return False
     low, high = (before, now) if before < now else (now, before)
     return not high - low < by or any(low <= bound <= high for bound in bounds)  # what is not a number has moved
+
+
+def due_s(now_s: float, decision: Decision, memory: Memory, snapshot: Snapshot) -> float:
+    """When the next decision is due at the latest, after this one at `now_s`."""
+    soon_s, later_s = now_s + TICK_S, now_s + CALM_TICK_S
+    if decision.command is not None:
+        return soon_s
+    if decision.state in QUIET:
+        return later_s
+    if decision.state is not State.CHARGING or memory.faults:
+        return soon_s
+    values, reading = snapshot.battery, snapshot.charger
+    read_s = [value.t_s for value in (values.voltage_v, values.current_a, values.temperature_c) if value is not None]
+    old_s = min(read_s, default=now_s) + FAST_STALE_S, (reading.t_s if reading is not None else now_s) + CHARGER_STALE_S
+    return max(soon_s, min(later_s, *old_s))

@@ -19,7 +19,7 @@ from orchestrator.core.faults import FAULTS, FaultRow
 from orchestrator.core.states import QUIET, SETTLED
 from orchestrator.model import STOP, Action, Alarm, Cause, ControlMode, Effect, Request, State
 from orchestrator.protocol.charger import STATUS_REPLY_BYTES, STOP_FRAME
-from orchestrator.service.bay import QUIET_TICK_S
+from orchestrator.service.news import CALM_TICK_S
 from orchestrator.sim.faults import FAULTS as INJECTIONS
 from orchestrator.sim.pack import Pack
 from orchestrator.sim.presets import PACKS
@@ -240,7 +240,8 @@ class Run:
         self._standing = decision.command == STOP
         self.forced = "seen by the grid"
         self.world.supervisor._wake.put(0)
-        looks_s = QUIET_TICK_S if decision.state in QUIET else 0.0  # a bay at rest looks so rarely
+        calm = decision.state in QUIET or decision.state is State.CHARGING
+        looks_s = CALM_TICK_S if calm else 0.0  # a bay in which nothing happens looks so rarely
         lasts_s = self.cell.row.for_s + 0.3 + 0.5 * self.cell.row.polls + 2 * looks_s
         self.time.call_later(lasts_s, self._gone)
         self.time.call_later(lasts_s + SETTLE_S, self._judge)

@@ -319,7 +319,7 @@ def faults(bench: Bench) -> dict[str, str]:
     return {fault["id"]: fault["text"] for fault in bench.bay.status()["faults"]}  # type: ignore[attr-defined]  # a JSON document
 
 
-@pytest.mark.parametrize(("missed_s", "said"), [(0.5, set()), (0.7, {"late"}), (1.3, {"late", "overrun"})])
+@pytest.mark.parametrize(("missed_s", "said"), [(0.8, set()), (1.0, {"late"}), (1.6, {"late", "overrun"})])
 def test_a_step_that_comes_late_is_said_and_a_long_gap_stops(bench: Bench, missed_s: float, said: set[str]) -> None:
     bench.charging()
     bench.now_s += missed_s - STEP_S

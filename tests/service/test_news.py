@@ -19,7 +19,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.service.asked import Asked
-from orchestrator.service.bay import QUIET_TICK_S, TICK_S
+from orchestrator.service.news import CALM_TICK_S, TICK_S
 from tests.service.bench import STEP_S, VOLTS, Bench
 
 
@@ -167,14 +167,39 @@ def test_at_rest_most_news_waits_too(tmp_path: Path) -> None:
     assert battery_says(bench, current_a=1.0)
 
 
-def test_the_tick_is_longer_where_no_current_flows(bench: Bench, tmp_path: Path) -> None:
-    assert bench.bay.due_s == bench.now_s + TICK_S
-    resting = Bench(tmp_path / "resting")
+def test_the_tick_is_longer_at_rest(tmp_path: Path) -> None:
+    resting = Bench(tmp_path)
     resting.battery.values["soc_pct"] = 100.0
     resting.step()
     assert resting.bay.due_s == resting.now_s + TICK_S  # its stop is not verified yet
     resting.step(10)
-    assert resting.bay.due_s == resting.now_s + QUIET_TICK_S
-    resting.now_s += QUIET_TICK_S - STEP_S
+    assert resting.bay.due_s == resting.now_s + CALM_TICK_S
+    resting.now_s += CALM_TICK_S - STEP_S
     resting.step()
     assert not resting.bay._snapshot.late_s
+
+
+def test_the_tick_is_longer_in_a_charge_in_which_no_fault_is_seen(bench: Bench) -> None:
+    assert bench.bay.due_s == bench.now_s + CALM_TICK_S
+    bench.battery.values["voltage_v"] = VOLTS + 3.0  # not the charger's: seen, and no fault before it has lasted
+    bench.step()
+    assert bench.bay.decision is not None
+    assert bench.bay.decision.state is State.CHARGING
+    assert not bench.bay.decision.faults
+    assert bench.bay.due_s == bench.now_s + TICK_S
+
+
+@pytest.mark.parametrize("silent", ["charger", "battery"])
+def test_no_value_gets_too_old_between_two_ticks(bench: Bench, silent: str) -> None:
+    bench.step()
+    since_s = bench.charger.reading.t_s if silent == "charger" else bench.battery.now_s
+    while bench.bay.due_s < since_s + 1.5:
+        bench.now_s = bench.bay.due_s
+        if silent == "charger":
+            bench.battery.now_s = bench.now_s
+        else:
+            bench.charger.pass_time(bench.now_s)
+        bench.bay.run(bench.now_s)
+        assert bench.bay.decision is not None
+        assert bench.bay.decision.state is State.CHARGING
+    assert bench.bay.due_s == since_s + 1.5
