@@ -54,8 +54,7 @@ class BayRunner:
         self._revision = 0  # the revision that persists this bay's memory
         self._ending: Cause | None = None
         self._waits: Cause | None = None  # why the next run must wait for an operator
-        self._asleep_s = 0.0
-        self._closely = True  # how often the BMU is read, until the first decision
+        self._asleep_s, self._closely = 0.0, True  # the BMU is read closely until the first decision
         self._charger, self._battery, self._journal = charger, battery, journal
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
@@ -85,6 +84,13 @@ class BayRunner:
         if self.decision is None or self.owes or self._internal:
             return True
         return self.policy.news.matters(self.decision, self._snapshot, self._charger.view, self._battery.view)
+
+    def is_due(self, now_s: float) -> bool:
+        """Whether a decision is due. One for a value that would get too old is put off when a newer one has come."""
+        if now_s >= self.due_s and self.decision is not None and self._memory is not None and not self._internal:
+            reading, values = self._charger.view[0], self._battery.view[0]
+            self.due_s = due_s(self.last_s, self.decision, self._memory, reading, values)
+        return now_s >= self.due_s
 
     def answer(self) -> None:
         """Give all pending answers, at the end of the service."""
@@ -164,7 +170,7 @@ class BayRunner:
         # In a quiet state no current flows and none is about to: what a BMU reports changes slowly.
         closely = decision.state not in QUIET
         self.decision, self._internal, self.last_s = decision, "", now_s
-        self.due_s = due_s(now_s, decision, self._memory, snapshot)
+        self.due_s = due_s(now_s, decision, self._memory, snapshot.charger, snapshot.battery)
         if self._closely is not closely:
             self._closely = closely
             self._battery.attend(closely=closely)

@@ -105,16 +105,20 @@ def _moved(before: float, now: float, by: float, bounds: Iterable[float]) -> boo
     return not high - low < by or any(low <= bound <= high for bound in bounds)  # what is not a number has moved
 
 
-def due_s(now_s: float, decision: Decision, memory: Memory, snapshot: Snapshot) -> float:
-    """When the next decision is due at the latest, after this one at `now_s`."""
-    soon_s, later_s = now_s + TICK_S, now_s + CALM_TICK_S
+def due_s(
+    decided_s: float, decision: Decision, memory: Memory, reading: ChargerReading | None, values: BatteryReading
+) -> float:
+    """When the next decision is due at the latest: after one made at `decided_s`, with these newest values."""
+    soon_s, later_s = decided_s + TICK_S, decided_s + CALM_TICK_S
     if decision.command is not None:
         return soon_s
     if decision.state in QUIET:
         return later_s
     if decision.state is not State.CHARGING or memory.faults:
         return soon_s
-    values, reading = snapshot.battery, snapshot.charger
     read_s = [value.t_s for value in (values.voltage_v, values.current_a, values.temperature_c) if value is not None]
-    old_s = min(read_s, default=now_s) + FAST_STALE_S, (reading.t_s if reading is not None else now_s) + CHARGER_STALE_S
+    old_s = (
+        min(read_s, default=decided_s) + FAST_STALE_S,
+        (reading.t_s if reading is not None else decided_s) + CHARGER_STALE_S,
+    )
     return max(soon_s, min(later_s, *old_s))

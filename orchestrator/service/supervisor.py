@@ -183,7 +183,7 @@ class Supervisor:
             self._reload.ask()
         now_s = monotonic()
         for bay in self._bays:
-            if now_s >= bay.due_s:
+            if bay.is_due(now_s):
                 self._run(bay)
                 self._decide(self._news())
         if now_s - self._beat_s >= BEAT_S:
