@@ -112,8 +112,7 @@ def nothing_must_stop(patch: Patch) -> None:
 
 
 def silent_alarm(patch: Patch) -> None:
-    decide = model.Decision
-    patch.setattr(decide_module, "Decision", lambda **fields: decide(**fields | {"alarm": model.Alarm.NONE}))
+    patch.setattr(decide_module, "alarm", lambda *_: model.Alarm.NONE)
 
 
 def a_hold_wears_off(patch: Patch) -> None:

@@ -56,7 +56,7 @@ class StationInputs:
     jumps_s: tuple[float, ...] = ()
     chargers: Mapping[str, Charger] = field(default_factory=lambda: CHARGERS)
     batteries: Mapping[str, Shown] = field(default_factory=dict)
-    _moment: _Moment = field(default_factory=_Moment, compare=False, repr=False)
+    _moment: _Moment = field(default_factory=_Moment, init=False, compare=False, repr=False)
 
     @classmethod
     def of(cls, rules: Rules) -> "StationInputs":
