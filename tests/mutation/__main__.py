@@ -3,7 +3,7 @@
 mutmut makes and tries the mutants; pyproject.toml sets the modules and tests. The results go to docs/mutation.md, where
 people write the reasons for survivors. Arguments select mutants, such as `orchestrator.protocol.frame.*`; the default
 is new mutants and those of changed functions. Each is tried with a few likely tests; survivors without a reason are
-tried again with all that reach them.
+tried again with the quick ones of all that reach them, and then with all.
 """
 
 import json
@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from tests.mutation.mutants import ALL_TESTS, Mutant
+from tests.mutation.mutants import ALL, FEW, QUICK, TESTS, Mutant
 from tests.mutation.page import GOAL_PCT, Reasons, page, reasons, score
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -24,10 +24,12 @@ PAGE = ROOT / "docs" / "mutation.md"
 def main(patterns: Sequence[str]) -> int:
     """Try them and write the page; 1 if too many survive, one survives without a reason, or some were not tried."""
     known = reasons(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
+    os.environ[TESTS] = FEW
     _mutmut("run", "--max-children", "1", *patterns)
-    if living := [mutant.name for mutant in _unexplained(_mutants(), known)]:
-        os.environ[ALL_TESTS] = "yes"
-        _mutmut("run", "--max-children", "1", *living)
+    for tests in (QUICK, ALL):
+        if living := [mutant.name for mutant in _unexplained(_mutants(), known)]:
+            os.environ[TESTS] = tests
+            _mutmut("run", "--max-children", "1", *living)
     mutants = list(_mutants())
     PAGE.write_text(page(mutants, known), encoding="utf-8")
     unexplained = _unexplained(mutants, known)

@@ -7,8 +7,8 @@ from typing import Self
 #: mutmut's exit codes: 1 and 3 are pytest's, the others mean that CPU time or time ran out.
 KILLED = (1, 3)
 TIMED_OUT = (-24, 24, 36, 152, 255)
-#: Set in mutmut's environment for a trial with all tests instead of the likeliest few.
-ALL_TESTS = "MUTATION_ALL_TESTS"
+#: The tests of a trial, in mutmut's environment: the likeliest few, those that take little time, all.
+TESTS, FEW, QUICK, ALL = "MUTATION_TESTS", "few", "quick", "all"
 
 
 @dataclass(frozen=True)

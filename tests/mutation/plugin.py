@@ -4,7 +4,7 @@
   each mutant.
 - The first failing test ends a mutant's trial. So the tests that ended recent trials come first, then the quick ones.
   In a first trial only the likeliest few run, because to collect the thousands that reach most functions takes longer
-  than to run these. All run in a separate trial, on the survivors: `ALL_TESTS` in the environment.
+  than to run these. More run in separate trials, on the survivors: `TESTS` in the environment.
 - Test ids are plain ASCII. mutmut collects repeatedly in one process, pytest escapes other characters in ids
   again each time and then finds no such test, and mutmut counts that as a killed mutant.
 - A function with mutants runs directly during a trial, not through mutmut's trampoline, which looks up at each call
@@ -29,7 +29,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, settings
 from mutmut.mutation import trampoline
 
-from tests.mutation.mutants import ALL_TESTS
+from tests.mutation.mutants import ALL, QUICK, TESTS
 
 settings.register_profile(
     "mutation",
@@ -60,7 +60,7 @@ ELSEWHERE: Mapping[str, Sequence[str]] = {
 }  # fmt: skip
 #: The likeliest tests: so many that ended recent trials, and that reach the fewest functions.
 RECENT, CLOSEST = 60, 140
-#: None of the closest takes longer.
+#: No quick test takes longer.
 QUICK_S = 0.3
 #: A longer one waits for something the mutant prevents.
 HANGS_S = 20.0
@@ -144,11 +144,14 @@ def pytest_configure(config: pytest.Config) -> None:
             known.cache_clear()
             known()
         return
-    if ALL_TESTS in os.environ:
+    if os.environ[TESTS] == ALL:
         return
     ago, reach, seconds = _ago(), _reach(), _seconds()
     recent = sorted((name for name in config.args if name in ago), key=ago.__getitem__)[:RECENT]
     quick = [name for name in config.args if seconds.get(name, 0.0) <= QUICK_S] or config.args
+    if os.environ[TESTS] == QUICK:
+        config.args[:] = quick
+        return
     closest = sorted(quick, key=lambda name: (reach.get(name, 0), seconds.get(name, 0.0)))[:CLOSEST]
     config.args[:] = dict.fromkeys([*recent, *closest])
 
