@@ -256,10 +256,10 @@ def test_a_port_that_is_not_there_says_so(tmp_path: Path) -> None:
 
 def test_no_descriptor_is_left_open(tmp_path: Path) -> None:
     with running_chargers(tmp_path) as (bench,):
-        before = len(list(Path("/proc/self/fd").iterdir()))
+        before = set(Path("/proc/self/fd").iterdir())
         stop_all({bench.name: bench.duplicate(), str(tmp_path / "none"): None}, 0.1)
         stop_all({bench.name: None}, 0.1)
-        assert len(list(Path("/proc/self/fd").iterdir())) == before
+        assert set(Path("/proc/self/fd").iterdir()) <= before  # others may have been closed as garbage meanwhile
 
 
 def test_a_file_that_is_no_port_is_not_written_to(tmp_path: Path) -> None:
