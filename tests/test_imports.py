@@ -41,8 +41,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     "sim": ("model", "protocol.objects"),
     # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
-        "columns", "config", "core", "errors", "extras", "keys", "model", "protocol.objects", "service.parts",
-        "service.records", "service.rows", "sim.charger", "sim.chemistry", "sim.pack", "text",
+        "columns", "config", "core", "errors", "extras", "keys", "model", "protocol.objects",
+        "service.journal_files", "service.parts", "service.records", "service.rows", "service.timespan", "sim.charger",
+        "sim.chemistry", "sim.pack", "text",
     ),
     "columns": (),
     "show": ("model", "text"),
@@ -278,6 +279,7 @@ SAID = frozenset({
     ("service.request_verb", "; to stop chargers without"),
     ("link.gpio", "used by "),  # what `probe` shows of a line
     ("service.reach", ""),  # what `check` says of a file
+    ("service.journal_files", ""),  # the same, of a journal
     ("service.bay", " in "),  # where an exception of our own was raised
     ("service.where", ""),  # the same
 })  # fmt: skip
