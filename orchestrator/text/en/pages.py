@@ -16,7 +16,7 @@ TEXTS: Mapping[str, str] = {
     "next_reset": "orchestrator reset {bay}, then orchestrator start {bay}",
     "next_mains": "cut the charger's mains",
     "next_person": "waits for a person: {what}",
-    "next_at": "{what} ({at})",
+    "next_at": "{what} ({end_at})",
     # the page's labels
     "page_state": "STATE",
     "page_why": "WHY",

@@ -16,7 +16,7 @@ TEXTS: Mapping[str, str] = {
     "next_reset": "실행하십시오: orchestrator reset {bay}, 이어서 orchestrator start {bay}",
     "next_mains": "충전기의 전원을 차단하십시오",
     "next_person": "작업자를 기다립니다: {what}",
-    "next_at": "{what}({at})",
+    "next_at": "{what}({end_at})",
     # the page's labels
     "page_state": "상태",
     "page_why": "이유",
