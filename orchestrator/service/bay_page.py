@@ -6,23 +6,19 @@ A line that an older service does not tell of is left out.
 from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import cast
 
-from orchestrator.columns import cut, folded, width_of
+from orchestrator.columns import folded, width_of
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain, without_then
-from orchestrator.page import Block, warnings
+from orchestrator.page import Block, all_cut, loud
 from orchestrator.service.lasting import lasting, session_figures
 from orchestrator.service.wallclock import WallClock
 from orchestrator.show import (
     Bay,
     below,
     figure,
-    is_alarming,
-    labelled,
     level_of,
     other_faults,
     step_of,
-    strays,
-    what_to_do,
 )
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import in_language, language_of_answer
@@ -44,13 +40,7 @@ def bay_blocks(
     (bay,) = cast("Sequence[Bay]", document["bays"])
     clock, level = WallClock(now_s, now_s), level_of(bay)
     head = f"{bay['name']} · {clock.time_of_day(now_s)}"
-    found = [
-        Block(head),
-        *(Block(labelled("alarm", text, language), "danger") for text in strays(document, language)),
-        *([Block(labelled("alarm", what_to_do(bay, language), language), "danger")] if is_alarming(bay) else []),
-        *(Block(labelled("warning", text, language), "attention") for text in warnings(document)),
-    ]
-    found = [Block(folded(one.text, width), one.level) for one in found]
+    found = [Block(folded(head, width)), *loud(document, [bay], language, width)]
     lines = [*_lines(bay, clock, language), *(("page_events", *one) for one in events)]
     margin = max(width_of(say(Cause(label), language)) for label, *_ in lines) + 2
     before = ""
@@ -59,9 +49,7 @@ def bay_blocks(
         before = label
         begin = name + " " * (margin - width_of(name)) + (f"{column}  " if column else "")
         found.append(Block(folded(text, width, begin), level if label == "page_state" else ""))
-    return [
-        Block("\n".join(part for line in one.text.split("\n") for part in cut(line, width)), one.level) for one in found
-    ]
+    return all_cut(found, width)
 
 
 def _lines(bay: Bay, clock: WallClock, language: str) -> Iterator[Line]:

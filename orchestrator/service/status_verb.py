@@ -2,6 +2,7 @@
 
 import argparse
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import cast
 
@@ -43,8 +44,8 @@ def status(arguments: argparse.Namespace) -> int:
 def _blocks(document: dict[str, object], arguments: argparse.Namespace) -> list[Block]:
     """A page about the one bay that is named, else the table of all that are meant."""
     language, width = own_language(), own_width()
-    if _named(arguments) is None or arguments.problems:
-        return blocks(document, language, width, time.strftime(CLOCK), problems=arguments.problems)
+    if _named(arguments) is None or arguments.problems or arguments.group:
+        return overview(document, arguments, time.strftime(CLOCK))
     from orchestrator.service.bay_page import bay_blocks
     from orchestrator.service.history_verb import last_events
 
@@ -53,6 +54,16 @@ def _blocks(document: dict[str, object], arguments: argparse.Namespace) -> list[
     told_in = language_of_answer(document, language)
     events = last_events(Path(directory), bay, told_in, now_s) if directory else []
     return bay_blocks(document, events, language, width, now_s)
+
+
+def overview(document: Mapping[str, object], arguments: argparse.Namespace, clock: str) -> list[Block]:
+    """The bays in groups, or in a table."""
+    language, width = own_language(), own_width()
+    if arguments.group:
+        from orchestrator.service.group_page import group_blocks
+
+        return group_blocks(document, language, width, clock, problems=arguments.problems)
+    return blocks(document, language, width, clock, problems=arguments.problems)
 
 
 def _named(arguments: argparse.Namespace) -> str | None:

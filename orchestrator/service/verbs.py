@@ -28,6 +28,7 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
     status = verbs.add_parser("status", help="show what every bay is doing, and why")
     status.add_argument("bay", nargs="*", help=f"only these bays: {NAMES}")
     _add_except(status)
+    status.add_argument("--group", action="store_true", help="the bays in groups by what they do: for many bays")
     status.add_argument("--problems", action="store_true", help="only bays that need a person")
     status.add_argument(
         "--check", action="store_true", help="exit status 1 if something needs a person, 2 if nobody can tell"
