@@ -31,8 +31,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     # The devices know the link only as a typing.Protocol: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": (
-        "columns", "config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "page",
-        "protocol", "show", "text",
+        "columns", "config", "core", "devices", "errors", "gist", "interlock", "keys", "lastresort", "link", "model",
+        "page", "protocol", "show", "text",
     ),
     "commissioning": (
         "config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile", "text",
