@@ -234,14 +234,14 @@ class BayRunner:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)
 
-    def status(self) -> dict[str, object]:
-        """The bay's part of the status document."""
+    def status(self, *, closely: bool = False) -> dict[str, object]:
+        """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         decision = self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER)
         snapshot, memory, rules, contactor = self._snapshot, self._memory, self.policy.rules, self._contactor
         decision, clock = told(decision, snapshot, memory, rules), WallClock(monotonic(), time())
         return {
             **bay_status(self.name, snapshot, decision, clock.now_s, clock.wall_s, self._language),
-            **outlook(decision, snapshot, memory, rules, clock, self._language),
+            **outlook(decision, snapshot, memory, rules, clock, self._language, closely=closely),
             "contactor": contactor and contactor_fields(contactor, self._language),
             "port": self.place.port,
             "bmu": {"can": self.place.can, "node_id": self.place.node_id},

@@ -35,26 +35,30 @@ TO_GO_ON = "to_go_on"
 
 
 def outlook(
-    decision: Decision, snapshot: Snapshot, memory: Memory | None, rules: Rules, clock: WallClock, language: str
+    decision: Decision,
+    snapshot: Snapshot,
+    memory: Memory | None,
+    rules: Rules,
+    clock: WallClock,
+    language: str,
+    *,
+    closely: bool,
 ) -> dict[str, object]:
-    """`since` and `at` are Unix time. Nothing but `next` is known before the first decision."""
+    """`since` and `at` are Unix time. Only `closely` there are `limits` and `forecast`, which cost most of it.
+
+    Nothing but `next` is known before the first decision.
+    """
     coming = next_of(decision, rules)
-    told = clock.told(coming)
+    told, at_s = fields(clock.told(coming), language) or {}, _moment(coming, clock)
+    since_s = memory.since_s if memory is not None else None
     found: dict[str, object] = {
-        "since": None,
-        "next": {**(fields(told, language) or {}), "by_itself": by_itself(decision), "at": _moment(coming, clock)},
-        "limits": [],
-        "forecast": None,
+        "since": round(clock.unix_s(since_s), 3) if since_s is not None else None,
+        "next": {**told, "by_itself": by_itself(decision), "at": at_s},
     }
-    if memory is None or memory.since_s is None or memory.last_s is None:
+    if not closely or memory is None or memory.last_s is None:
         return found
     f = Facts.of(memory.last_s, snapshot, memory, rules)
-    return {
-        **found,
-        "since": round(clock.unix_s(memory.since_s), 3),
-        "limits": list(_limits(f, decision, language)),
-        "forecast": forecast(f, clock),
-    }
+    return {**found, "limits": list(_limits(f, decision, language)), "forecast": forecast(f, clock)}
 
 
 # --- what limits it ---------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ POLICY = load_policy("li-ion-48v")
 def document(world: World, **more: Any) -> dict[str, Any]:
     """The bay's part of the status, as a client receives it."""
     clock, snapshot = WallClock(world.now_s, NOW_S), world.snapshot(None, "")
-    looked = outlook(world.decision, snapshot, world.memory, world.rules, clock, "en")
+    looked = outlook(world.decision, snapshot, world.memory, world.rules, clock, "en", closely=True)
     status = bay_status("bay-1", snapshot, world.decision, clock.now_s, clock.wall_s, "en")
     policy = {"name": "mine", "file": "mine.yaml", "sha256": "0123", "since": NOW_S - 90_000, "waiting_sha256": ""}
     other = {"port": "/dev/ttyX", "bmu": {"can": "can0", "node_id": 0x10}, "policy": policy, **more}
@@ -106,12 +106,20 @@ def test_the_stricter_of_station_and_policy_is_named() -> None:
 @pytest.mark.parametrize("state", State)
 def test_every_state_says_what_comes_next_and_whether_by_itself(state: State) -> None:
     decision = Decision(state, Memory().cause)
-    looked = outlook(decision, Snapshot(), None, Rules.of(bay(POLICY)), WallClock(0.0, NOW_S), "en")
+    looked = outlook(decision, Snapshot(), None, Rules.of(bay(POLICY)), WallClock(0.0, NOW_S), "en", closely=True)
     coming = cast("dict[str, Any]", looked["next"])
     assert state in NEXT or state is State.CHARGING
     assert coming["text"] and "{" not in coming["text"]
     assert coming["by_itself"] is (state not in BY_PERSON)
-    assert (looked["since"], looked["limits"], looked["forecast"]) == (None, [], None)
+    assert looked.keys() == {"since", "next"} and looked["since"] is None
+
+
+def test_what_costs_most_is_told_of_a_bay_that_is_asked_for_by_name() -> None:
+    world = charging()
+    clock, snapshot = WallClock(world.now_s, NOW_S), world.snapshot(None, "")
+    looked = outlook(world.decision, snapshot, world.memory, world.rules, clock, "en", closely=False)
+    assert looked.keys() == {"since", "next"}
+    assert document(world).keys() >= {"since", "next", "limits", "forecast"}
 
 
 def test_an_operators_pause_waits_for_a_person() -> None:
