@@ -63,6 +63,8 @@ class Asked:
         head = text[:HEAD]
         if not head.startswith(BEGIN):
             return True
+        if self.station and not (_in_json("bay", "") in head or _in_json("kind", "station") in head):
+            return False
         if any(_in_json("kind", kind) in head for kind in UNTOLD):
             return False
         return not self.words or not is_plain(self.words) or any(_in_json("bay", one) in head for one in self.words)

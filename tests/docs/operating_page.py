@@ -1,7 +1,7 @@
 """docs/operating.md, with what each command says of an emulated station.
 
-`python -m tests.docs.operating_page DIRECTORY > docs/operating.md`, with an empty directory, on a machine with nothing else
-to do. It takes two minutes, and every run has other times and figures.
+`python -m tests.docs.operating_page DIRECTORY > docs/operating.md`, with an empty directory, on a machine that has
+nothing else to do. It takes two minutes, and every run has other times and figures.
 """
 
 import sys
@@ -21,9 +21,9 @@ SHOWN = "/srv/depot"
 HEAD = """\
 # Operating a station: a question, a command
 
-Each command below was run against an emulated station, and its output is as it came, on a terminal of 100 columns: three
-bays at work, one overheated, one with a loose plug, after somebody had killed the service. The batteries live eight times
-as fast as the clock, so our own estimate, which counts ampere-hours, is not what it would be at a real one.
+Each command below was run against an emulated station, and its output is as it came, on a terminal of 100 columns:
+three bays at work, one overheated, one with a loose plug, after somebody had killed the service. The batteries live
+eight times as fast as the clock, so our own estimate, which counts ampere-hours, is not what a real one would show.
 `python -m tests.docs.operating_page DIRECTORY` makes this page again.
 
 """
@@ -156,7 +156,7 @@ def main(directory: Path, only: Sequence[str] = ()) -> None:
     for name in only or PARTS:
         (directory / name).mkdir(parents=True, exist_ok=True)
     parts = [part for name in only or PARTS for part in PARTS[name](directory / name)]
-    print(("" if only else HEAD) + "\n".join(part.rstrip() + "\n" for part in parts), end="")
+    print(("" if only else HEAD) + "\n".join(part.rstrip() + "\n" for part in parts), end="")  # noqa: T201 - the page
 
 
 if __name__ == "__main__":

@@ -123,6 +123,9 @@ class Notebook:
     def say(self, text: str) -> None:
         self.said.append(text)
 
+    def note(self, *_: object) -> None:
+        """What the service says of itself, nobody reads here."""
+
     def put(self, bay: str, line: Any, t_s: float | None = None) -> None:
         if line[0] == "fault":
             self.lines.append((bay, line[1]))
