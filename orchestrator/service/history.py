@@ -24,6 +24,8 @@ FAILURES = frozenset({
     "journal_dead", "journal_hangs", "journal_failed", "disk_failed", "disk_slow", "disk_hangs", "disk_silent",
     "socket_internal", "socket_taken", "socket_lost", "reload_refused", "reload_failed", "stray_found", "stray_runs",
 })  # fmt: skip
+#: A charge that has lasted longer does not begin, but was left open.
+OPEN_S = 1.0
 #: A part of a run that goes on begins with the run's name as well; its own line stands at the run's very beginning.
 SAME_S = 0.5
 
@@ -99,6 +101,8 @@ class Story:
         if record["event"] == "end":
             result = None if self._told(record) else self._cause(record, "result")
             return Cause.of("event_charged", figures=session_figures(record), result=result), ""
+        if record["event"] == "begin" and (record.get("elapsed_s") or 0.0) > OPEN_S:
+            return Cause.of("event_charge_open", figures=session_figures(record)), ""  # left open by the run before
         if record["event"] == "begin":
             return Cause.of("event_charge", soc_pct=record["soc_start_pct"]), ""
         return None

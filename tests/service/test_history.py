@@ -70,7 +70,7 @@ def test_a_charge_in_sentences_that_say_each_thing_once() -> None:
         "soc_pct": 54.0,
     }
     end = record("session", t_s=101.0, event="end", **figures, result=say(trip), cause=plain(trip))
-    begin = record("session", event="begin", **figures, result="", cause=None)
+    begin = record("session", event="begin", **{**figures, "elapsed_s": 0.0}, result="", cause=None)
     assert texts(
         goes(None, "STARTING", Cause("service_started")),
         begin,
@@ -89,6 +89,11 @@ def test_a_charge_in_sentences_that_say_each_thing_once() -> None:
         "the charge has ended; 6.42 Ah, 330 Wh in 1 h 04 min; SOC 35 % → 54 %",
         "over: the pack had 45.2 °C, the limit is 45 °C (p.yaml:3); it charges again below 40 °C",
     ]
+
+
+def test_a_charge_left_open_by_the_last_run_does_not_begin_again() -> None:
+    left = record("session", event="begin", elapsed_s=90.0, charged_ah=0.35, charged_wh=17.0, soc_start_pct=40.0)
+    assert texts(left) == ["the last run left a charge open: 0.35 Ah, 17 Wh in 90 s"]
 
 
 def test_another_fault_beside_it_is_told_and_a_result_that_nobody_told_as_well() -> None:

@@ -54,6 +54,7 @@ TEXTS: Mapping[str, str] = {
     "event_fault": "{effect}: {what}",
     "event_fault_over": "over: {what}",
     "event_charge": "a charge begins at SOC {soc_pct:.0f} %",
+    "event_charge_open": "the last run left a charge open: {figures}",
     "event_charged": "the charge has ended; {figures}{result:after}",
     "event_closed": "the contactor is closed{problem:after}",
     "event_opened": "the contactor is open{problem:after}",

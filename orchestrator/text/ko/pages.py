@@ -54,6 +54,7 @@ TEXTS: Mapping[str, str] = {
     "event_fault": "{effect}: {what}",
     "event_fault_over": "해소: {what}",
     "event_charge": "SOC {soc_pct:.0f} %에서 충전을 시작합니다",
+    "event_charge_open": "지난 실행에서 끝나지 않은 충전이 있습니다: {figures}",
     "event_charged": "충전이 끝났습니다. {figures}{result:after}",
     "event_closed": "접촉기가 닫혔습니다{problem:after}",
     "event_opened": "접촉기가 열렸습니다{problem:after}",
