@@ -49,14 +49,22 @@ def blocks(
     document = in_language(document, language)
     bays = sorted(cast("Sequence[Bay]", document["bays"]), key=urgency)
     shown = [bay for bay in bays if level_of(bay)] if problems else bays
-    found = [
-        *([Block(say(gist(bays, clock), language))] if bays and clock else []),
-        *(Block(labelled("alarm", text, language), "danger") for text in strays(document, language)),
-        *(Block(labelled("alarm", what_to_do(bay, language), language), "danger") for bay in shown if is_alarming(bay)),
-        *(Block(labelled("warning", text, language), "attention") for text in warnings(document)),
-    ]
-    found = [Block(folded(block.text, width), block.level) for block in found]
+    found = [*([Block(folded(say(gist(bays, clock), language), width))] if bays and clock else [])]
+    found += loud(document, shown, language, width)
     found += _table(shown, language, width) if shown or not problems else [Block(say(Cause("no_problems"), language))]
+    return all_cut(found, width)
+
+
+def loud(document: Mapping[str, object], bays: Sequence[Bay], language: str, width: int) -> Iterator[Block]:
+    """What to do now: about chargers that may be out of control, and about the station itself."""
+    for text in (*strays(document, language), *(what_to_do(bay, language) for bay in bays if is_alarming(bay))):
+        yield Block(folded(labelled("alarm", text, language), width), "danger")
+    for text in warnings(document):
+        yield Block(folded(labelled("warning", text, language), width), "attention")
+
+
+def all_cut(found: Sequence[Block], width: int) -> list[Block]:
+    """The blocks without a line wider than this (0: unlimited)."""
     return [Block(_cut(block.text, width), block.level, block.bays) for block in found]
 
 

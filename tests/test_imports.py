@@ -31,8 +31,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     # The devices know the link only as a typing.Protocol: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": (
-        "columns", "config", "core", "devices", "errors", "interlock", "keys", "lastresort", "link", "model", "page",
-        "protocol", "show", "text",
+        "columns", "config", "core", "devices", "errors", "gist", "interlock", "keys", "lastresort", "link", "model",
+        "page", "protocol", "show", "text",
     ),
     "commissioning": (
         "config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile", "text",
@@ -41,8 +41,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     "sim": ("model", "protocol.objects"),
     # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
-        "columns", "config", "core", "errors", "extras", "keys", "model", "protocol.objects", "service.parts",
-        "service.records", "service.rows", "sim.charger", "sim.chemistry", "sim.pack", "text",
+        "columns", "config", "core", "errors", "extras", "keys", "model", "protocol.objects",
+        "service.journal_files", "service.parts", "service.records", "service.rows", "service.timespan", "sim.charger",
+        "sim.chemistry", "sim.pack", "text",
     ),
     "columns": (),
     "show": ("model", "text"),
@@ -278,6 +279,7 @@ SAID = frozenset({
     ("service.request_verb", "; to stop chargers without"),
     ("link.gpio", "used by "),  # what `probe` shows of a line
     ("service.reach", ""),  # what `check` says of a file
+    ("service.journal_files", ""),  # the same, of a journal
     ("service.bay", " in "),  # where an exception of our own was raised
     ("service.where", ""),  # the same
 })  # fmt: skip

@@ -23,7 +23,7 @@ def comparison(
 
     `words` are the objects' raw words and the sizes declared by the answers.
     """
-    decoded = {name: _decode(one, words) for name, one in maps.items()}
+    decoded = {name: decode(one, words) for name, one in maps.items()}
     columns: dict[str, Values] = {**decoded, **({"older protocol": pages} if pages else {})}
     width = max(13, *(len(name) + 2 for name in columns))
     yield f"{'value':17} " + " ".join(f"{name:>{width}}" for name in columns)
@@ -35,7 +35,8 @@ def comparison(
     yield _advice(maps, chosen, wrong)
 
 
-def _decode(one: ObjectMap, words: Mapping[Key, tuple[int, int]]) -> Values:
+def decode(one: ObjectMap, words: Mapping[Key, tuple[int, int]]) -> Values:
+    """What these words mean by this map."""
     values: dict[str, Decoded] = {}
     for entry in one.objects:
         word = words.get((entry.index, entry.sub))

@@ -7,12 +7,13 @@ each map decodes them, beside the pages of the BMU's older protocol if it suppor
 from collections.abc import Callable, Mapping
 from time import monotonic
 
-from orchestrator.commissioning.compare_maps import comparison
+from orchestrator.commissioning.compare_maps import comparison, decode
 from orchestrator.config.files import MAP
 from orchestrator.config.load import load_map
 from orchestrator.config.shipped import shipped_names
 from orchestrator.config.station import BatteryConfig
 from orchestrator.link.can import CanBus
+from orchestrator.model import Measurement
 from orchestrator.protocol.hextext import hex_of
 from orchestrator.protocol.pages import pages_request, pages_request_cob_id, parse_page
 from orchestrator.protocol.sdo import (
@@ -57,6 +58,7 @@ class BmuProbe:
     def __init__(self, bus: CanBus, config: BatteryConfig, show: Callable[[str], None]) -> None:
         self._bus, self._config, self._show = bus, config, show
         self._node_id = config.node_id
+        self.volts: float | None = None  #: the pack's, by the bay's own map
         self._frames: list[tuple[int, bytes]] = []
         self._maps = {name: load_map(name) for name in shipped_names(MAP.folder)}
         if config.map not in self._maps.values():
@@ -82,6 +84,8 @@ class BmuProbe:
             self._show(f"  0x{key[0]:04X}:{key[1]:02X}  {_said(reply)}")
         pages = self._pages() if old_protocol else {}
         words = {key: (reply.value, reply.size) for key, reply in replies.items() if isinstance(reply, SdoValue)}
+        volts = decode(self._config.map, words).get("voltage_v")
+        self.volts = volts.value if isinstance(volts, Measurement) else None
         for line in comparison(self._maps, self._config.map, words, pages):
             self._show(f"  {line}")
         return None not in replies.values()

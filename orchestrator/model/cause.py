@@ -55,6 +55,21 @@ def together(causes: Sequence[Cause]) -> Cause:
     return causes[0] if len(causes) == 1 else Cause.of(SEVERAL, whats=tuple(causes))
 
 
+def without_then(cause: Cause, *, advice: bool = True) -> Cause:
+    """The cause without what comes next, and without `advice` if that is over: in several causes, of each of them."""
+    params = tuple(
+        (
+            name,
+            tuple(without_then(one, advice=advice) for one in value)
+            if (cause.id, name) == (SEVERAL, "whats")
+            else value,
+        )
+        for name, value in cause.params
+        if name != "then"
+    )
+    return Cause(cause.id, params, cause.key, cause.place, cause.advice if advice else "")
+
+
 def said(text: str) -> Cause:
     """A sentence of which nobody knows more: one from before there were causes, or of no account."""
     return Cause.of(SAID, text=text)

@@ -19,6 +19,7 @@ from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.journal import Journal
 from orchestrator.service.news import TICK_S, due_s
+from orchestrator.service.outlook import outlook
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
 from orchestrator.service.records import SnapshotRecorder, TimedLine, decision_lines, transition
@@ -237,14 +238,16 @@ class BayRunner:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)
 
-    def status(self) -> dict[str, object]:
-        """The bay's part of the status document."""
+    def status(self, *, closely: bool = False) -> dict[str, object]:
+        """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         decision = self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER)
-        decision = told(decision, self._snapshot, self._memory, self.policy.rules)
-        contactor = self._contactor
+        snapshot, memory, rules, contactor = self._snapshot, self._memory, self.policy.rules, self._contactor
+        decision, clock = told(decision, snapshot, memory, rules), WallClock(monotonic(), time())
         return {
-            **bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language),
+            **bay_status(self.name, snapshot, decision, clock.now_s, clock.wall_s, self._language),
+            **outlook(decision, snapshot, memory, rules, clock, self._language, closely=closely),
             "contactor": contactor and contactor_fields(contactor, self._language),
             "port": self.place.port,
+            "bmu": {"can": self.place.can, "node_id": self.place.node_id},
             "policy": self.policy.status(),
         }

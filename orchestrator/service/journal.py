@@ -1,8 +1,8 @@
 """The journal: JSON Lines on disk, rotated and bounded. A full or missing disk never stops a charge, or delays a stop.
 
-There are two streams: `events` (transition, decision, command, fault, session) for "why did it stop?", and the much
-larger `snapshots` for replay; each has its own share of the space, so that snapshots never displace the reasons. Both
-begin each run of the service with a line `run`: monotonic times of two runs, or two boots, are not comparable.
+There are two streams: `events` (transition, decision, command, fault, session, station) for "why did it stop?", and the
+much larger `snapshots` for replay; each has its own share of the space, so that snapshots never displace the reasons.
+Both begin each run of the service with a line `run`: monotonic times of two runs, or two boots, are not comparable.
 
 Events are on disk within half a second, as plain text; finished parts are compressed. Snapshots are compressed as they
 are written, which needs many lines at once: they wait for each other, unless an event shows that they matter.
@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import TypeVar
 
 from orchestrator.model import Cause
+from orchestrator.model.cause import plain
 from orchestrator.service.disk import code_of
 from orchestrator.service.packed import PackedFile
 from orchestrator.service.records import Line, rfc3339
 from orchestrator.service.rotating import RotatingFile
+from orchestrator.text.catalogue import say
 
 #: Of these lines; the first had no `run`, the second no causes but sentences, the third sentences in its snapshots, the
 #: fourth a line for each decision.
@@ -38,6 +40,9 @@ HOLD_BYTES = 1 << 16
 RETRY_S = 5.0
 #: A disk may be slow, but a writer without progress for this long hangs.
 STALL_S = 30.0
+
+#: What the service says of a bay that has records of its own.
+OWN = frozenset({"bay_begins", "bay_goes"})
 
 T = TypeVar("T")
 Entry = tuple[float, float, str, Line]  #: monotonic s, wall s, bay, line
@@ -118,6 +123,13 @@ class Journal:
             self.lost += 1
         now_s, wall_s = self._clock(), self._wall()
         waiting.append((now_s, wall_s, bay, line) if t_s is None else (t_s, wall_s - (now_s - t_s), bay, line))
+
+    def note(self, cause: Cause, language: str) -> None:
+        """Add what the service says of itself: its beginning and end, its disk, its sockets, its guardian."""
+        if cause.id not in OWN:
+            bay = cause.param("bay")
+            said = {"text": say(cause, language), "cause": plain(cause)}
+            self.put(bay if isinstance(bay, str) else "", ("station", said))
 
     def problem(self, now_s: float) -> Cause | None:
         """Why nothing is being written; None while all is well."""

@@ -1,6 +1,7 @@
 """A bay's policy in force, and a newly read one that waits until the bay is in standby."""
 
 from dataclasses import replace
+from time import time
 
 from orchestrator.config.station import BayConfig
 from orchestrator.core.rules import Rules
@@ -42,14 +43,16 @@ class PolicyInForce:
     def _adopt(self, bay: BayConfig) -> None:
         self.rules = Rules.of(bay)
         self.news = News.of(self.rules)
+        self._since_s = time()
 
-    def status(self) -> dict[str, str]:
-        """Its part of the status document."""
+    def status(self) -> dict[str, object]:
+        """Its part of the status document. `since` is Unix time: when this service began, or adopted it."""
         policy, offered = self.rules.bay.policy, self._offered
         return {
             "name": policy.policy,
             "file": policy.source.file,
             "sha256": policy.source.digest,
+            "since": round(self._since_s, 3),
             "waiting_sha256": offered.policy.source.digest if offered else "",
         }
 

@@ -45,7 +45,7 @@ class RequestHandler:
         if verb == "status":
             name = request.get("bay")
             bays = self._bays if name is None else [self._named(name)]
-            now_s, shown = self._clock(), [bay.status() for bay in bays]
+            now_s, shown = self._clock(), [bay.status(closely=name is not None) for bay in bays]
             problem, not_persisted = self._journal.problem(now_s), self._store.not_persisted(now_s)
             alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
             strays = self._strays.status(self._language)

@@ -122,7 +122,10 @@ def station_status(
         "alarm": _level(alarm),
         "bays": bays,
         "strays": list(strays),
-        "journal": _problem(journal_problem, station.language.value),
+        "journal": {
+            "directory": str(station.journal.directory.absolute()),
+            **_problem(journal_problem, station.language.value),
+        },
         "persisted": _problem(not_persisted, station.language.value),
     }
 

@@ -2,6 +2,7 @@
 
 import argparse
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import cast
 
@@ -10,7 +11,7 @@ from orchestrator.errors import NoServiceError, ServiceError, UsageError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain
-from orchestrator.page import blocks, needs_a_person, painted
+from orchestrator.page import Block, blocks, needs_a_person, painted
 from orchestrator.service.chosen import choose, is_plain, unknown
 from orchestrator.service.where import find_socket
 from orchestrator.show import level_of, own_language
@@ -36,9 +37,39 @@ def status(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json_text(document), flush=True)
     else:
-        found = blocks(document, own_language(), own_width(), time.strftime(CLOCK), problems=arguments.problems)
-        print(painted(found, colour=own_colour()), flush=True)
+        print(painted(_blocks(document, arguments), colour=own_colour()), flush=True)
     return int(arguments.check and needs_a_person(document))
+
+
+def _blocks(document: dict[str, object], arguments: argparse.Namespace) -> list[Block]:
+    """A page about the one bay that is named, else the table of all that are meant."""
+    language, width = own_language(), own_width()
+    if _named(arguments) is None or arguments.problems or arguments.group:
+        return overview(document, arguments, time.strftime(CLOCK))
+    from orchestrator.service.bay_page import bay_blocks
+    from orchestrator.service.history_verb import last_events
+
+    bay, now_s = arguments.bay[0], time.time()
+    directory = cast("dict[str, str]", document.get("journal", {})).get("directory")
+    told_in = language_of_answer(document, language)
+    events = last_events(Path(directory), bay, told_in, now_s) if directory else []
+    return bay_blocks(document, events, language, width, now_s)
+
+
+def overview(document: Mapping[str, object], arguments: argparse.Namespace, clock: str) -> list[Block]:
+    """The bays in groups, or in a table."""
+    language, width = own_language(), own_width()
+    if arguments.group:
+        from orchestrator.service.group_page import group_blocks
+
+        return group_blocks(document, language, width, clock, problems=arguments.problems)
+    return blocks(document, language, width, clock, problems=arguments.problems)
+
+
+def _named(arguments: argparse.Namespace) -> str | None:
+    """The bay, if exactly one is named, and not by a pattern."""
+    words = arguments.bay
+    return words[0] if len(words) == 1 and is_plain(words) and not arguments.excepted else None
 
 
 def _checked(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
@@ -51,8 +82,7 @@ def _checked(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
 
 def look(path: Path, arguments: argparse.Namespace, within_s: float = ANSWER_S) -> dict[str, object]:
     """The status document with the bays that the command line means. ServiceError if one of them is unknown."""
-    words, excepted = arguments.bay, arguments.excepted
-    one = words[0] if len(words) == 1 and is_plain(words) and not excepted else None
+    words, excepted, one = arguments.bay, arguments.excepted, _named(arguments)
     document = ask(path, {"verb": "status", "bay": one}, within_s)
     document.pop("ok")
     bays = cast("list[dict[str, object]]", document["bays"])

@@ -149,8 +149,9 @@ class Supervisor:
         self._run_all()
 
     def _say(self, cause: Cause) -> None:
-        """A line on standard error."""
+        """A line on standard error; the journal has it as well."""
         self._console.say(say(cause, self._language))
+        self._journal.note(cause, self._language)
 
     def _run_all(self) -> None:
         for bay in self._bays:

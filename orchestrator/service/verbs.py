@@ -1,4 +1,4 @@
-"""The verbs of the running service: run it, show its status, and request start, pause, stop or reset of its bays.
+"""The verbs of the running service: run it, show its status and history, and request start, pause, stop or reset.
 
 Each imports its dependencies when it runs, so that none waits for another's libraries.
 """
@@ -21,13 +21,14 @@ NAMES = "names, or patterns such as 'bay-0*'"
 
 
 def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """`run`, `status` and the requests."""
+    """`run`, `status`, `history` and the requests."""
     run = verbs.add_parser("run", help="run the service for a station until told to end")
     run.add_argument("station", nargs="?", help="the station file (default: station.yaml)")
     run.set_defaults(run=_run)
     status = verbs.add_parser("status", help="show what every bay is doing, and why")
     status.add_argument("bay", nargs="*", help=f"only these bays: {NAMES}")
     _add_except(status)
+    status.add_argument("--group", action="store_true", help="the bays in groups by what they do: for many bays")
     status.add_argument("--problems", action="store_true", help="only bays that need a person")
     status.add_argument(
         "--check", action="store_true", help="exit status 1 if something needs a person, 2 if nobody can tell"
@@ -36,6 +37,7 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
     status.add_argument("--watch", action="store_true", help="refresh until interrupted")
     _add_socket(status)
     status.set_defaults(run=_status)
+    _add_history(verbs)
     for verb, about in REQUESTS.items():
         request = verbs.add_parser(verb, help=about)
         request.add_argument("bay", nargs="*", help=f"the bays: {NAMES}")
@@ -45,6 +47,25 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
             request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
+
+
+def _add_history(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    history = verbs.add_parser("history", help="show what happened, newest last")
+    history.add_argument("bay", nargs="*", help=f"only these bays: {NAMES}")
+    history.add_argument(
+        "--station", action="store_true", help="only the station itself: its begins, ends and failures"
+    )
+    history.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
+    history.add_argument("--until", metavar="TIME", help="up to then")
+    history.add_argument(
+        "--limit", type=int, metavar="N", help="only the last N events; 0: all (default: 50, with --since all)"
+    )
+    history.add_argument("--json", action="store_true", help="a JSON object on each line, for programs")
+    history.add_argument(
+        "--journal", metavar="DIRECTORY", help="the journal (default: that of station.yaml here, else of the service)"
+    )
+    _add_socket(history)
+    history.set_defaults(run=_history)
 
 
 def _add_except(parser: argparse.ArgumentParser) -> None:
@@ -75,6 +96,12 @@ def _status(arguments: argparse.Namespace) -> int:
     from orchestrator.service.status_verb import status
 
     return status(arguments)
+
+
+def _history(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.history_verb import history
+
+    return history(arguments)
 
 
 def _request(arguments: argparse.Namespace) -> int:

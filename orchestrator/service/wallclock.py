@@ -36,5 +36,10 @@ class WallClock:
             return strftime("%Y-%m-%d %H:%M", then)
         return strftime("%H:%M" if coming else "%H:%M:%S", then)
 
+    @property
+    def stamp(self) -> str:
+        """The present date and time, here."""
+        return strftime("%Y-%m-%d %H:%M:%S", localtime(self.wall_s))
+
     def _told(self, name: str, t_s: float) -> str:
         return self.time_of_day(t_s, coming=name == COMING)

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
-from orchestrator.columns import json_text, own_colour, own_height, own_width
+from orchestrator.columns import json_text, own_colour, own_height
 from orchestrator.errors import NoServiceError, ServiceError
 from orchestrator.model import Cause
 from orchestrator.model.cause import said
-from orchestrator.page import PLAIN, Block, blocks, fitted, painted
-from orchestrator.service.status_verb import CLOCK, look
+from orchestrator.page import PLAIN, Block, fitted, painted
+from orchestrator.service.status_verb import CLOCK, look, overview
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import language_of_answer
@@ -80,8 +80,7 @@ class _View:
     def _draw(self, first: Sequence[Block]) -> None:
         """These blocks, and the last answer below them, at the time when it came."""
         language = language_of_answer(self._last, own_language())
-        found = blocks(self._last, own_language(), own_width(), self.answered_at, problems=self.arguments.problems)
-        found, height = [*first, *found], own_height()
+        found, height = [*first, *overview(self._last, self.arguments, self.answered_at)], own_height()
         text = painted(fitted(found, height, language) if height else found, colour=own_colour())
         if not height:
             print(text, flush=True)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.model.cause import from_plain
+from orchestrator.model.cause import PARTS, from_plain
 from orchestrator.text.catalogue import say
 
 
@@ -58,6 +58,15 @@ def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
         "reason": said(bay.get("cause"), bay["reason"], language),
         "step_rule": said(bay.get("step_cause"), bay.get("step_rule", ""), language),
         "faults": [_fault(one, language) for one in bay["faults"]],
+        **({"limits": [_text(one, one["cause"], language) for one in bay["limits"]]} if "limits" in bay else {}),
+        **({"next": _text(bay["next"], bay["next"], language)} if bay.get("next") else {}),
+    }
+
+
+def _text(part: Mapping[str, Any], cause: Mapping[str, Any], language: str) -> dict[str, Any]:
+    return {
+        **part,
+        "text": said({name: cause.get(name, "") for name in PARTS if name in cause}, part["text"], language),
     }
 
 

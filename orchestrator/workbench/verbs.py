@@ -4,7 +4,6 @@ Each imports its dependencies when it runs: plotting and the like are extras, wh
 """
 
 import argparse
-import re
 import shutil
 import sys
 import time
@@ -14,11 +13,10 @@ from types import ModuleType
 
 from orchestrator.errors import OrchestratorError, UsageError
 from orchestrator.extras import install_extra
+from orchestrator.service.timespan import moment
 
 #: A computation that takes longer shows its progress, this often.
 PROGRESS_S = 1.0
-#: What `--since` counts in.
-AGO_S = {"min": 60.0, "h": 3600.0, "d": 86_400.0}
 PICTURES = ("mermaid", "svg", "png")
 
 
@@ -140,21 +138,9 @@ def _replay(arguments: argparse.Namespace) -> int:
         from orchestrator.workbench.replay.verb import processes_for, replay
     except ImportError as error:
         raise missing("replay", error) from None
-    since = since_of(arguments.since, time.time()) if arguments.since else ""
+    since = moment("--since", arguments.since or "", time.time())
     jobs = arguments.jobs if arguments.jobs is not None else processes_for(arguments.journal)
     return replay(arguments.journal, arguments.policy, arguments.bay, since, jobs=jobs)
-
-
-def since_of(text: str, wall_s: float) -> str:
-    """The beginning that a person named, as the journal writes times; a date and time without a zone is local."""
-    from orchestrator.service.records import rfc3339, unix_s
-
-    if (ago := re.fullmatch(r"(\d{1,6})\s*(min|h|d)", text)) is not None:
-        return rfc3339(max(wall_s - int(ago[1]) * AGO_S[ago[2]], 0.0))
-    try:
-        return rfc3339(unix_s(text))
-    except (ValueError, OverflowError, OSError):
-        raise UsageError(f"--since {text}: expected 90min, 2h, 7d, 2026-11-28 or 2026-11-28T06:00") from None
 
 
 def _diagram(arguments: argparse.Namespace) -> int:

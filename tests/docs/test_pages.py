@@ -3,12 +3,13 @@
 import re
 from pathlib import Path
 
+from orchestrator.cli import _parser
 from orchestrator.config.load import load_policy
 from orchestrator.config.shipped import shipped_names
 from orchestrator.core.faults import FAULTS
 from orchestrator.text.catalogue import LANGUAGES
 from orchestrator.workbench.draw.diagram import diagram, mermaid
-from tests.docs import cause_page
+from tests.docs import cause_page, operating_page
 from tests.docs.catalogue import CATALOGUE
 from tests.docs.fault_page import page, rows_of
 
@@ -29,6 +30,14 @@ def test_the_page_of_causes_is_the_catalogue() -> None:
 def test_the_picture_in_the_readme_is_the_machine() -> None:
     written = (ROOT / "README.md").read_text(encoding="utf-8")
     assert f"```mermaid\n{mermaid(diagram())}```" in written, "orchestrator diagram"
+
+
+def test_each_command_of_the_operating_page_is_one() -> None:
+    written = (DOCS / "operating.md").read_text(encoding="utf-8")
+    commands = re.findall(r"^\$ orchestrator (.+)$", written, re.MULTILINE)
+    assert commands == [*(one.command for one in operating_page.ANSWERS), operating_page.MANY.command]
+    for command in commands:
+        assert _parser().parse_args(command.split())
 
 
 #: The numbers of the catalogue.

@@ -22,8 +22,8 @@ from orchestrator.demo.stage import Stage
 from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import State
+from orchestrator.service.journal_files import files_of, records_of
 from orchestrator.sim.faults import FAULTS
-from orchestrator.workbench.replay.files import files_of, records_of
 from tests.proof.truth import MARGIN_S, SILENT_S, VERIFY_S
 from tests.waiting import wait_until
 

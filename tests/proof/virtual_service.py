@@ -37,7 +37,7 @@ from orchestrator.keys import Range
 from orchestrator.lastresort import line_settings as settings_module
 from orchestrator.link import can as can_module
 from orchestrator.link import serial as serial_module
-from orchestrator.model import ControlMode, Decision, Request
+from orchestrator.model import Cause, ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
 from orchestrator.service import ports as ports_module
 from orchestrator.service import reload as reload_module
@@ -122,6 +122,9 @@ class Notebook:
 
     def say(self, text: str) -> None:
         self.said.append(text)
+
+    def note(self, cause: Cause, language: str) -> None:
+        """What the service says of itself, nobody reads here."""
 
     def put(self, bay: str, line: Any, t_s: float | None = None) -> None:
         if line[0] == "fault":

@@ -16,8 +16,8 @@ from typing import Any
 
 from orchestrator.demo.stage import Stage
 from orchestrator.service.journal import _line
+from orchestrator.service.journal_files import files_of, lines_of
 from orchestrator.service.records import SnapshotRecorder
-from orchestrator.workbench.replay.files import files_of, lines_of
 from orchestrator.workbench.replay.recording import read
 from tests.proof.play import Player, stage
 from tests.proof.report import say

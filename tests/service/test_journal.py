@@ -21,11 +21,11 @@ from hypothesis import strategies as st
 from orchestrator.service import journal as journal_module
 from orchestrator.service import rotating
 from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal
+from orchestrator.service.journal_files import files_of, lines_of
 from orchestrator.service.packed import PackedFile
 from orchestrator.service.parts import MIN_PART, PARTS, order, size_of
 from orchestrator.service.records import rfc3339
 from orchestrator.service.rotating import RotatingFile
-from orchestrator.workbench.replay.files import files_of, lines_of
 from tests.core.said import say
 from tests.waiting import wait_until
 

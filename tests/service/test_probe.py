@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator.commissioning.compare_maps import comparison
 from orchestrator.commissioning.probe import probe
+from orchestrator.commissioning.volts import Volts, compared
 from orchestrator.config.load import load_map, load_station
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.config.station import Station
@@ -145,6 +146,74 @@ def test_nothing_is_commanded(site: Site) -> None:
     after = site.plant.state()
     assert after["polls"] == before["polls"] + 1
     assert [after[name] - before[name] for name in ("orders", "stops", "resumes", "bad")] == [0, 0, 0, 0]
+
+
+def test_charger_and_bmu_are_compared_and_the_nodes_on_the_bus_listed(site: Site) -> None:
+    site.plant.set(2, soc_pct=60)
+    _, shown = site.probe("bay-1", "bay-2")
+    lines = shown.splitlines()
+    assert "nodes heard on can0 (0x10 … 0x1F): 0x10 (bay-1), 0x11 (bay-2)" in lines
+    assert "bay-1: charger 48.1 V, BMU 48.1 V: they agree" in lines
+    assert "swapped?" not in shown and "not heard" not in shown
+
+
+def swapped_ports(document: Document) -> None:
+    one, other = (bay["charger"] for bay in document["bays"])
+    one["port"], other["port"] = other["port"], one["port"]
+
+
+def test_swapped_cables_are_named(site: Site) -> None:
+    site.plant.set(2, soc_pct=90)
+    status, shown = site.probe("bay-1", "bay-2", change=swapped_ports)
+    assert status == 1
+    assert "swapped? bay-1 and bay-2: each charger reads the volts of the other's battery: exchange" in shown
+
+
+def test_a_node_at_another_switch_is_named(site: Site) -> None:
+    def wrong_node(document: Document) -> None:
+        document["bays"][0]["battery"]["node_id"] = 0x1A
+
+    _, shown = site.probe(change=wrong_node)
+    assert "nodes heard on can0 (0x10 … 0x1F): 0x10 (no bay has it), 0x11 (bay-2)" in shown
+    assert "not heard: 0x1A (bay-1); is battery.node_id, or the switch, one of 0x10?" in shown
+
+
+def volts(bay: str, charger_v: float | None, bmu_v: float | None) -> Volts:
+    return Volts(bay, charger_v, bmu_v, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        ([volts("a", 50.0, 51.0)], ["a: charger 50.0 V, BMU 51.0 V: they agree"]),
+        ([volts("a", 50.0, 51.1)], ["a: charger 50.0 V, BMU 51.1 V: they differ by 1.1 V, at most 1.0 V is right"]),
+        ([volts("a", 0.2, 51.1)], ["a: charger 0.2 V, BMU 51.1 V: the charger sees no battery; is a contactor open?"]),
+        ([volts("a", None, 51.1)], ["a: charger –, BMU 51.1 V: nothing to compare"]),
+        (
+            [volts("a", 50.0, 50.0), volts("b", 50.5, 50.5)],
+            ["a and b have batteries of the same volts: cables swapped between them would not show here"],
+        ),
+        (
+            [volts("a", 50.0, 44.0), volts("b", 44.0, 50.0), volts("c", 53.0, 53.0)],
+            ["swapped? a and b: each charger reads the volts of the other's battery: exchange their serial ports, or "
+             "their node ids, in the station file or at the cables"],
+        ),
+        (
+            [volts("a", 50.0, 44.0), volts("b", 50.0, 50.0)],
+            ["swapped? a's charger reads the volts of b's battery: see which cables go where"],
+        ),
+        (
+            [volts("a", 50.0, 41.0), volts("b", 44.0, 50.0), volts("c", 41.0, 44.0)],
+            [f"swapped? {one}'s charger reads the volts of {other}'s battery: see which cables go where"
+             for one, other in ("ab", "bc", "ca")],
+        ),
+        ([volts("a", 0.2, 44.0), volts("b", 30.0, 0.2)], []),
+    ],
+)  # fmt: skip
+def test_what_is_compared_and_what_may_be_swapped(found: list[Volts], said: list[str]) -> None:
+    lines = list(compared(found))
+    assert [line for line in lines if line in said] == said
+    assert sum(line.startswith("swapped?") for line in lines) == sum(line.startswith("swapped?") for line in said)
 
 
 def test_an_nmt_command_is_sent_first(site: Site) -> None:

@@ -76,7 +76,7 @@ def test_a_charge_goes_on_by_the_policy_that_it_began_with(site: Site) -> None:
     site.bench.ask(Request.PAUSE)
     site.bench.until(State.SUSPENDED)
     site.bench.step(2)
-    assert site.policy == before | {"sha256": waiting}
+    assert site.policy == before | {"sha256": waiting, "since": site.policy["since"]}
     site.bench.ask(Request.START)
     site.bench.charging()
     site.bench.battery.values["soc_pct"] = 99.0

@@ -179,6 +179,10 @@ def test_the_station_tells_its_name_its_bays_and_its_journals_problem() -> None:
         "alarm": "danger",
         "bays": [],
         "strays": [stray],
-        "journal": {"problem": "disk full", "cause": fields(cause("disk full"))},
+        "journal": {
+            "directory": str(station.journal.directory.absolute()),
+            "problem": "disk full",
+            "cause": fields(cause("disk full")),
+        },
         "persisted": {"problem": "worn", "cause": fields(cause("worn"))},
     }

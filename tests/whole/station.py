@@ -13,8 +13,8 @@ from threading import Event
 from typing import Any, Self, cast
 
 from orchestrator.lastresort.asking import ask
+from orchestrator.service.journal_files import files_of, records_of
 from orchestrator.sim.client import PlantProcess
-from orchestrator.workbench.replay.files import files_of, records_of
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until
 

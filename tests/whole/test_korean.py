@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from orchestrator.service.journal_files import files_of, lines_of
 from orchestrator.show import own_language
-from orchestrator.workbench.replay.files import files_of, lines_of
 from tests.waiting import wait_until
 from tests.whole.station import Document, whole_station
 

@@ -64,7 +64,8 @@ def test_status_shows_every_bay_and_why(station: Station) -> None:
     assert document["station"] == "whole"
     assert [bay["name"] for bay in document["bays"]] == ["bay-2"]
     assert document["bays"][0]["charger"]["online"] is True
-    assert document["journal"] == {"problem": "", "cause": None}
+    directory = str(service.directory / "run" / "journal")
+    assert document["journal"] == {"directory": directory, "problem": "", "cause": None}
 
 
 def test_pause_and_start(station: Station) -> None:

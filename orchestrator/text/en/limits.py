@@ -24,4 +24,9 @@ TEXTS: Mapping[str, str] = {
     "allows_nothing": "allows no current",
     "allows_a": "allows {allowed_a:.1f} A",
     "allows_c": "allows {allowed_a:.1f} A ({max_c:g} C)",
+    # what else bounds a charge
+    "limit_volts": "no current above {most_v:g} V, {place}",
+    "limit_temperature": "no current outside {low:g} … {high:g} °C, {place}",
+    "limit_ah": "a charge of more than {most:.3g} Ah is a fault, {place}",
+    "limit_h": "a charge of more than {most:.3g} h is a fault, {place}",
 }

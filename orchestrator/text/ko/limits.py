@@ -24,4 +24,9 @@ TEXTS: Mapping[str, str] = {
     "allows_nothing": "전류를 허용하지 않습니다",
     "allows_a": "{allowed_a:.1f} A까지 허용합니다",
     "allows_c": "{allowed_a:.1f} A({max_c:g} C)까지 허용합니다",
+    # what else bounds a charge
+    "limit_volts": "{most_v:g} V보다 높으면 전류를 흘리지 않습니다({place})",
+    "limit_temperature": "{low:g} … {high:g} °C 밖에서는 전류를 흘리지 않습니다({place})",
+    "limit_ah": "한 번의 충전이 {most:.3g} Ah를 넘으면 장애입니다({place})",
+    "limit_h": "한 번의 충전이 {most:.3g}시간을 넘으면 장애입니다({place})",
 }

@@ -12,8 +12,8 @@ from orchestrator.core.memory import Memory, in_parts
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause, Snapshot
 from orchestrator.model.cause import from_plain
+from orchestrator.service.journal_files import Fields
 from orchestrator.service.rows import BATTERY, COLUMNS, NUMBERS, OTHERS, RECORDS
-from orchestrator.workbench.replay.files import Fields
 
 _CONVERTER = Converter(detailed_validation=False)
 _CONVERTER.register_structure_hook(Path, lambda text, _: Path(text))

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from pathlib import Path
 
-from orchestrator.workbench.replay.files import Fields, may_continue, records_of
+from orchestrator.service.journal_files import Fields, may_continue, records_of
 
 Event = tuple[str, Mapping[str, object]]  #: kind, fields
 #: The records that `decision_lines` writes for a decision.

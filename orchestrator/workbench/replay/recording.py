@@ -15,11 +15,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.errors import Finding
 from orchestrator.model import Snapshot
-from orchestrator.service.parts import stream_of
-from orchestrator.service.records import WHOLE_S, rfc3339, unix_s
-from orchestrator.workbench.replay.converting import SENTENCES, UNREADABLE, OlderError, snapshot_of, whole
-from orchestrator.workbench.replay.events import Event, Events, run_of
-from orchestrator.workbench.replay.files import (
+from orchestrator.service.journal_files import (
     STREAMS,
     Fields,
     files_of,
@@ -29,6 +25,10 @@ from orchestrator.workbench.replay.files import (
     records_of,
     unreadable,
 )
+from orchestrator.service.parts import stream_of
+from orchestrator.service.records import WHOLE_S, rfc3339, unix_s
+from orchestrator.workbench.replay.converting import SENTENCES, UNREADABLE, OlderError, snapshot_of, whole
+from orchestrator.workbench.replay.events import Event, Events, run_of
 from orchestrator.workbench.replay.rows import rows_of
 
 #: Records that break continuity: another run of the service, lines that the disk did not take.

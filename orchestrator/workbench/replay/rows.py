@@ -6,8 +6,8 @@ from typing import Any
 
 from orchestrator.core.parts import changed, made
 from orchestrator.model import BatteryReading, Measurement, Snapshot
+from orchestrator.service.journal_files import Fields
 from orchestrator.workbench.replay.converting import ALL_NUMBERS, BATTERY_TIMES, MAKERS, PLACES
-from orchestrator.workbench.replay.files import Fields
 
 #: No record has more rows; more would be somebody's joke.
 MOST = 100_000

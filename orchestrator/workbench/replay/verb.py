@@ -8,9 +8,9 @@ from pathlib import Path
 from orchestrator.config.load import load_policy
 from orchestrator.config.policy import Policy
 from orchestrator.errors import Finding, OrchestratorError
+from orchestrator.service.journal_files import files_of
 from orchestrator.workbench.processes import cores
 from orchestrator.workbench.replay.again import Again, Repeater
-from orchestrator.workbench.replay.files import files_of
 from orchestrator.workbench.replay.otherwise import Comparison, told
 from orchestrator.workbench.replay.recording import Recorded, Recording, bays_in
 

@@ -55,7 +55,7 @@ OURS: tuple[Seed, ...] = (
         "a journal with one unreadable line is not replayed",
         ("a record over lives",),
         (
-            f"{WORKBENCH}replay/files.py",
+            f"{SERVICE}journal_files.py",
             "                except (LookupError, TypeError, ValueError, RecursionError, OverflowError) as error:\n",
             "                except (RecursionError, OverflowError) as error:\n",
         ),

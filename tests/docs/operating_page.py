@@ -1,0 +1,231 @@
+"""docs/operating.md: `python -m tests.docs.operating_page DIRECTORY > docs/operating.md`, with an empty directory.
+
+The whole service in virtual time, with a real journal, and a real control socket that real commands ask. Every run has
+other times.
+"""
+
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from unittest.mock import patch
+
+from orchestrator.config.station import JournalConfig
+from orchestrator.core.memory import Memory
+from orchestrator.model import ControlMode, Request
+from orchestrator.service import bay as bay_module
+from orchestrator.service import policy_in_force as policy_module
+from orchestrator.service.control import ControlSocket
+from orchestrator.service.journal import GATHER_S, Journal
+from orchestrator.sim.faults import FAULTS
+from orchestrator.sim.presets import PACKS
+from tests.proof.virtual_rig import Nature
+from tests.proof.virtual_service import World, station, world
+from tests.whole.terminal import Terminal
+
+LINES, COLUMNS = 90, 100
+WINDOW = (30, 80)
+#: Where the page says that the station is.
+SHOWN = "/srv/depot"
+#: How long the station of three bays runs before its power fails, and after that, in virtual time.
+BEFORE_S, AFTER_S, MANY_S = 60.0, 900.0, 60.0
+#: Virtual time has this start over the clock, which then is waited for.
+LEAD_S = 40.0
+HEAD = """\
+# Operating a station: a question, a command
+
+Each command below was run on an emulated station, and its output is as it came, on a terminal of 100 columns: three
+bays, one overheated, one with a loose plug, a quarter of an hour after a power failure. What is not here yet: which
+battery gets old, who stopped it, energy, charges as CSV, and a charge to another target or at a given time.
+`python -m tests.docs.operating_page DIRECTORY` makes this page again.
+
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a question is asked with, and what to look at."""
+
+    question: str
+    look: str
+    command: str
+    also: tuple[str, ...] = ()  #: further questions that the same output answers
+
+
+ANSWERS = (
+    Answer(
+        "What does each bay do, and why?", "What needs a person comes first. WHY ends with what comes next.", "status"
+    ),
+    Answer(
+        "Is anything wrong? (for a script)",
+        "The exit status: 1 if anything needs a person.",
+        "status --check --problems",
+    ),
+    Answer(
+        "All about one bay",
+        "The page of a bay answers most of an operator's questions:",
+        "status bay-1",
+        (
+            "since when: STATE",
+            "how much so far: SESSION",
+            "when full: FORECAST (the BMU's own, and [ours](journal.md#how-long-a-charge-takes))",
+            "what limits the current: LIMITS, the lowest first; the one that sets the step *binds*",
+            "which policy is in force, and since when: POLICY",
+        ),
+    ),
+    Answer("May I reset it, and when?", "NEXT says it, and which command to type.", "status bay-2"),
+    Answer("Does it go on by itself, and when?", "NEXT again: with a time, where there is one.", "status bay-3"),
+    Answer("Why did it stop an hour ago?", "What needed a person is marked.", "history bay-2 --since 2h"),
+    Answer(
+        "What did this bay do last week?",
+        "The same, further back; `--until` ends it earlier.",
+        "history bay-3 --since 7d",
+    ),
+    Answer(
+        "What was the last failure of the station itself?",
+        "Its beginnings, ends and failures; the latter are marked.",
+        "history --station --limit 6",
+    ),
+)
+MANY = Answer(
+    "Which of 64 bays need me?",
+    "In a window of 80 × 30; `status --problems` has the whole sentences.",
+    "status --group",
+)
+
+
+LAST = """\
+## Pause all bays but one
+`orchestrator pause --all --except bay-1`. Each bay answers in a line (`bay-2: pause accepted; stands by, verified`),
+and the exit status is 0 once all of them stand by. `start` lets them go on; each charge goes on where it was.
+"""
+
+
+def shown(directory: Path, command: str, lines: int = LINES, columns: int = COLUMNS) -> str:
+    """The command and what it says, as in a terminal, with its exit status if that is not 0."""
+    env = {"ORCHESTRATOR_SOCKET": str(directory / "socket"), "NO_COLOR": "1", "LC_ALL": "en_US.UTF-8"}
+    with Terminal(lines, columns, *command.split(), env=env) as terminal:
+        status = terminal.end()
+        text = "\n".join(line.rstrip() for line in terminal.screen.lines).rstrip()
+        assert not terminal.screen.wrapped, command
+        assert not terminal.screen.scrolled, command
+    text = text.replace(str(directory), SHOWN)
+    code = f"\n$ echo $?\n{status}" if status else ""
+    return f"```text\n$ orchestrator {command}\n{text}{code}\n```\n"
+
+
+def section(answer: Answer, output: str) -> str:
+    """A question, where to look, and the output."""
+    also = "".join(f"- {one}\n" for one in answer.also)
+    return f"## {answer.question}\n{answer.look}\n\n{also}{chr(10) if also else ''}{output}\n"
+
+
+@contextmanager
+def living(
+    directory: Path, bays: int, boot: str, began_s: float, kept: Mapping[str, Memory] | None = None
+) -> Iterator[World]:
+    """A station in virtual time, `began_s` in Unix time, that writes its journal and answers on its socket."""
+    settings = replace(
+        station([ControlMode.MANUAL] * bays), station="depot-1", stagger_s=0.0,
+        journal=JournalConfig(directory=directory / "journal", snapshots=False),
+    )  # fmt: skip
+    natures = []
+    for number in range(bays):
+        pack = PACKS["48v"]()
+        pack.set_soc(40.0 + number * 7 % 50)
+        natures.append(Nature(pack, seed=number + 1))
+    now: list[Callable[[], float]] = [lambda: began_s]
+    with (
+        patch.object(policy_module, "time", lambda: now[0]()),
+        patch.object(bay_module, "time", lambda: now[0]()),
+        world(settings, natures, end_s=3600.0, kept=kept) as made,
+        patch.object(bay_module, "monotonic", lambda: made.time.now_s),
+    ):
+        begin_s = made.time.now_s
+        now[0] = lambda: began_s + made.time.now_s - begin_s
+        journal = Journal(directory / "journal", 100.0, lambda: made.time.now_s, lambda: now[0](), boot=boot)
+        made.journal.put, made.journal.note = journal.put, journal.note  # type: ignore[method-assign]
+        made.journal.problem = lambda _: None  # type: ignore[attr-defined]
+
+        def write() -> None:
+            made.time.call_later(GATHER_S, write)
+            journal._write()
+
+        write()
+        yield made
+
+
+def ask(made: World, directory: Path, questions: Callable[[], list[str]]) -> list[str]:
+    """The answers of real commands, while virtual time stands still."""
+    time.sleep(max(vars(bay_module)["time"]() - time.time(), 0.0))
+    socket = ControlSocket(directory / "socket", made.supervisor._handler.answer, time.monotonic)
+    socket.start()
+    try:
+        return questions()
+    finally:
+        socket.close()
+
+
+def small(directory: Path) -> Iterator[str]:
+    """The sections of the station with three bays, which was without power meanwhile."""
+    began_s, found = time.time() + LEAD_S - AFTER_S, list[str]()
+    with living(directory, 3, "boot-1", began_s - BEFORE_S - 30) as made:
+        made.time.call_later(BEFORE_S, setattr, made.journal, "put", lambda *_: None)
+        made.time.call_later(BEFORE_S, setattr, made.journal, "note", lambda *_: None)
+        kept: dict[str, Memory] = {}
+
+        def fail() -> None:
+            kept.update({name: one.memory(1000.0) for name, one in made.store.persisted.items()})
+            made.end()
+
+        made.time.call_later(BEFORE_S, fail)
+        made.run()
+    with living(directory, 3, "boot-2", began_s, kept) as made:
+        later, (_, second, third) = made.time.call_later, made.rigs
+        for number in range(3):
+            later(40.0, made.ask, Request.START, number)
+        later(AFTER_S - 30, setattr, second.bay.pack, "temperature_c", 57.0)
+        later(AFTER_S - 25, third.inject, lambda rig: FAULTS["battery_removed"].happen(rig, None))
+        later(AFTER_S - 15, third.inject, lambda rig: FAULTS["heal"].happen(rig, None))
+
+        def look() -> None:
+            found.extend(ask(made, directory, lambda: [section(one, shown(directory, one.command)) for one in ANSWERS]))
+            made.end()
+
+        later(AFTER_S, look)
+        made.run()
+    yield from found
+
+
+def large(directory: Path) -> Iterator[str]:
+    """The section of the station with 64 bays."""
+    found: list[str] = []
+    with living(directory, 64, "boot-1", time.time() + LEAD_S - MANY_S) as made:
+        for number in (6, 22):
+            made.time.call_later(MANY_S - 20, setattr, made.rigs[number].bay.pack, "temperature_c", 57.0)
+
+        def look() -> None:
+            found.extend(ask(made, directory, lambda: [section(MANY, shown(directory, MANY.command, *WINDOW))]))
+            made.end()
+
+        made.time.call_later(MANY_S, look)
+        made.run()
+    yield from found
+
+
+#: The parts of the page, by the names of their directories.
+PARTS = {"small": small, "large": large}
+
+
+def main(directory: Path, only: Sequence[str] = ()) -> None:
+    """Print the page, or only these parts of it."""
+    for name in only or PARTS:
+        (directory / name).mkdir(parents=True, exist_ok=True)
+    parts = [part for name in only or PARTS for part in PARTS[name](directory / name)]
+    print(("" if only else HEAD) + "\n".join(part.rstrip() + "\n" for part in [*parts, LAST]), end="")  # noqa: T201 - the page
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])
