@@ -55,6 +55,12 @@ def together(causes: Sequence[Cause]) -> Cause:
     return causes[0] if len(causes) == 1 else Cause.of(SEVERAL, whats=tuple(causes))
 
 
+def parts(cause: Cause) -> tuple[Cause, ...]:
+    """The causes that were put together; a single one is its own only part."""
+    whats = cause.param("whats") if cause.id == SEVERAL else None
+    return tuple(one for one in whats or (cause,) if isinstance(one, Cause))
+
+
 def said(text: str) -> Cause:
     """A sentence of which nobody knows more: one from before there were causes, or of no account."""
     return Cause.of(SAID, text=text)

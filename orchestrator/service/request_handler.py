@@ -1,16 +1,20 @@
 """Handles requests from the control socket, in its thread: builds the status, or passes requests to the bays."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from orchestrator.config.station import Station
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause, Request
 from orchestrator.model.cause import plain
 from orchestrator.service.asked import Asked
+from orchestrator.service.asker import Asker, user_name
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.chosen import unknown
 from orchestrator.service.journal import Journal
 from orchestrator.service.reception import Answer, Later
+from orchestrator.service.request_log import RequestLog
 from orchestrator.service.status import station_status
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.service.strays import Strays
@@ -33,11 +37,14 @@ class RequestHandler:
         store: Store,
         strays: Strays,
         clock: Callable[[], float],
+        wall: Callable[[], float],
         wake: Callable[[int], None],
     ) -> None:
         self._station, self._bays, self._language = station, bays, station.language.value
         self._journal, self._store, self._strays = journal, store, strays
-        self._clock, self._wake = clock, wake
+        self._clock, self._wall, self._wake = clock, wall, wake
+        self._log = RequestLog(journal, clock, self._language)
+        user_name(os.getuid())  # the only one who is let in, besides root
 
     def answer(self, request: Mapping[str, object]) -> Answer | Later:
         """Whatever was asked; RequestError where it cannot be understood or done."""
@@ -51,26 +58,35 @@ class RequestHandler:
             strays = self._strays.status(self._language)
             return station_status(self._station, alarm, shown, problem, not_persisted, strays)
         if isinstance(verb, str) and verb in set(Request):
-            names, port = request.get("bays"), request.get("port")
+            names, port, asker = request.get("bays"), request.get("port"), Asker.of(request, self._wall())
             if verb == Request.RESET and isinstance(port, str):
-                return self._drop(port)
+                return self._drop(port, asker)
             bays, others = (self._bays, {}) if names is None else self._meant(_names(names), verb)
-            return self._ask(bays, Request(verb), others)
+            spares = verb == Request.START and request.get("spares") is True
+            return self._ask(bays, partial(Asked, Request(verb), asker, spares=spares), others)
         raise RequestError(Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", *map(str, Request))))
 
-    def _drop(self, port: str) -> Later:
+    def refused(self, request: Mapping[str, object], why: Cause) -> None:
+        """Write down a request that reaches no bay."""
+        verb, names = request.get("verb"), request.get("bays")
+        if verb != "status":
+            bays = [f"{name!s:.80}" for name in names[:MOST_UNKNOWN]] if isinstance(names, list) else None
+            self._log.write("", f"{verb!s:.80}", Asker.of(request, self._wall()), why, bays=bays)
+
+    def _drop(self, port: str, asker: Asker) -> Later:
         """Forget a charger without a bay; answered once that is on disk."""
         self._store.refuse_not_persisted(self._clock())
         what, revision = self._strays.drop(port)
+        verb = Request.RESET
         end_s = self._clock() + KEPT_WITHIN_S
 
         def results() -> Answer | None:
             if self._store.persisted_revision >= revision:
-                return self._results({what: None})
+                return self._results({what: None}, verb, asker)
             if self._clock() < end_s:
                 return None
             problem = self._store.not_persisted(self._clock()) or Cause("not_taken")
-            return self._results({what: Cause.of("dropped_not_persisted", problem=problem)})
+            return self._results({what: Cause.of("dropped_not_persisted", problem=problem)}, verb, asker)
 
         return results
 
@@ -92,12 +108,15 @@ class RequestHandler:
         meant = dict.fromkeys(self._bays[known.index(name)] for name in names if name in known)
         return list(meant), {", ".join(told): unknown(told, known)} if told else {}
 
-    def _ask(self, bays: Sequence[BayRunner], request: Request, others: Mapping[str, Cause] | None = None) -> Later:
-        """Pass the request to each bay; their answers come later, "" means yes, with those to `others`."""
-        asked = {bay.name: Asked(request) for bay in bays}
+    def _ask(
+        self, bays: Sequence[BayRunner], make: Callable[[], Asked], others: Mapping[str, Cause] | None = None
+    ) -> Later:
+        """Pass a request to each bay; their answers come later, "" means yes, with those to `others`."""
+        asked = {bay.name: make() for bay in bays}
         for bay in bays:
             bay.ask(asked[bay.name])
             self._wake(self._bays.index(bay))
+        model = make()
         end_s = self._clock() + ANSWER_S
         late = Cause("no_answer")
 
@@ -105,11 +124,13 @@ class RequestHandler:
             if not all(one.done.is_set() for one in asked.values()) and self._clock() < end_s:
                 return None
             answers = {name: one.answer if one.done.is_set() else late for name, one in asked.items()}
-            return self._results({**answers, **(others or {})})
+            return self._results({**answers, **(others or {})}, model.request, model.asker)
 
         return results
 
-    def _results(self, answers: Mapping[str, Cause | None]) -> Answer:
+    def _results(self, answers: Mapping[str, Cause | None], verb: str, asker: Asker) -> Answer:
+        for name, answer in answers.items():
+            self._log.write(name, str(verb), asker, answer)
         return {
             "language": self._language,
             "results": {name: say(answer, self._language) for name, answer in answers.items()},

@@ -12,6 +12,7 @@ from typing import cast
 
 from orchestrator.errors import NoServiceError, ServiceError, UsageError
 from orchestrator.lastresort.asking import ask
+from orchestrator.lastresort.signing import signed
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain, said
 from orchestrator.service.chosen import Chosen, choose, is_plain, unknown
@@ -27,8 +28,6 @@ STOPS = ("stop", "pause")
 STANDBY_S, LOOK_S = 4.0, 0.1
 #: The causes of names that no bay has.
 UNKNOWN = ("bay_unknown", "bays_unknown")
-#: What a request may take besides its names.
-FRAME = 100
 
 
 def request(arguments: argparse.Namespace) -> int:
@@ -88,12 +87,13 @@ def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answ
     """Ask the service, in as many requests as the names need."""
     verb, answers = arguments.verb, _Answers(own_language())
     words = None if arguments.all else arguments.bay
+    base = signed({"verb": verb, **_spares(arguments)}, arguments.because)
     if port is not None:
-        answers.take(ask(path, {"verb": verb, "bays": None, "port": os.path.abspath(port)}))  # noqa: PTH100 - not resolved
+        answers.take(ask(path, {**base, "bays": None, "port": os.path.abspath(port)}))  # noqa: PTH100 - not resolved
         return answers
-    if not arguments.excepted and is_plain(words or ()) and len(list(_parts(words or ()))) <= 1:
+    if not arguments.excepted and is_plain(words or ()) and len(list(_parts(words or (), base))) <= 1:
         try:
-            answers.take(ask(path, {"verb": verb, "bays": words}))
+            answers.take(ask(path, {**base, "bays": words}))
             return answers
         except ServiceError as error:
             if verb != "stop" or not _is_unknown(error.told):
@@ -104,9 +104,9 @@ def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answ
     chosen = choose(words, arguments.excepted, known)
     answers.missing += _missing(chosen, known, verb, answers.language)
     failed: ServiceError | None = None
-    for part in _parts(chosen.bays):
+    for part in _parts(chosen.bays, base):
         try:
-            answers.take(ask(path, {"verb": verb, "bays": part}))
+            answers.take(ask(path, {**base, "bays": part}))
         except ServiceError as error:
             if verb != "stop":
                 raise
@@ -114,6 +114,12 @@ def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answ
     if failed:
         raise failed
     return answers
+
+
+def _spares(arguments: argparse.Namespace) -> dict[str, bool]:
+    """Whoever names a bay means it. `--all`, or a pattern, is not meant for bays that somebody else holds."""
+    named = not arguments.all and is_plain(arguments.bay)
+    return {"spares": True} if arguments.verb == "start" and not named and not arguments.force else {}
 
 
 def _strangers(answer: Mapping[str, object]) -> list[str]:
@@ -137,11 +143,11 @@ def _missing(chosen: Chosen, known: Sequence[str], verb: str, language: str) -> 
     raise ServiceError(say(cause, language), plain(cause))
 
 
-def _parts(names: Sequence[str]) -> Iterator[list[str]]:
-    """The names in lists that each fit into one request."""
+def _parts(names: Sequence[str], base: Mapping[str, object]) -> Iterator[list[str]]:
+    """The names in lists that each fit into one request with the rest of it."""
     part: list[str] = []
     for name in names:
-        if part and len(json.dumps([*part, name])) > MAX_REQUEST - FRAME:
+        if part and len(json.dumps({**base, "bays": [*part, name]})) >= MAX_REQUEST:
             yield part
             part = []
         part.append(name)

@@ -41,6 +41,11 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
         request.add_argument("bay", nargs="*", help=f"the bays: {NAMES}")
         request.add_argument("--all", action="store_true", help="every bay of the station")
         _add_except(request)
+        _add_because(request)
+        if verb == "start":
+            request.add_argument(
+                "--force", action="store_true", help="with --all or patterns: also bays that another person has stopped"
+            )
         if verb == "reset":
             request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
@@ -50,6 +55,12 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
 def _add_except(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--except", dest="excepted", nargs="+", default=[], metavar="BAY", help="not these bays: names or patterns"
+    )
+
+
+def _add_because(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--because", default="", metavar="TEXT", help="the reason, for the journal and whoever asks why; one short line"
     )
 
 
