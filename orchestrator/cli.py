@@ -31,14 +31,15 @@ if TYPE_CHECKING:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return the exit status."""
-    arguments = _parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    arguments = _parser().parse_args(words)
     try:
         return int(arguments.run(arguments))
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 1
     except OrchestratorError as error:
-        print(f"orchestrator: {_said(error)}", file=sys.stderr)
+        print(f"orchestrator: {_said(error, arguments, words)}", file=sys.stderr)
         return 2 if isinstance(error, UsageError | HexError | NoServiceError) else 1
     except KeyboardInterrupt:
         return 130
@@ -50,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
 
 
-def _said(error: OrchestratorError) -> str:
+def _said(error: OrchestratorError, arguments: argparse.Namespace, words: Sequence[str]) -> str:
     """The message to print, in the reader's language if the error carries its cause as data."""
     from orchestrator.show import own_language
     from orchestrator.text.catalogue import say
@@ -58,6 +59,11 @@ def _said(error: OrchestratorError) -> str:
 
     if isinstance(error, CauseError):
         return say(error.cause, own_language())
+    if isinstance(error, NoServiceError):
+        from orchestrator.service.unreachable import unreachable
+
+        if cause := unreachable(error.told, getattr(arguments, "socket", None), words):
+            return say(cause, own_language())
     return said(error.told, str(error), own_language()) if isinstance(error, ServiceError) else str(error)
 
 

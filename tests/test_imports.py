@@ -275,11 +275,9 @@ SAID = frozenset({
     *(("service.verbs", said) for said in (  # the command line, and a service that cannot be reached
         "let a bay charge", "stop charging", "clear latched faults", "names, or patterns",
     )),
-    ("service.request_verb", "; to stop chargers without"),
     ("link.gpio", "used by "),  # what `probe` shows of a line
     ("service.reach", ""),  # what `check` says of a file
     ("service.bay", " in "),  # where an exception of our own was raised
-    ("service.where", ""),  # the same
 })  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
-from orchestrator.errors import NoServiceError, ServiceError, UsageError
+from orchestrator.errors import ServiceError, UsageError
 from orchestrator.lastresort.asking import ask
 from orchestrator.lastresort.signing import signed
 from orchestrator.model import Cause
@@ -35,11 +35,7 @@ def request(arguments: argparse.Namespace) -> int:
     port, verb = getattr(arguments, "port", None), arguments.verb
     _check_use(arguments, port)
     path = find_socket(arguments.socket)
-    try:
-        answers = _asked(arguments, port, path)
-    except NoServiceError as error:
-        without = "; to stop chargers without a service: orchestrator estop" if verb in STOPS else ""
-        raise NoServiceError(f"{error}{without}") from None
+    answers = _asked(arguments, port, path)
     results, missing, language = answers.results, answers.missing, answers.language
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified: dict[str, str] = {}

@@ -10,7 +10,6 @@ import pytest
 
 from orchestrator.core.memory import Operator
 from orchestrator.core.persisted import Persisted
-from orchestrator.lastresort import signing
 from orchestrator.lastresort.signing import MOST_BECAUSE, one_line, signed
 from orchestrator.model import Cause, Request, State
 from orchestrator.service.asked import Asked
@@ -90,9 +89,9 @@ def test_a_reason_is_one_printable_line_of_bounded_length(text: str, line: str) 
 
 def test_only_root_reports_for_whom(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SUDO_USER", "kim")
-    monkeypatch.setattr(signing.os, "geteuid", lambda: 0)
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
     assert signed({"verb": "stop"}, "wet floor") == {"verb": "stop", "sudo_user": "kim", "because": "wet floor"}
-    monkeypatch.setattr(signing.os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
     assert signed({"verb": "stop"}) == {"verb": "stop"}
 
 

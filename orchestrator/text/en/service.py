@@ -75,6 +75,16 @@ TEXTS: Mapping[str, str] = {
     "bays_no_list": "'bays' is a list of names, or null for all",
     "request_too_long": "a request is one line of at most {limit} bytes",
     "request_no_object": "a request is one JSON object on one line",
+    # a service that cannot be reached
+    "service_not_found": "no service found: neither --socket nor $ORCHESTRATOR_SOCKET is given, no {station} names a control "
+    "socket, and there is no {installed}; start a service (orchestrator run STATION), or name its socket: --socket PATH",
+    "service_silent": "no service answers on {socket} ({reason}), the socket named by {origin}: is it running?{other}{without}",
+    "socket_by_option": "{option}",
+    "socket_by_station": "{station}",
+    "socket_installed": "the installation",
+    "installed_answers": " The installed service has another one: --socket {socket}",
+    "estop_without": " To stop chargers without a service: orchestrator estop",
+    "socket_forbidden": "{socket}: permission denied: only {owners:and} may use it; type: {command}",
     "owner_only": "only the owner of the service may use this socket",
     "too_many_requests": "too many requests at once: ask again",
     "request_internal": "internal: {error}",

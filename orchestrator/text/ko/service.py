@@ -77,6 +77,16 @@ TEXTS: Mapping[str, str] = {
     "bays_no_list": "'bays'는 이름의 목록이거나, 전체를 뜻하는 null이어야 합니다",
     "request_too_long": "요청은 최대 {limit}바이트의 한 줄이어야 합니다",
     "request_no_object": "요청은 한 줄의 JSON 객체 하나여야 합니다",
+    # a service that cannot be reached
+    "service_not_found": "서비스를 찾을 수 없습니다: --socket도 $ORCHESTRATOR_SOCKET도 지정되지 않았고, {station} 파일에 제어 소켓이 "
+    "없으며, {installed}도 없습니다. 서비스를 시작하거나(orchestrator run STATION) 소켓을 지정하십시오: --socket PATH",
+    "service_silent": "{socket}에서 응답하는 서비스가 없습니다({reason}). 이 소켓은 {origin}에서 지정되었습니다. 서비스가 실행 중입니까?{other}{without}",
+    "socket_by_option": "{option}",
+    "socket_by_station": "{station}",
+    "socket_installed": "설치 설정",
+    "installed_answers": " 설치된 서비스의 소켓은 다릅니다: --socket {socket}",
+    "estop_without": " 서비스 없이 충전기를 정지하려면: orchestrator estop",
+    "socket_forbidden": "{socket}: 권한이 없습니다. {owners:and}만 사용할 수 있습니다. 입력할 명령: {command}",
     "owner_only": "서비스의 소유자만 이 소켓을 사용할 수 있습니다",
     "too_many_requests": "요청이 한꺼번에 너무 많습니다: 다시 요청하십시오",
     "request_internal": "내부 에러: {error}",
