@@ -50,6 +50,14 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
             request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
+    _add_reload(verbs)
+
+
+def _add_reload(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    reload = verbs.add_parser("reload", help="reread the policies; each bay adopts its own in standby")
+    _add_because(reload)
+    _add_socket(reload)
+    reload.set_defaults(run=_reload)
 
 
 def _add_except(parser: argparse.ArgumentParser) -> None:
@@ -92,3 +100,9 @@ def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.service.request_verb import request
 
     return request(arguments)
+
+
+def _reload(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.reload_verb import reload
+
+    return reload(arguments)
