@@ -17,6 +17,7 @@ from orchestrator.model import Cause
 from orchestrator.model.cause import plain, said
 from orchestrator.service.chosen import Chosen, choose, is_plain, unknown
 from orchestrator.service.client import MAX_REQUEST
+from orchestrator.service.started import not_charging, with_hint
 from orchestrator.service.where import find_socket
 from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do
 from orchestrator.text.catalogue import say
@@ -43,13 +44,19 @@ def request(arguments: argparse.Namespace) -> int:
         # A stop may be carried out and still be answered with a problem, e.g. not persisted: watch its charger as well.
         looked_at = list(results) if verb == "stop" else accepted
         unverified = _wait_for_standby(path, looked_at, language, every=arguments.all)
-    refused = [Cause.of("bay_refused", bay=bay, why=refusal) for bay, refusal in results.items() if refusal]
+    refused = [
+        with_hint(Cause.of("bay_refused", bay=bay, why=refusal), answers.causes.get(bay) if verb == "start" else None)
+        for bay, refusal in results.items()
+        if refusal
+    ]
     for line in (*unverified.values(), *(say(one, language) for one in refused + missing)):
         print(line, file=sys.stderr, flush=True)  # what to do, before anything else
     for bay in accepted:
         verified = verb in STOPS and bay not in unverified
         done = Cause.of("accepted_verified" if verified else "accepted", bay=bay, verb=verb)
-        print(say(done, language))
+        print(say(done, language), flush=True)
+    for line in not_charging(path, accepted, language) if verb == "start" else ():
+        print(line)
     return 1 if unverified or missing or any(results.values()) else 0
 
 
@@ -71,9 +78,11 @@ class _Answers:
     language: str
     results: dict[str, str] = field(default_factory=dict)
     missing: list[Cause] = field(default_factory=list)
+    causes: dict[str, object] = field(default_factory=dict)  #: of the refusals
 
     def take(self, answer: Mapping[str, object]) -> None:
         self.language = language_of_answer(answer, self.language)
+        self.causes |= cast("Mapping[str, object]", answer.get("causes", {}))
         told, strangers = refusals(answer, self.language), _strangers(answer)
         self.missing += [said(told[name]) for name in strangers]
         self.results |= {name: why for name, why in told.items() if name not in strangers}
