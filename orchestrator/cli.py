@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator import __version__
+from orchestrator.commands import with_examples
 from orchestrator.errors import (
     CauseError,
     ConfigError,
@@ -23,6 +24,7 @@ from orchestrator.errors import (
     UsageError,
 )
 from orchestrator.service.verbs import add_service_verbs
+from orchestrator.shell_verbs import add_shell_verbs
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
 if TYPE_CHECKING:
@@ -77,12 +79,17 @@ def _parser() -> argparse.ArgumentParser:
     add_service_verbs(verbs)
     _add_estop(verbs)
     _add_tool_verbs(verbs)
-    return parser
+    add_shell_verbs(verbs, _parser)
+    return with_examples(parser)
 
 
 def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Only for the list of verbs: `__main__` runs it before importing any of this."""
-    verbs.add_parser("estop", help="stop every charger now; needs no running service", add_help=False)
+    """Only for help, manual and completion: `__main__` runs it before importing any of this."""
+    estop = verbs.add_parser("estop", help="stop every charger now; needs no running service")
+    estop.add_argument("station", nargs="?", help="the station file (default: the one that is found)")
+    estop.add_argument("--port", nargs="+", metavar="PATH", help="these ports, without a station file or besides it")
+    estop.add_argument("--socket", metavar="PATH", help="the service's control socket, if it is not the station file's")
+    estop.add_argument("--leave-held", action="store_true", help="leave alone ports that a running service holds")
 
 
 def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
