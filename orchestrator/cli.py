@@ -13,7 +13,6 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from orchestrator import __version__
-from orchestrator.commands import with_examples
 from orchestrator.errors import (
     CauseError,
     ConfigError,
@@ -24,7 +23,8 @@ from orchestrator.errors import (
     UsageError,
 )
 from orchestrator.service.verbs import add_service_verbs
-from orchestrator.shell_verbs import add_shell_verbs
+from orchestrator.shell.commands import with_examples
+from orchestrator.shell.verbs import add_shell_verbs
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
 if TYPE_CHECKING:

@@ -51,8 +51,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
         "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",
-        "link", "model", "protocol", "service", "show", "sim", "text", "workbench",
+        "link", "model", "protocol", "service", "shell", "show", "sim", "text", "workbench",
     ),
+    "shell": ("lastresort.asking", "service.where", "workbench.verbs"),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
 #: Third-party library → its owners; nobody else imports it, and no other library is imported.
@@ -69,6 +70,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "pygraphviz": ("workbench.draw.drawing",),
     "rich": ("demo",),
     "serial": ("link.serial",),
+    "shtab": ("shell.completion",),
     "transitions": ("core.machine",),
     "yaml": ("config",),
 }

@@ -2,7 +2,7 @@
 
 import argparse
 
-from orchestrator.commands import actions_of, verbs_of
+from orchestrator.shell.commands import actions_of, verbs_of
 
 SHELLS = ("bash", "zsh", "fish")
 #: The arguments that are files, and those that are names of bays, which the running service knows.

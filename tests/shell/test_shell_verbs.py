@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import _parser, main
-from orchestrator.commands import actions_of, verbs_of
-from orchestrator.completion import SHELLS, script
-from orchestrator.examples import EXAMPLES
 from orchestrator.lastresort.estop_options import USAGE, Options
-from orchestrator.manpage import manpage
 from orchestrator.service.reception import Answer
+from orchestrator.shell.commands import actions_of, verbs_of
+from orchestrator.shell.completion import SHELLS, script
+from orchestrator.shell.examples import EXAMPLES
+from orchestrator.shell.manpage import manpage
 from tests.service.control_bench import listening
 
 VERBS = verbs_of(_parser())

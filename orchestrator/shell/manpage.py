@@ -5,8 +5,8 @@ import re
 from collections.abc import Iterator
 
 from orchestrator import __version__
-from orchestrator.commands import abouts_of, actions_of, explained, verbs_of
-from orchestrator.examples import EXAMPLES
+from orchestrator.shell.commands import abouts_of, actions_of, explained, verbs_of
+from orchestrator.shell.examples import EXAMPLES
 
 EXIT = (
     ("0", "It worked."),

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from typing import cast
 
-from orchestrator.completion import NAMES, SHELLS
+from orchestrator.shell.completion import NAMES, SHELLS
 
 MakeParser = Callable[[], argparse.ArgumentParser]
 
@@ -19,7 +19,7 @@ def add_shell_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 
 def _completion(arguments: argparse.Namespace, make: MakeParser) -> int:
-    from orchestrator.completion import script
+    from orchestrator.shell.completion import script
     from orchestrator.workbench.verbs import missing
 
     if arguments.shell == NAMES:
@@ -42,7 +42,7 @@ def _names() -> int:
 
 
 def _manpage(make: MakeParser) -> int:
-    from orchestrator.manpage import manpage
+    from orchestrator.shell.manpage import manpage
 
     print(manpage(make()), end="")
     return 0
