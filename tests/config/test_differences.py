@@ -6,7 +6,7 @@ import pytest
 
 from orchestrator.config.differences import MOST_SHOWN, differences
 from orchestrator.config.load import load_policy
-from orchestrator.keys import Range
+from orchestrator.keys import Range, Source
 from tests.service.bench import the_bay
 
 
@@ -22,6 +22,7 @@ from tests.service.bench import the_bay
 )
 def test_a_key_has_its_values_before_and_after(changes: dict[str, str], found: list[str]) -> None:
     before, after = load_policy("li-ion-48v"), load_policy("li-ion-48v", changes=changes)
+    after = replace(after, source=Source("elsewhere"))
     assert [f"{key} {old} → {new}" for key, old, new in differences(before, after)] == found
 
 

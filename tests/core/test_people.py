@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.core.operator import MOST_PEOPLE, PAUSED, STOPPED, is_own, pause, stopped
+from orchestrator.core.memory import FaultMemory, Memory, with_values
+from orchestrator.core.operator import MOST_PEOPLE, PAUSED, STOPPED, handle_request, is_own, pause, stopped
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Alarm, Cause, Request, State
 from orchestrator.model.cause import parts
@@ -51,11 +52,13 @@ def test_nobody_s_stop_is_lost_by_another_s() -> None:
 
 
 def test_a_reset_leaves_a_person_s_stop_and_a_start_ends_it() -> None:
+    tripped = {"status_trip": FaultMemory(raised_s=0.0, clean_s=0.0, latched=True, cause=Cause("unfinished"))}
+    for hold, after in ((by("kim"), by("kim")), (None, by("lee", "reset_by")), (STOPPED, by("lee", "reset_by"))):
+        memory = with_values(Memory(), hold=hold, faults=tripped)
+        heard = handle_request(memory, Request.RESET, 1000.0, by=by("lee", "reset_by"))
+        assert (heard.refusal, heard.operator.hold) == (None, after)
     world = World().charging()
     world.tick(request=Request.STOP, asked_by=by("kim"))
-    world.until(State.HELD)
-    world.tick(request=Request.RESET, asked_by=by("lee", "reset_by"))
-    assert world.memory.operator.hold == by("kim")
     world.tick(request=Request.START, asked_by=by("lee", "started_by"))
     assert world.memory.operator.hold is None
 

@@ -59,6 +59,7 @@ def test_the_manual_has_every_verb_and_option(tmp_path: Path) -> None:
     )
     assert done.stderr == ""
     assert [name for name in [*VERBS, *OPTIONS] if name not in done.stdout and name != "--help"] == []
+    assert [name for name in VERBS if f"\n   {name}\n" not in done.stdout] == []
     assert "orchestrator stop bay-1 --because 'wet floor'" in done.stdout.replace("’", "'").replace("‘", "'")
 
 
