@@ -23,6 +23,8 @@ from orchestrator.errors import (
     UsageError,
 )
 from orchestrator.service.verbs import add_service_verbs
+from orchestrator.shell.commands import with_examples
+from orchestrator.shell.verbs import add_shell_verbs
 from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
 
 if TYPE_CHECKING:
@@ -31,14 +33,15 @@ if TYPE_CHECKING:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return the exit status."""
-    arguments = _parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    arguments = _parser().parse_args(words)
     try:
         return int(arguments.run(arguments))
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 1
     except OrchestratorError as error:
-        print(f"orchestrator: {_said(error)}", file=sys.stderr)
+        print(f"orchestrator: {_said(error, arguments, words)}", file=sys.stderr)
         return 2 if isinstance(error, UsageError | HexError | NoServiceError) else 1
     except KeyboardInterrupt:
         return 130
@@ -50,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 1
 
 
-def _said(error: OrchestratorError) -> str:
+def _said(error: OrchestratorError, arguments: argparse.Namespace, words: Sequence[str]) -> str:
     """The message to print, in the reader's language if the error carries its cause as data."""
     from orchestrator.show import own_language
     from orchestrator.text.catalogue import say
@@ -58,6 +61,11 @@ def _said(error: OrchestratorError) -> str:
 
     if isinstance(error, CauseError):
         return say(error.cause, own_language())
+    if isinstance(error, NoServiceError):
+        from orchestrator.service.unreachable import unreachable
+
+        if cause := unreachable(error.told, getattr(arguments, "socket", None), words):
+            return say(cause, own_language())
     return said(error.told, str(error), own_language()) if isinstance(error, ServiceError) else str(error)
 
 
@@ -71,12 +79,17 @@ def _parser() -> argparse.ArgumentParser:
     add_service_verbs(verbs)
     _add_estop(verbs)
     _add_tool_verbs(verbs)
-    return parser
+    add_shell_verbs(verbs, _parser)
+    return with_examples(parser)
 
 
 def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Only for the list of verbs: `__main__` runs it before importing any of this."""
-    verbs.add_parser("estop", help="stop every charger now; needs no running service", add_help=False)
+    """Only for help, manual and completion: `__main__` runs it before importing any of this."""
+    estop = verbs.add_parser("estop", help="stop every charger now; needs no running service")
+    estop.add_argument("station", nargs="?", help="the station file (default: the one that is found)")
+    estop.add_argument("--port", nargs="+", metavar="PATH", help="these ports, without a station file or besides it")
+    estop.add_argument("--socket", metavar="PATH", help="the service's control socket, if it is not the station file's")
+    estop.add_argument("--leave-held", action="store_true", help="leave alone ports that a running service holds")
 
 
 def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

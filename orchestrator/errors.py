@@ -57,6 +57,10 @@ class UsageError(OrchestratorError):
     """The command line is invalid; the text says what is missing."""
 
 
+class NoSocketError(CauseError, UsageError):
+    """Nothing names the service that a verb is for."""
+
+
 class HexError(OrchestratorError):
     """A person's input is not hexadecimal; the text names the characters and their positions."""
 

@@ -22,7 +22,7 @@ def test_every_extra_has_packages() -> None:
     extras = {
         line.partition("extra ==")[2].strip(" '\"") for line in requires(DISTRIBUTION) or () if "extra ==" in line
     }
-    assert extras == {"gpio", "demo", "workbench", "dask"}
+    assert extras == {"completion", "gpio", "demo", "workbench", "dask"}
     assert not [extra for extra in extras if DISTRIBUTION in install_extra(extra)]
 
 

@@ -52,8 +52,9 @@ EDGES: dict[str, tuple[str, ...]] = {
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
         "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",
-        "link", "model", "protocol", "service", "show", "sim", "text", "workbench",
+        "link", "model", "protocol", "service", "shell", "show", "sim", "text", "workbench",
     ),
+    "shell": ("lastresort.asking", "service.where", "workbench.verbs"),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
 }  # fmt: skip
 #: Third-party library → its owners; nobody else imports it, and no other library is imported.
@@ -70,6 +71,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "pygraphviz": ("workbench.draw.drawing",),
     "rich": ("demo",),
     "serial": ("link.serial",),
+    "shtab": ("shell.completion",),
     "transitions": ("core.machine",),
     "yaml": ("config",),
 }
@@ -276,12 +278,10 @@ SAID = frozenset({
     *(("service.verbs", said) for said in (  # the command line, and a service that cannot be reached
         "let a bay charge", "stop charging", "clear latched faults", "names, or patterns",
     )),
-    ("service.request_verb", "; to stop chargers without"),
     ("link.gpio", "used by "),  # what `probe` shows of a line
     ("service.reach", ""),  # what `check` says of a file
     ("service.journal_files", ""),  # the same, of a journal
     ("service.bay", " in "),  # where an exception of our own was raised
-    ("service.where", ""),  # the same
 })  # fmt: skip
 
 

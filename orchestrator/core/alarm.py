@@ -2,7 +2,7 @@
 
 from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.memory import Memory
-from orchestrator.core.operator import OWN
+from orchestrator.core.operator import is_own
 from orchestrator.core.states import UNSEEN
 from orchestrator.model import ActiveFault, Alarm, State
 
@@ -28,4 +28,4 @@ def _waits(memory: Memory, faults: Faults) -> bool:
     if memory.state is not State.HELD:
         return memory.state is State.TRIPPED
     by_fault = any(ROW[fault.id].clear is Clear.OPERATOR for fault in faults)
-    return by_fault or memory.operator.hold not in (None, *OWN)
+    return by_fault or (memory.operator.hold is not None and not is_own(memory.operator.hold))

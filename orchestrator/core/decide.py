@@ -62,7 +62,7 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
         memory = changed(memory, stalled_s=now_s)
     f = Facts.of(now_s, snapshot, memory, rules)
     f = update_history(f, now_s - memory.last_s if memory.last_s is not None else 0.0)
-    f, refusal = _requested(f, snapshot.request, snapshot.not_persisted)
+    f, refusal = _requested(f, snapshot)
     known = latches.update(f)
     if known is not f.memory.faults:
         f = f.with_memory(changed(f.memory, faults=known))
@@ -79,11 +79,14 @@ def decide(now_s: float, snapshot: Snapshot, memory: Memory, rules: Rules) -> tu
     return decision, memory
 
 
-def _requested(f: Facts, request: Request | None, not_persisted: Cause | None) -> tuple[Facts, Cause | None]:
+def _requested(f: Facts, snapshot: Snapshot) -> tuple[Facts, Cause | None]:
     """Carry out the request; returns why it was refused, if it was."""
-    refusal: Cause | None = None
+    request, refusal = snapshot.request, None
     if request is not None:
-        heard = handle_request(f.memory, request, f.now_s, not_persisted, f.rules.bay.name, at_rest=stands_by(f))
+        heard = handle_request(
+            f.memory, request, f.now_s, snapshot.not_persisted, f.rules.bay.name,
+            at_rest=stands_by(f), by=snapshot.asked_by,
+        )  # fmt: skip
         refusal = heard.refusal
         f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
     if (hold := shared(f.charger)) is not None:

@@ -38,7 +38,9 @@ def carry_on(now_s: float, snapshot: Snapshot, memory: Memory, error: str, bay: 
         last_s=now_s,
         closed=closes(state, closed=memory.closed, standby=False),
         faults=_latched(memory, now_s, error),
-        operator=operator.stopped(memory.operator) if snapshot.request is Request.STOP else memory.operator,
+        operator=operator.stopped(memory.operator, snapshot.asked_by)
+        if snapshot.request is Request.STOP
+        else memory.operator,
         stop=safestop.failed(memory.stop, now_s, cause),
         stage=stage.not_ready(memory.stage),
         sequence=sequence.ends(memory.sequence),

@@ -51,7 +51,8 @@ class Operator:
     """What an operator has asked of the bay."""
 
     hold: Cause | None = event(None)  #: why a person must start before the next charge; None: free to go
-    paused: bool = event(default=False)  #: the operator paused the bay
+    paused: bool = event(default=False)  #: the operator paused the bay …
+    paused_by: Cause | None = event(None)  #: … with this name; None: unknown
     resets: tuple[tuple[float, str], ...] = event(())  #: (when, fault id) of a person's resets in the last hour
 
 

@@ -12,7 +12,7 @@ from orchestrator.core.finish import finished, goes_full
 from orchestrator.core.history import battery, stage
 from orchestrator.core.history import session as sessions
 from orchestrator.core.machine import Trigger
-from orchestrator.core.operator import RESET
+from orchestrator.core.operator import RESET, pause
 from orchestrator.core.outofcontrol import out_of_control
 from orchestrator.core.resting import absent, ending, held, offline, resting_place
 from orchestrator.core.safestop import LOST_S, gives_up, verified
@@ -59,7 +59,7 @@ def next_transition(f: Facts, faults: Faults) -> Next:
 def _energised(f: Facts, faults: Faults) -> Next:
     if faults and faults[0].effect >= Effect.PAUSE:
         return Next(Trigger.STOP, faults[0].cause)
-    asked = f.memory.operator.hold or ending(f) or (Cause("operator_pause") if f.memory.operator.paused else None)
+    asked = f.memory.operator.hold or ending(f) or pause(f.memory.operator)
     if asked is not None:
         return Next(Trigger.STOP, asked)
     if f.memory.state is State.CHARGING:
@@ -165,7 +165,7 @@ def _rest(f: Facts, faults: Faults) -> Next:
     if state is State.TRIPPED:
         if trigger is Trigger.TRIP:
             return Next(None, why)
-        return Next(Trigger.RESET, held(f, RESET))
+        return Next(Trigger.RESET, held(f, f.memory.operator.hold or RESET))
     if state is State.QUALIFYING and trigger is Trigger.QUALIFY:
         return _qualifying(f)
     if trigger is Trigger.QUALIFY and state not in STARTABLE:

@@ -16,12 +16,17 @@ from orchestrator.core.parts import changed
 from orchestrator.core.safestop import LASTS_S
 from orchestrator.core.states import AT_WORK
 from orchestrator.model import Cause, Request, State
-from orchestrator.model.cause import together
+from orchestrator.model.cause import parts, together
 
-STOPPED = Cause("operator_stop")
-RESET = Cause("operator_reset")
+STOPPED, PAUSED, RESET = Cause("operator_stop"), Cause("operator_pause"), Cause("operator_reset")
+#: The same with the person's name: who, when, why. They are made by the service; nothing here depends on the person.
+NAMED = frozenset({"stopped_by", "estopped_by", "paused_by"})
 #: The holds that an operator has caused.
-OWN = frozenset({STOPPED, RESET})
+OWN = frozenset({STOPPED.id, RESET.id, "reset_by", *NAMED})
+#: Those that a later reset replaces; a named stop stays until a start.
+RESETTABLE = frozenset({STOPPED.id, RESET.id, "reset_by"})
+#: No more stops, or pauses, of different people are remembered at a time.
+MOST_PEOPLE = 5
 OUT_OF_CONTROL = Cause.of("out_of_control", lasts_s=LASTS_S)
 
 
@@ -40,6 +45,7 @@ class Told:
 
     bay: str  #: the name for commands
     at_rest: bool
+    by: Cause | None  #: who requests it, and why, as the cause that this becomes
 
 
 def handle_request(
@@ -50,21 +56,39 @@ def handle_request(
     bay: str = "BAY",
     *,
     at_rest: bool = False,
+    by: Cause | None = None,
 ) -> Heard:
     """Carry out the request or refuse it.
 
-    `bay` is the name for commands; `at_rest`: the charger is in standby, verified.
+    `bay` is the name for commands; `at_rest`: the charger is in standby, verified; `by` is who requests it, if known.
     A request that would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never
     is.
     """
     if not_persisted is not None and request in (Request.START, Request.RESET):
         return _refused(memory, Cause.of("not_done", advice="not_persisted", problem=not_persisted))
-    return VERBS[request](memory, now_s, Told(bay, at_rest))
+    return VERBS[request](memory, now_s, Told(bay, at_rest, by))
 
 
-def stopped(known: Operator) -> Operator:
+def stopped(known: Operator, by: Cause | None = None) -> Operator:
     """The operator's part of the memory after a stop."""
-    return changed(known, hold=STOPPED)
+    return changed(known, hold=_joined(known.hold, by or STOPPED))
+
+
+def is_own(hold: Cause) -> bool:
+    """Whether an operator, and nothing else, has caused this hold."""
+    return all(one.id in OWN for one in parts(hold))
+
+
+def pause(known: Operator) -> Cause | None:
+    """The operator's pause, if there is one."""
+    return (known.paused_by or PAUSED) if known.paused else None
+
+
+def _joined(before: Cause | None, new: Cause) -> Cause:
+    """This stop or pause, after those of other people that hold the bay as well."""
+    known = () if before is None else parts(before)
+    others = [one for one in known if one.id in NAMED and one.param("who") != new.param("who")]
+    return together([*others[1 - MOST_PEOPLE :], new])
 
 
 def held_back(known: Operator, why: Cause) -> Operator:
@@ -76,17 +100,18 @@ def _refused(memory: Memory, why: Cause) -> Heard:
     return Heard(memory.operator, memory.faults, why)
 
 
-def _stop(memory: Memory, _now_s: float, _told: Told) -> Heard:
-    return Heard(stopped(memory.operator), memory.faults)
+def _stop(memory: Memory, _now_s: float, told: Told) -> Heard:
+    return Heard(stopped(memory.operator, told.by), memory.faults)
 
 
-def _pause(memory: Memory, _now_s: float, _told: Told) -> Heard:
+def _pause(memory: Memory, _now_s: float, told: Told) -> Heard:
     latched = tuple(name for name, fault in memory.faults.items() if fault.latched and fault.raised_s is not None)
     if latched:  # a reset leads to a start, which would end the pause
         return _refused(memory, Cause.of("reset_first", faults=latched))
     if memory.operator.hold:
         return _refused(memory, Cause.of("not_running", what=memory.operator.hold))
-    return Heard(changed(memory.operator, paused=True), memory.faults)
+    by = _joined(memory.operator.paused_by, told.by or PAUSED)
+    return Heard(changed(memory.operator, paused=True, paused_by=None if by == PAUSED else by), memory.faults)
 
 
 def _start(memory: Memory, now_s: float, told: Told) -> Heard:
@@ -98,7 +123,7 @@ def _start(memory: Memory, now_s: float, told: Told) -> Heard:
     faults, _ = latches.release(before, now_s, by_reset=False)
     if not (known.hold or known.paused) and len(faults) == len(before) and memory.state not in AT_WORK:
         return _refused(memory, Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause))
-    return Heard(changed(known, hold=None, paused=False), faults)
+    return Heard(changed(known, hold=None, paused=False, paused_by=None), faults)
 
 
 def _reset(memory: Memory, now_s: float, told: Told) -> Heard:
@@ -114,7 +139,7 @@ def _reset(memory: Memory, now_s: float, told: Told) -> Heard:
     resets = tuple(reset for reset in known.resets if now_s - reset[0] < RESETS_S)
     resets += tuple((now_s, name) for name in cleared)
     # in any state, even while the stop is being verified: the way on is a start, which ends any other hold as well
-    hold = RESET if known.hold is None or known.hold in OWN else known.hold
+    hold = (told.by or RESET) if known.hold is None or known.hold.id in RESETTABLE else known.hold
     return Heard(changed(known, hold=hold, resets=resets), faults)
 
 

@@ -42,6 +42,7 @@ class Persisted:
     uncontrollable: Age | None = None  #: how long a charger out of control has not obeyed its stop; None: it is not
     hold: Cause | None = None  #: why a person must start; as in the core's memory
     paused: bool = False
+    paused_by: Cause | None = None  #: who paused it, if known
     faults: Mapping[str, PersistedFault] = field(default_factory=dict)
     resets: tuple[tuple[Age, str], ...] = ()
     session: Session | None = None  #: the open charge with all its counters; `started_s` is an age
@@ -70,6 +71,7 @@ class Persisted:
             uncontrollable=_uncontrollable(memory, now_s),
             hold=memory.operator.hold,
             paused=memory.operator.paused,
+            paused_by=memory.operator.paused_by,
             faults=faults,
             resets=tuple((now_s - t_s, name) for t_s, name in memory.operator.resets),
             session=replace(session, started_s=now_s - session.started_s) if session is not None else None,
@@ -86,7 +88,7 @@ class Persisted:
         )
         resets = tuple(name for _, name in self.resets)
         known = (self.uncontrollable is not None, self.session is not None, self.full_pct is None)
-        return self.running, self.hold, self.paused, faults, resets, *known
+        return self.running, self.hold, self.paused, self.paused_by, faults, resets, *known
 
     def aged(self, seconds: float, unseen_s: float | None = None) -> "Persisted":
         """The same state this much later; `unseen_s` if the time without counting differs from that."""
@@ -138,6 +140,7 @@ class Persisted:
             stopping_s=out_s,
             hold=self.hold or (together(others) if others else None),
             paused=self.paused,
+            paused_by=self.paused_by,
             faults=faults,
             resets=tuple((now_s - age_s, name) for age_s, name in self.resets),
             session=replace(session, started_s=now_s - session.started_s) if session is not None else None,

@@ -8,7 +8,7 @@ from orchestrator.core.faults import ROW, Clear
 from orchestrator.core.finish import full_due, goes_on, target
 from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import with_values
-from orchestrator.core.operator import OWN
+from orchestrator.core.operator import is_own, pause
 from orchestrator.core.outofcontrol import problem
 from orchestrator.core.states import DONE
 from orchestrator.model import ActiveFault, Cause, Effect, State
@@ -51,7 +51,7 @@ def _waits(f: Facts, faults: Faults) -> Found:
 def _told(f: Facts, fault: ActiveFault) -> Cause:
     """The fault, and a hold that no operator has caused: what was wired where can be why the fault is here."""
     hold = f.memory.operator.hold
-    return fault.told if hold is None or hold in OWN else together([fault.told, hold])
+    return fault.told if hold is None or is_own(hold) else together([fault.told, hold])
 
 
 def _holds(f: Facts, _faults: Faults) -> Found:
@@ -67,7 +67,8 @@ def _ends(f: Facts, _faults: Faults) -> Found:
 
 
 def _pauses(f: Facts, _faults: Faults) -> Found:
-    return (Trigger.SUSPEND, held(f, Cause("operator_pause"))) if f.memory.operator.paused else None
+    why = pause(f.memory.operator)
+    return (Trigger.SUSPEND, held(f, why)) if why is not None else None
 
 
 def absent(f: Facts, _faults: Faults = ()) -> Found:

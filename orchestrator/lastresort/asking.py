@@ -23,12 +23,17 @@ def ask(path: Path, request: Mapping[str, object], timeout_s: float = 5.0) -> di
     try:
         answer = _exchange(path, request, end_s)
     except PermissionError:
-        raise NoServiceError(f"{path}: permission denied: only {_owner(path)} and root may use it (sudo)") from None
+        owners = _owners(path)
+        raise NoServiceError(
+            f"{path}: permission denied: only {' and '.join(owners)} may use it (sudo)",
+            _cause("socket_forbidden", socket=str(path), owners=owners),
+        ) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error) or "no answer"
         raise NoServiceError(
             f"no service answers on {path} ({reason}): is it running, and is this its control.socket? "
-            "Name it with --socket or $ORCHESTRATOR_SOCKET"
+            "Name it with --socket or $ORCHESTRATOR_SOCKET",
+            _cause("service_silent", socket=str(path), reason=reason),
         ) from None
     if not isinstance(answer, dict) or not answer.get("ok"):
         why = answer.get("error") if isinstance(answer, dict) else f"what answers on {path} is no service of this kind"
@@ -72,9 +77,20 @@ def _read_line(client: socket.socket, end_s: float) -> bytes:
     return bytes(data)
 
 
-def _owner(path: Path) -> str:
-    """The socket's owner, for people; the directory may not even let us look."""
-    try:
-        return f"its owner, {pwd.getpwuid(path.stat().st_uid).pw_name},"
-    except (OSError, KeyError):
-        return "the service's own user"
+def _cause(id_: str, **params: object) -> dict[str, object]:
+    """A cause as a service would send it."""
+    return {"id": id_, "params": params, "key": "", "place": "", "advice": ""}
+
+
+def _owners(path: Path) -> list[str]:
+    """Who may use the socket: its owner, or that of the closed directory which hides it, and root."""
+    for place in (path, *path.parents):
+        try:
+            uid = place.stat().st_uid
+        except OSError:
+            continue
+        try:
+            return list(dict.fromkeys((pwd.getpwuid(uid).pw_name, "root")))
+        except KeyError:
+            return [f"uid {uid}", "root"]
+    return ["root"]

@@ -16,6 +16,14 @@ itself if a charger does not obey.
   --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or the station file's)
   --leave-held     leave alone ports that a running service holds, and tell it nothing
 
+examples:
+  orchestrator estop
+      stop every charger of the station that is found, now
+  orchestrator estop /etc/orchestrator/station.yaml
+      of this station
+  orchestrator estop --port /dev/charger/bay-1
+      without any file
+
 Exit status 0: every charger was verified in standby; 1: not every one, or there may be more; 2: usage error.
 """
 #: systemd's $SERVICE_RESULT for ExecStopPost= (systemd.exec) if its watchdog has killed the guardian: the ports are

@@ -15,6 +15,7 @@ from typing import Any
 from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.lastresort.port_owner import services
+from orchestrator.lastresort.signing import signed
 
 #: After this long without an answer, the service is asked again.
 ANSWER_S = 0.5
@@ -128,7 +129,7 @@ class Service:
             self.told.set()  # a service that starts now stops its chargers first anyway
             return False
         bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
-        results = ask(self.path, {"verb": "stop", "bays": bays}, ANSWER_S)["results"]
+        results = ask(self.path, signed({"verb": "stop", "bays": bays, "means": "estop"}), ANSWER_S)["results"]
         answers = dict(results) if isinstance(results, Mapping) else {}
         refused = [f"{name}: {answer}" for name, answer in answers.items() if answer]
         held = ", ".join(name for name, answer in answers.items() if not answer)

@@ -70,6 +70,12 @@ def without_then(cause: Cause, *, advice: bool = True) -> Cause:
     return Cause(cause.id, params, cause.key, cause.place, cause.advice if advice else "")
 
 
+def parts(cause: Cause) -> tuple[Cause, ...]:
+    """The causes that were put together; a single one is its own only part."""
+    whats = cause.param("whats") if cause.id == SEVERAL else None
+    return tuple(one for one in whats or (cause,) if isinstance(one, Cause))
+
+
 def said(text: str) -> Cause:
     """A sentence of which nobody knows more: one from before there were causes, or of no account."""
     return Cause.of(SAID, text=text)

@@ -42,6 +42,7 @@ class Snapshot:
     )
     moves: str = ""  #: the other bay whose BMU saw the first amperes of this bay's charger, if that happened
     running_persisted: bool = True  #: the disk records that this bay's charger may be running
+    asked_by: Cause | None = None  #: who made the request, when and why, as the cause that it becomes
 
 
 class State(StrEnum):

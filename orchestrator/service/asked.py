@@ -4,17 +4,33 @@ from collections.abc import Callable
 from itertools import takewhile
 from threading import Event, Lock
 
+from orchestrator.core.memory import Memory
 from orchestrator.model import Cause, Request
+from orchestrator.service.asker import NOBODY, Asker, held_by_others
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 
 
 class Asked:
-    """`answer` is valid once `done` is set: None means yes."""
+    """`answer` is valid once `done` is set: None means yes. `spares`: a bay that somebody else holds is left alone."""
 
-    def __init__(self, request: Request) -> None:
-        self.request = request
+    def __init__(self, request: Request, asker: Asker = NOBODY, *, spares: bool = False) -> None:
+        self.request, self.asker, self.spares = request, asker, spares
         self.answer: Cause | None = None
         self.done = Event()
+
+    @property
+    def by(self) -> Cause | None:
+        """Who asks, and why, as the core takes it."""
+        return self.asker.cause(self.request)
+
+    def is_like(self, other: "Asked") -> bool:
+        """Whether one decision answers both."""
+        return (self.request, self.asker, self.spares) == (other.request, other.asker, other.spares)
+
+    def spared(self, memory: Memory | None, bay: str) -> Cause | None:
+        """Why the bay is left alone, if it is."""
+        what = held_by_others(memory.operator, self.asker) if self.spares and memory is not None else None
+        return Cause.of("held_by_others", what=what, bay=bay) if what is not None else None
 
 
 class Requests:
@@ -40,7 +56,7 @@ class Requests:
     def take(self) -> list[Asked]:
         """The next request, with its consecutive repetitions: one decision answers all of them."""
         with self._lock:
-            taken = list(takewhile(lambda one: one.request is self._asked[0].request, self._asked))
+            taken = list(takewhile(lambda one: one.is_like(self._asked[0]), self._asked))
             del self._asked[: len(taken)]
             return taken
 

@@ -63,6 +63,7 @@ class BayRunner:
         self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
         self._requests = Requests()
         self._internal = ""
+        self._by: Cause | None = None  # who made the request that is being decided
 
     @property
     def verified(self) -> bool:
@@ -131,15 +132,17 @@ class BayRunner:
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
         asked, before = self._requests.take(), self._revision
+        spared = asked[0].spared(self._memory, self.name) if asked else None
+        request, self._by = (asked[0].request, asked[0].by) if asked and spared is None else (None, None)
         try:
-            self._step(now_s, asleep_s, asked[0].request if asked else None)
+            self._step(now_s, asleep_s, request)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
             self._charger.command(STOP)
-            self._failed(error, now_s, asked[0].request if asked else None)
+            self._failed(error, now_s, request)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
         for one in asked:
             answer, changed = self.decision.answer if self.decision else None, self._revision != before
-            answer = WallClock(now_s, time()).told(answer)
+            answer = WallClock(now_s, time()).told(spared or answer)
             self._answers.give(one, answer, self._revision, now_s, changed=changed)
         self._answers.look(now_s)
 
@@ -151,7 +154,7 @@ class BayRunner:
             self._say(Cause.of("bay_internal", bay=self.name, error=internal))
         self._internal, self.last_s, self.due_s = internal, now_s, now_s + TICK_S
         try:
-            snapshot, memory = replace(self._snapshot, request=request), self._memory
+            snapshot, memory = replace(self._snapshot, request=request, asked_by=self._by), self._memory
             memory = memory or self._store.past(self.place).memory(now_s)
             self.decision, self._memory = carry_on(now_s, snapshot, memory, internal, self.name)
             self._keep(self._memory, now_s)
@@ -207,6 +210,7 @@ class BayRunner:
             waits=self._starts.waits(self.name, now_s),
             moves=self._starts.moves(self.name),
             running_persisted=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
+            asked_by=self._by,
         )
         if self._contactor is not None:
             connected, problem = self._contactor.connects(reading), self._contactor.problem

@@ -22,6 +22,7 @@ class Client:
     def __init__(self, connection: socket.socket, now_s: float) -> None:
         connection.settimeout(0)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
+        self.uid = -1  #: the user at the other end, once `peer` was called
         self.line = b""  #: its request, once complete
         self.request: Mapping[str, object] = {}
         self.heard_s = now_s  #: when the last byte of its request arrived
@@ -37,8 +38,8 @@ class Client:
 
     def peer(self) -> tuple[int, int, int]:
         """The process, user and group at the other end."""
-        pid, uid, gid = struct.unpack("3i", self._connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
-        return pid, uid, gid
+        pid, self.uid, gid = struct.unpack("3i", self._connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))
+        return pid, self.uid, gid
 
     def hear(self, now_s: float) -> bool:
         """Take what has come; whether the request is complete. RequestError where it cannot become one any more."""

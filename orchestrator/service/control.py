@@ -13,6 +13,7 @@ import socket
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from math import inf
 from pathlib import Path
 from time import sleep, thread_time
@@ -20,7 +21,7 @@ from time import sleep, thread_time
 from orchestrator.errors import RequestError, StartError
 from orchestrator.model import Cause
 from orchestrator.service.client import Client, parse_request
-from orchestrator.service.reception import Handler, Reception, encode, refused
+from orchestrator.service.reception import Handler, OnRefused, Reception, encode, refused
 from orchestrator.service.socketfile import identity, listen, remove
 
 #: The maximum number of clients served at once; one more displaces the longest idle one.
@@ -50,14 +51,14 @@ class ControlSocket:
         clock: Callable[[], float],
         say: Callable[[Cause], None] = lambda _: None,
         language: str = "en",
+        on_refused: OnRefused = lambda _request, _why: None,
     ) -> None:
         self._path, self._clock, self._say, self._language = path, clock, say, language
         self._strangers, self._said_s = 0, -inf  # turned away since the last report
         self._turn_s: float | None = None  # when the present turn began
-        self._closing = False
-        self._clients: set[Client] = set()
-        self._handler = handler
-        self._reception = Reception(handler, self._reply, language)
+        self._closing, self._clients = False, set[Client]()
+        self._receive = partial(Reception, handler, self._reply, language, on_refused)
+        self._reception = self._receive()
         self._accept_s = -inf  # nobody is accepted before this
         self._selector = selectors.DefaultSelector()
         self._listener = listen(path)
@@ -106,7 +107,7 @@ class ControlSocket:
         self._complain(Cause.of("socket_internal", error=repr(error)))
         for client in tuple(self._clients):
             self._drop(client)
-        self._reception = Reception(self._handler, self._reply, self._language)
+        self._reception = self._receive()
 
     @property
     def _patience_s(self) -> float:
@@ -195,7 +196,7 @@ class ControlSocket:
                 self._write(client)
             elif client.hear(now_s):
                 self._selector.unregister(client)
-                client.request = parse_request(client.line)
+                client.request = {**parse_request(client.line), "uid": client.uid}
                 self._reception.take(client, now_s)
         except RequestError as error:
             self._refuse(client, error.cause, now_s)

@@ -12,7 +12,8 @@ from os.path import abspath, realpath
 from orchestrator.config.station import BayConfig, Rs485
 from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.model import Cause, ControlMode
-from orchestrator.model.cause import SEVERAL, together
+from orchestrator.model.cause import parts as causes
+from orchestrator.model.cause import together
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,7 @@ def shown(port: str) -> str:
 
 def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
     """The strictest combination of all of them, held for `moves` and for whatever held any of them."""
-    holds = dict.fromkeys([*moves, *(one for part in parts if part.hold is not None for one in _holds(part.hold))])
+    holds = dict.fromkeys([*moves, *(one for part in parts if part.hold is not None for one in causes(part.hold))])
     faults: dict[str, PersistedFault] = {}
     for part in parts:
         for name, fault in part.faults.items():
@@ -109,6 +110,7 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
         uncontrollable=max((one for part in parts if (one := part.uncontrollable) is not None), default=None),
         hold=together(list(holds)) if holds else None,
         paused=any(part.paused for part in parts),
+        paused_by=next((part.paused_by for part in parts if part.paused_by is not None), None),
         faults=faults,
         resets=tuple(sorted({reset for part in parts for reset in part.resets}, reverse=True)),
         session=max(sessions, key=lambda session: session.charged_ah, default=None),
@@ -116,12 +118,6 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
         full=max((part.full for part in parts if part.full is not None), default=None),
         soc=min((part.soc for part in parts if part.soc is not None), default=None),
     )
-
-
-def _holds(hold: Cause) -> list[Cause]:
-    """The individual reasons for which a bay was held."""
-    whats = hold.param("whats") if hold.id == SEVERAL else None
-    return [one for one in (whats or (hold,)) if isinstance(one, Cause)]
 
 
 def _worse(one: PersistedFault, other: PersistedFault) -> PersistedFault:

@@ -3,10 +3,14 @@
 from dataclasses import replace
 from time import time
 
+from orchestrator.config.differences import differences
 from orchestrator.config.station import BayConfig
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause
 from orchestrator.service.news import News
+
+#: More changed keys than this are counted only.
+MOST_CHANGES = 6
 
 
 class PolicyInForce:
@@ -25,13 +29,20 @@ class PolicyInForce:
         `bay` is this bay in the present station file, None if the file no longer has it.
         """
         mine = self.rules.bay
-        if bay is None or replace(bay, policy=mine.policy) != mine:
-            return Cause("needs_restart")
+        if bay is None:
+            return Cause.of("needs_restart", changes=Cause("bay_gone"))
+        if replace(bay, policy=mine.policy) != mine:
+            return Cause.of("needs_restart", changes=changes(mine, replace(bay, policy=mine.policy)))
         if bay.policy.source == mine.policy.source:
             self._offered = None
             return Cause.of("policy_unchanged", policy=name_of(bay))
         self._offered = bay
-        return Cause.of("policy_offered", policy=name_of(bay))
+        return Cause.of("policy_offered", policy=name_of(bay), changes=changes(mine.policy, bay.policy))
+
+    @property
+    def waits(self) -> bool:
+        """Whether an offered policy is not in force yet."""
+        return self._offered is not None
 
     def take_over(self) -> BayConfig | None:
         """The bay is in standby: put the offered policy into force. Returns the bay with it, None if there is none."""
@@ -55,6 +66,15 @@ class PolicyInForce:
             "since": round(self._since_s, 3),
             "waiting_sha256": offered.policy.source.digest if offered else "",
         }
+
+
+def changes(before: object, after: object) -> tuple[Cause, ...]:
+    """What differs between two versions of a configuration, for people; not more than a few lines of it."""
+    found = list(differences(before, after))
+    some = tuple(Cause.of("changed", name=one.key, before=one.before, after=one.after) for one in found[:MOST_CHANGES])
+    if not some:
+        return (Cause("only_text"),)
+    return (*some, Cause.of("count_more", number=more)) if (more := len(found) - len(some)) else some
 
 
 def name_of(bay: BayConfig) -> Cause:

@@ -32,9 +32,11 @@ ANSWER_S = 10.0
 STOP, STATUS = "stop", "status"
 
 Answer = Mapping[str, object]
+Same = tuple[int, bytes]  #: the user, and the request's line
 Later = Callable[[], Answer | None]  #: returns the answer, None while there is none
 Handler = Callable[[Mapping[str, object]], Answer | Later]
 Reply = Callable[[Client, bytes, float], None]
+OnRefused = Callable[[Mapping[str, object], Cause], None]  #: told of a request that is refused here
 
 
 @dataclass(slots=True)
@@ -52,14 +54,14 @@ class Reception:
     `handler` must not block either: if an answer takes time, it returns a function to be polled for it.
     """
 
-    def __init__(self, handler: Handler, reply: Reply, language: str = "en") -> None:
-        self._handler, self._reply, self._language = handler, reply, language
+    def __init__(self, handler: Handler, reply: Reply, language: str, on_refused: OnRefused) -> None:
+        self._handler, self._reply, self._language, self._on_refused = handler, reply, language, on_refused
         self._urgent: list[Client] = []
         self._questions: deque[Client] = deque()
         self._requests: deque[Client] = deque()
         self._request_s = -inf  # the earliest time for the next one to go to the bays
         self._pending: list[Pending] = []
-        self._stops: dict[bytes, Pending] = {}  # pending stops that identical ones may join
+        self._stops: dict[Same, Pending] = {}  # pending stops that identical ones may join
         self._shared: dict[bytes, bytes] = {}  # a status, by its request
         self._shared_s = -inf  # when the oldest of them was built
 
@@ -108,10 +110,11 @@ class Reception:
             self._refuse(client, Cause("overtaken"), now_s)
 
     def _begin_stop(self, client: Client, now_s: float) -> None:
-        if client.line in self._stops:
-            self._stops[client.line].clients.append(client)
+        same = client.uid, client.line
+        if same in self._stops:
+            self._stops[same].clients.append(client)
         elif (pending := self._handle(client, now_s)) is not None:
-            self._stops[client.line] = pending
+            self._stops[same] = pending
 
     def _begin(self, client: Client, now_s: float) -> None:
         self._stops.clear()  # a stop after this request differs from a stop before it
@@ -161,12 +164,13 @@ class Reception:
                 late = refused(Cause("request_unanswered"), self._language)
                 said = late if answer is None else {"ok": True, **answer}
             self._pending.remove(pending)
-            self._stops = {line: one for line, one in self._stops.items() if one is not pending}
+            self._stops = {same: one for same, one in self._stops.items() if one is not pending}
             text = encode(said)
             for client in pending.clients:
                 self._reply(client, text, now_s)
 
     def _refuse(self, client: Client, why: Cause, now_s: float) -> None:
+        self._on_refused(client.request, why)
         self._reply(client, encode(refused(why, self._language)), now_s)
 
 

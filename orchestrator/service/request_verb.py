@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
-from orchestrator.errors import NoServiceError, ServiceError, UsageError
+from orchestrator.errors import ServiceError, UsageError
 from orchestrator.lastresort.asking import ask
+from orchestrator.lastresort.signing import signed
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain, said
 from orchestrator.service.chosen import Chosen, choose, is_plain, unknown
 from orchestrator.service.client import MAX_REQUEST
+from orchestrator.service.started import not_charging, with_hint
 from orchestrator.service.where import find_socket
 from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do
 from orchestrator.text.catalogue import say
@@ -27,8 +29,6 @@ STOPS = ("stop", "pause")
 STANDBY_S, LOOK_S = 4.0, 0.1
 #: The causes of names that no bay has.
 UNKNOWN = ("bay_unknown", "bays_unknown")
-#: What a request may take besides its names.
-FRAME = 100
 
 
 def request(arguments: argparse.Namespace) -> int:
@@ -36,11 +36,7 @@ def request(arguments: argparse.Namespace) -> int:
     port, verb = getattr(arguments, "port", None), arguments.verb
     _check_use(arguments, port)
     path = find_socket(arguments.socket)
-    try:
-        answers = _asked(arguments, port, path)
-    except NoServiceError as error:
-        without = "; to stop chargers without a service: orchestrator estop" if verb in STOPS else ""
-        raise NoServiceError(f"{error}{without}") from None
+    answers = _asked(arguments, port, path)
     results, missing, language = answers.results, answers.missing, answers.language
     accepted = [bay for bay, refusal in results.items() if not refusal]
     unverified: dict[str, str] = {}
@@ -48,13 +44,19 @@ def request(arguments: argparse.Namespace) -> int:
         # A stop may be carried out and still be answered with a problem, e.g. not persisted: watch its charger as well.
         looked_at = list(results) if verb == "stop" else accepted
         unverified = _wait_for_standby(path, looked_at, language, every=arguments.all)
-    refused = [Cause.of("bay_refused", bay=bay, why=refusal) for bay, refusal in results.items() if refusal]
+    refused = [
+        with_hint(Cause.of("bay_refused", bay=bay, why=refusal), answers.causes.get(bay) if verb == "start" else None)
+        for bay, refusal in results.items()
+        if refusal
+    ]
     for line in (*unverified.values(), *(say(one, language) for one in refused + missing)):
         print(line, file=sys.stderr, flush=True)  # what to do, before anything else
     for bay in accepted:
         verified = verb in STOPS and bay not in unverified
         done = Cause.of("accepted_verified" if verified else "accepted", bay=bay, verb=verb)
-        print(say(done, language))
+        print(say(done, language), flush=True)
+    for line in not_charging(path, accepted, language) if verb == "start" else ():
+        print(line)
     return 1 if unverified or missing or any(results.values()) else 0
 
 
@@ -76,9 +78,11 @@ class _Answers:
     language: str
     results: dict[str, str] = field(default_factory=dict)
     missing: list[Cause] = field(default_factory=list)
+    causes: dict[str, object] = field(default_factory=dict)  #: of the refusals
 
     def take(self, answer: Mapping[str, object]) -> None:
         self.language = language_of_answer(answer, self.language)
+        self.causes |= cast("Mapping[str, object]", answer.get("causes", {}))
         told, strangers = refusals(answer, self.language), _strangers(answer)
         self.missing += [said(told[name]) for name in strangers]
         self.results |= {name: why for name, why in told.items() if name not in strangers}
@@ -88,12 +92,13 @@ def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answ
     """Ask the service, in as many requests as the names need."""
     verb, answers = arguments.verb, _Answers(own_language())
     words = None if arguments.all else arguments.bay
+    base = signed({"verb": verb, **_spares(arguments)}, arguments.because)
     if port is not None:
-        answers.take(ask(path, {"verb": verb, "bays": None, "port": os.path.abspath(port)}))  # noqa: PTH100 - not resolved
+        answers.take(ask(path, {**base, "bays": None, "port": os.path.abspath(port)}))  # noqa: PTH100 - not resolved
         return answers
-    if not arguments.excepted and is_plain(words or ()) and len(list(_parts(words or ()))) <= 1:
+    if not arguments.excepted and is_plain(words or ()) and len(list(_parts(words or (), base))) <= 1:
         try:
-            answers.take(ask(path, {"verb": verb, "bays": words}))
+            answers.take(ask(path, {**base, "bays": words}))
             return answers
         except ServiceError as error:
             if verb != "stop" or not _is_unknown(error.told):
@@ -104,9 +109,9 @@ def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answ
     chosen = choose(words, arguments.excepted, known)
     answers.missing += _missing(chosen, known, verb, answers.language)
     failed: ServiceError | None = None
-    for part in _parts(chosen.bays):
+    for part in _parts(chosen.bays, base):
         try:
-            answers.take(ask(path, {"verb": verb, "bays": part}))
+            answers.take(ask(path, {**base, "bays": part}))
         except ServiceError as error:
             if verb != "stop":
                 raise
@@ -114,6 +119,12 @@ def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answ
     if failed:
         raise failed
     return answers
+
+
+def _spares(arguments: argparse.Namespace) -> dict[str, bool]:
+    """Whoever names a bay means it. `--all`, or a pattern, is not meant for bays that somebody else holds."""
+    named = not arguments.all and is_plain(arguments.bay)
+    return {"spares": True} if arguments.verb == "start" and not named and not arguments.force else {}
 
 
 def _strangers(answer: Mapping[str, object]) -> list[str]:
@@ -137,11 +148,11 @@ def _missing(chosen: Chosen, known: Sequence[str], verb: str, language: str) -> 
     raise ServiceError(say(cause, language), plain(cause))
 
 
-def _parts(names: Sequence[str]) -> Iterator[list[str]]:
-    """The names in lists that each fit into one request."""
+def _parts(names: Sequence[str], base: Mapping[str, object]) -> Iterator[list[str]]:
+    """The names in lists that each fit into one request with the rest of it."""
     part: list[str] = []
     for name in names:
-        if part and len(json.dumps([*part, name])) > MAX_REQUEST - FRAME:
+        if part and len(json.dumps({**base, "bays": [*part, name]})) >= MAX_REQUEST:
             yield part
             part = []
         part.append(name)

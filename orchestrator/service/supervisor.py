@@ -78,10 +78,10 @@ class Supervisor:
         self._reload = Reload(station, self._bays, self._say)
         self._reload_asked = False
         self._handler = RequestHandler(
-            station, self._bays, self._journal, self._store, self._strays, monotonic, self._wake.put
+            station, self._bays, self._journal, self._store, self._strays, self._reload, monotonic, time, self._wake.put
         )
         self._control = ControlSocket(
-            station.control.socket, self._handler.answer, monotonic, self._say, self._language
+            station.control.socket, self._handler.answer, monotonic, self._say, self._language, self._handler.refused
         )
 
     def _build(self, ports: ChargerPorts) -> None:

@@ -43,10 +43,23 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
         request.add_argument("bay", nargs="*", help=f"the bays: {NAMES}")
         request.add_argument("--all", action="store_true", help="every bay of the station")
         _add_except(request)
+        _add_because(request)
+        if verb == "start":
+            request.add_argument(
+                "--force", action="store_true", help="with --all or patterns: also bays that another person has stopped"
+            )
         if verb == "reset":
             request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
+    _add_reload(verbs)
+
+
+def _add_reload(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    reload = verbs.add_parser("reload", help="reread the policies; each bay adopts its own in standby")
+    _add_because(reload)
+    _add_socket(reload)
+    reload.set_defaults(run=_reload)
 
 
 def _add_history(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -71,6 +84,12 @@ def _add_history(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -
 def _add_except(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--except", dest="excepted", nargs="+", default=[], metavar="BAY", help="not these bays: names or patterns"
+    )
+
+
+def _add_because(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--because", default="", metavar="TEXT", help="the reason, for the journal and whoever asks why; one short line"
     )
 
 
@@ -108,3 +127,9 @@ def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.service.request_verb import request
 
     return request(arguments)
+
+
+def _reload(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.reload_verb import reload
+
+    return reload(arguments)

@@ -5,7 +5,7 @@ from math import ceil
 from time import localtime, strftime
 
 from orchestrator.model import Cause
-from orchestrator.text.moments import with_moments
+from orchestrator.text.moments import MOMENT, UNIX, with_moments
 
 #: What is to come is told in minutes, and never too early.
 COMING, MINUTE_S, SOON_S = "until", 60.0, 120.0
@@ -42,4 +42,11 @@ class WallClock:
         return strftime("%Y-%m-%d %H:%M:%S", localtime(self.wall_s))
 
     def _told(self, name: str, t_s: float) -> str:
-        return self.time_of_day(t_s, coming=name == COMING)
+        if name.endswith(UNIX):
+            return self._minute(t_s)
+        return self.time_of_day(t_s, coming=name.removesuffix(MOMENT) == COMING)
+
+    def _minute(self, unix_s: float) -> str:
+        """HH:MM, of another day with its date."""
+        then = localtime(unix_s)
+        return strftime("%H:%M" if then[:3] == localtime(self.wall_s)[:3] else "%Y-%m-%d %H:%M", then)

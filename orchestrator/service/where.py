@@ -4,7 +4,8 @@ import os
 from pathlib import Path
 
 from orchestrator.config.ports import wiring
-from orchestrator.errors import UsageError
+from orchestrator.errors import NoSocketError
+from orchestrator.model import Cause
 
 #: The default station file of `run`.
 HERE = Path("station.yaml")
@@ -15,7 +16,7 @@ INSTALLED = Path("/run/orchestrator/orchestrator.sock")
 def find_socket(named: str | None, here: Path = HERE, installed: Path = INSTALLED) -> Path:
     """The named socket, else $ORCHESTRATOR_SOCKET, else that of the station file here, else the installed one.
 
-    UsageError if there is none of these.
+    NoSocketError if there is none of these.
     """
     if name := named or os.environ.get("ORCHESTRATOR_SOCKET"):
         return Path(name)
@@ -23,10 +24,16 @@ def find_socket(named: str | None, here: Path = HERE, installed: Path = INSTALLE
         return Path(written)
     if _may_be_there(installed):
         return installed
-    raise UsageError(
-        f"no service found: $ORCHESTRATOR_SOCKET is not set, no {here} in this folder names a control socket, and "
-        f"there is no {installed}; name the socket with --socket PATH"
-    )
+    raise NoSocketError(Cause.of("service_not_found", station=os.path.abspath(here), installed=str(installed)))  # noqa: PTH100 - for people
+
+
+def origin(named: str | None, here: Path = HERE) -> Cause:
+    """What named the socket that `find_socket` returns."""
+    if named or os.environ.get("ORCHESTRATOR_SOCKET"):
+        return Cause.of("socket_by_option", option="--socket" if named else "$ORCHESTRATOR_SOCKET")
+    if _written(here):
+        return Cause.of("socket_by_station", station=os.path.abspath(here))  # noqa: PTH100 - for people
+    return Cause("socket_installed")
 
 
 def _written(station: Path) -> str:

@@ -1,7 +1,8 @@
 """`say()`: the sentence for a cause, in English or Korean.
 
 Theory of operation. A template is stored under the id of its cause. It names its parameters, with the rounding of the
-figures. A frame combines it with any advice; `where` precedes the evidence, `then` and `how` follow. Besides the number
+figures. A frame combines it with any advice; `where` precedes the evidence, `because` (a person's own words), `then` and
+`how` follow. Besides the number
 formats there are five of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
 `then` (how the parts of a list are joined), `after` (a cause, if there is one, after what precedes it).
 
@@ -40,7 +41,7 @@ from orchestrator.text.ko.particles import resolved
 from orchestrator.text.ko.service import TEXTS as KO_SERVICE
 from orchestrator.text.ko.words import FRAMES as KO_FRAMES
 from orchestrator.text.ko.words import WORDS as KO_WORDS
-from orchestrator.text.moments import MOMENT, TIME_OF_DAY
+from orchestrator.text.moments import MOMENT, UNIX, told_as
 
 #: The effect of a tripping fault, as a cause carries it: its sentence begins with what to do.
 TRIP = "TRIP"
@@ -133,6 +134,8 @@ def _evidence(cause: Cause, texts: Language, params: "_Params") -> str:
     past = replace(texts, texts=texts.past) if cause.param("past") is True else texts
     what, frames = past.texts[cause.id].format_map(_Params(cause, past) if past is not texts else params), texts.frames
     what = frames["where"].format(where=params["where"], what=what) if "where" in params else what
+    if "because" in params:
+        what = frames["because"].format(what=what, because=params["because"])
     if "raised_at" in params:
         what = frames["at"].format(what=what, raised_at=params["raised_at"])
     notes = []
@@ -165,8 +168,8 @@ class _Params(dict[str, "_Value"]):
     def __init__(self, cause: Cause, texts: Language) -> None:
         super().__init__((name, _Value(value, texts)) for name, value in cause.params)
         for name, value in cause.params:
-            if name.endswith(MOMENT) and isinstance(value, int | float):
-                self[f"{name.removesuffix(MOMENT)}{TIME_OF_DAY}"] = _Value(f"{value:.0f} s", texts)
+            if name.endswith((MOMENT, UNIX)) and isinstance(value, int | float):
+                self[told_as(name)] = _Value(f"{value:.0f} s", texts)
         self["at"] = _Value(texts.frames["place"].format(place=cause.place) if cause.place else "", texts)
         self["place"] = _Value(cause.place, texts)
 

@@ -206,12 +206,13 @@ class World:
         states = [decision.state for decision in self.decisions[-ticks:]]
         return [now for before, now in zip([None, *states], states, strict=False) if now is not before]
 
-    def tick(self, dt_s: float = TICK_S, request: Request | None = None) -> Decision:
+    def tick(self, dt_s: float = TICK_S, request: Request | None = None, asked_by: Cause | None = None) -> Decision:
         self.now_s += dt_s
         self._fit()
         self._obey(dt_s)
         internal, self.internal = self.internal, ""
-        decision, self.memory = decide(self.now_s, self.snapshot(request, internal), self.memory, self.rules)
+        snapshot = replace(self.snapshot(request, internal), asked_by=asked_by)
+        decision, self.memory = decide(self.now_s, snapshot, self.memory, self.rules)
         self.decisions.append(decision)
         return decision
 

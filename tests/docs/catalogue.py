@@ -99,7 +99,7 @@ CATALOGUE: tuple[Entry, ...] = (
           "`service/store.py` (state): the second ends; a port lost to one later, `core/shared.py`: HELD"),
     Entry("G10", "power lost in mid-charge", "`core/persisted.py`: an interrupted charge is not resumed"),
     Entry("P1", "bad policy", "`config/`: refused with every error's line; `run` does not start"),
-    Entry("P2", "policy changed while charging", "reread on SIGHUP, adopted by a bay in standby"),
+    Entry("P2", "policy changed while charging", "reread on `reload` or SIGHUP, adopted by a bay in standby"),
     Entry("P3", "policy of another battery or charger", "`config/station_rules.py`: station and policy must agree"),
     Entry("P4", "operator's stop, emergency stop", "`core/operator.py`: from any state; `lastresort/estop.py`: alone"),
     Entry("P5", "start while latched or unknown", "`core/operator.py`: refused, with the cause"),

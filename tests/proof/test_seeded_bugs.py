@@ -79,7 +79,7 @@ def stop_is_not_heard(patch: Patch) -> None:
 
 def reset_starts(patch: Patch) -> None:
     def reset(memory: Memory, now_s: float) -> Heard:
-        return operator._start(with_values(memory, hold=None), now_s, operator.Told("bay-1", at_rest=False))
+        return operator._start(with_values(memory, hold=None), now_s, operator.Told("bay-1", at_rest=False, by=None))
 
     hear = operator.handle_request
 

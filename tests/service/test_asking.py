@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from pwd import getpwuid
 from threading import Event, Thread
 
 import pytest
@@ -133,9 +134,10 @@ def test_who_is_hung_up_on_asks_again_if_that_does_no_harm(tmp_path: Path, verb:
         waiting.join()
 
 
-@pytest.mark.parametrize(("seen", "who"), [(True, "its owner, .*,"), (False, "the service's own user")])
-def test_who_may_not_ask_is_told_who_may(*, seen: bool, who: str) -> None:
-    """By name, where the folder lets us look."""
+@pytest.mark.parametrize("seen", [True, False])
+def test_who_may_not_ask_is_told_who_may(*, seen: bool) -> None:
+    """By name, even where the folder does not let us look at the socket itself."""
+    who = " and ".join(dict.fromkeys((getpwuid(os.geteuid()).pw_name, "root")))
     open_folder, closed_folder = (0o711, 0o700) if os.geteuid() == 0 else (0o700, 0)
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         path = Path(folder, "control.sock")
@@ -143,6 +145,6 @@ def test_who_may_not_ask_is_told_who_may(*, seen: bool, who: str) -> None:
         listener.listen()
         path.chmod(0)
         Path(folder).chmod(open_folder if seen else closed_folder)
-        with somebody_else(), pytest.raises(NoServiceError, match=f"permission denied: only {who} and root may use it"):
+        with somebody_else(), pytest.raises(NoServiceError, match=f"permission denied: only {who} may use it"):
             ask(path, {})
         Path(folder).chmod(0o700)

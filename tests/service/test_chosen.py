@@ -4,6 +4,7 @@ from json import dumps
 
 import pytest
 
+from orchestrator.lastresort.signing import MOST_BECAUSE
 from orchestrator.service.chosen import Chosen, choose, is_plain, unknown
 from orchestrator.service.client import MAX_REQUEST, parse_request
 from orchestrator.service.request_verb import _parts
@@ -49,10 +50,11 @@ def test_what_is_unknown_is_told_with_what_there_is() -> None:
 
 def test_however_many_bays_are_named_each_request_is_one_that_the_service_takes() -> None:
     names = [f"{'베이' * 30}-{number}" for number in range(128)]
-    parts = list(_parts(names))
+    base = {"verb": "stop", "because": "비" * MOST_BECAUSE}
+    parts = list(_parts(names, base))
     assert [name for part in parts for name in part] == names
     assert len(parts) > 1
     for part in parts:
-        line = dumps({"verb": "stop", "bays": part}).encode() + b"\n"
+        line = dumps({**base, "bays": part}).encode() + b"\n"
         assert len(line) <= MAX_REQUEST and parse_request(line)["bays"] == part
-    assert list(_parts(["bay-1", "bay-2"])) == [["bay-1", "bay-2"]]
+    assert list(_parts(["bay-1", "bay-2"], {"verb": "stop"})) == [["bay-1", "bay-2"]]

@@ -21,7 +21,10 @@ from tests.waiting import wait_until
 
 
 def test_a_request_is_answered(path: Path) -> None:
-    assert ask(path, {"verb": "status", "bay": None}) == {"ok": True, "heard": {"verb": "status", "bay": None}}
+    assert ask(path, {"verb": "status", "bay": None}) == {
+        "ok": True,
+        "heard": {"verb": "status", "bay": None, "uid": os.getuid()},
+    }
 
 
 def test_an_error_is_an_answer_too(path: Path) -> None:

@@ -1,6 +1,7 @@
 """Clients of the control socket that are slow, rude, silent, foreign, or too many."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -79,7 +80,7 @@ def test_a_crowd_is_served(path: Path) -> None:
         one.start()
     for one in crowd:
         one.join()
-    assert sorted(map(str, heard)) == [str({"n": number}) for number in range(8)]
+    assert sorted(map(str, heard)) == [str({"n": number, "uid": os.getuid()}) for number in range(8)]
 
 
 def test_an_answer_that_nobody_takes_holds_nobody_up_and_ends(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from orchestrator.config.load import load_station
 from orchestrator.config.shipped import shipped_dir
 from orchestrator.config.station import Station
 from orchestrator.model import Request, State
-from orchestrator.service.reload import Reload
+from orchestrator.service.reload import Reading, Reload
 from tests.core.said import into
 from tests.service.bench import Bench
 from tests.waiting import wait_until
@@ -41,15 +41,25 @@ class Site:
         self.said: list[str] = []
         self.reload = Reload(station, [self.bench.bay], into(self.said))
 
-    def edit(self, file: Path, old: str, new: str) -> None:
+    def edit(self, file: Path, old: str, new: str, *, read: bool = True) -> None:
         text = file.read_text()
         assert old in text
         file.write_text(text.replace(old, new))
         self.said.clear()
-        self.reload.read()
+        if read:
+            self.read()
 
-    def edit_finish(self) -> None:
-        self.edit(self.policy_file, "target_soc_pct: 100 ", "target_soc_pct: 99 ")
+    def read(self) -> Reading:
+        reading = Reading()
+        self.reload.read(reading)
+        return reading
+
+    def edit_finish(self, *, read: bool = True) -> None:
+        self.edit(self.policy_file, "target_soc_pct: 100 ", "target_soc_pct: 99 ", read=read)
+
+    def pause(self) -> None:
+        """Let the thread that reads go on."""
+        threading.Event().wait(0.01)
 
     @property
     def policy(self) -> dict[str, str]:
@@ -67,6 +77,7 @@ def test_a_charge_goes_on_by_the_policy_that_it_began_with(site: Site) -> None:
     site.edit_finish()
     (said,) = site.said
     assert said.startswith("bay-1: reload: policy li-ion-48v (")
+    assert "): finish.target_soc_pct 100 → 99; comes" in said
     assert said.endswith("comes into force when the bay stands by")
     site.bench.step(50)
     assert site.bench.bay.status()["state"] == "CHARGING"
@@ -156,17 +167,28 @@ def test_a_file_with_an_error_changes_nothing(site: Site) -> None:
 
 def test_what_is_as_it_was_is_left_alone(site: Site) -> None:
     site.bench.step()
-    site.reload.read()
+    site.read()
     (said,) = site.said
     assert said.endswith("is unchanged")
 
 
-@pytest.mark.parametrize(("old", "new"), [("current_a: 15.0", "current_a: 8.0"), ("name: bay-1", "name: bay-2")])
-def test_hard_limits_and_wiring_are_for_a_restart(site: Site, old: str, new: str) -> None:
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("current_a: 15.0", "current_a: 8.0", {"bay-1": "limits.current_a 15 → 8"}),
+        ("[0, 45]}", "[0, 46]}", {"bay-1": "limits.temperature_c 0 … 45 → 0 … 46"}),
+        ("manual, ", "automatic, ", {"bay-1": "charger.control manual → automatic"}),
+        ("name: bay-1", "name: bay-2", {"bay-1": "this bay is no longer in it", "bay-2": "this bay is new in it"}),
+        ("run/socket", "run/other", {"station.yaml": "control.socket HERE/run/socket → HERE/run/other"}),
+    ],
+)
+def test_hard_limits_and_wiring_are_for_a_restart(site: Site, old: str, new: str, said: dict[str, str]) -> None:
     before = site.policy
     site.edit(site.station_file, old, new)
-    assert site.said == [
-        "bay-1: reload: the station file has changed here: only a restart of the service brings that into force"
+    found = [line.replace(str(site.station_file.parent), "HERE") for line in site.said]
+    restart = "only a restart of the service brings that into force"
+    assert [line for line in found if not line.endswith("is unchanged")] == [
+        f"{name}: reload: the station file has changed here ({what}): {restart}" for name, what in said.items()
     ]
     site.bench.step(20)
     assert site.policy == before

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.core.faults import FAULTS, Clear
-from orchestrator.core.operator import OWN, STOPPED
+from orchestrator.core.operator import STOPPED, is_own
 from orchestrator.core.persisted import COUNTERS_S, Persisted, PersistedFault
 from orchestrator.errors import StartError
 from orchestrator.model import Cause, Session
@@ -335,7 +335,7 @@ def test_a_hold_of_a_version_before_held_loses_the_end_that_said_what_to_do(tmp_
     document["format"], document["entries"][0]["hold"] = 2, said
     path.write_text(json.dumps(document))
     with running(tmp_path, A) as store:
-        assert store.past(A).hold == HELD.hold in OWN
+        assert store.past(A).hold == STOPPED and is_own(STOPPED)
     path.unlink()
     first = {"running": False, "hold": said, "paused": False, "faults": {}}
     (tmp_path / FIRST_FILE).write_text(json.dumps({"bay-1": first}))

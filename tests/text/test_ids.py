@@ -7,7 +7,7 @@ from pathlib import Path
 from string import Formatter
 
 from orchestrator.text.catalogue import LANGUAGES
-from orchestrator.text.moments import MOMENT, TIME_OF_DAY
+from orchestrator.text.moments import MOMENT, UNIX, told_as
 
 ROOT = Path(__file__).resolve().parents[2] / "orchestrator"
 TEXTS = LANGUAGES["en"].texts
@@ -50,14 +50,14 @@ def test_every_cause_has_the_parameters_that_its_template_names() -> None:
         for where, id_, call in made()
         if all(keyword.arg for keyword in call.keywords)  # else they are handed on
         and not (isinstance(call.func, ast.Name) and len(call.args) > 1)
-        and (missing := sorted(needed(id_) - {told_as(keyword.arg) for keyword in call.keywords} - GIVEN))
+        and (missing := sorted(needed(id_) - {called(keyword.arg) for keyword in call.keywords} - GIVEN))
     ]
     assert lacking == []
 
 
-def told_as(name: str | None) -> str | None:
+def called(name: str | None) -> str | None:
     """What a template calls a parameter: a moment is the time of day there."""
-    return f"{name.removesuffix(MOMENT)}{TIME_OF_DAY}" if name is not None and name.endswith(MOMENT) else name
+    return told_as(name) if name is not None and name.endswith((MOMENT, UNIX)) else name
 
 
 def needed(id_: str) -> set[str]:

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.station import Document, Service, orchestrator, station_document, whole_station
+from tests.whole.station import Document, Service, orchestrator, station_document, unnamed, whole_station
 
 
 def charging(plant: PlantProcess, service: Service) -> None:
@@ -96,7 +96,7 @@ def test_a_restart_is_neither_a_reset_nor_a_start(tmp_path: Path) -> None:
         bay = service.bay("bay-1")
         assert "the BMU reported bmu error" in bay["reason"], "its cause is gone, the trip is not"
         assert (
-            service.wait("HELD", ["bay-2"])["bay-2"]["reason"]
+            unnamed(service.wait("HELD", ["bay-2"])["bay-2"]["reason"])
             == "stopped by the operator; to go on: orchestrator start bay-2"
         )
         service.wait("CHARGING", ["bay-3"])  # its stop came from the service

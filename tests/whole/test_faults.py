@@ -9,7 +9,7 @@ import pytest
 from orchestrator.sim.client import PlantProcess
 from orchestrator.sim.faults import FAULTS
 from tests.waiting import wait_until
-from tests.whole.station import Document, Service, whole_station
+from tests.whole.station import Document, Service, unnamed, whole_station
 
 #: For faults that stop at once, with a poll, a sweep and a busy machine in between.
 AT_ONCE_S = 2.0
@@ -121,7 +121,7 @@ def named(service: Service, case: Case) -> bool:
     texts = {line["text"]: line["id"] for line in service.journal(bay, "fault") if line["event"] == "raised"}
     stops = [line["reason"] for line in service.journal(bay, "transition") if line["to"] == "STOPPING"]
     if case.name == "ignore_stop":
-        return case.fault in texts.values() and stops[-1] == STOPPED_BY
+        return case.fault in texts.values() and unnamed(stops[-1]) == STOPPED_BY
     return bool(stops) and texts.get(stops[-1]) in (case.fault, case.instead)
 
 

@@ -15,7 +15,7 @@ import pytest
 from orchestrator.errors import ServiceError
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.station import Document, Service, whole_station
+from tests.whole.station import Document, Service, unnamed, whole_station
 
 HELD = "stopped by the operator; to go on: orchestrator start bay-1"
 Station = tuple[PlantProcess, Service]
@@ -50,11 +50,11 @@ def test_an_accepted_stop_outlives_a_kill_right_after_it(station: Station) -> No
     charging(plant, service.start(), 1, 2)
     assert service.ask("stop", "bay-1") == {"bay-1": ""}
     service.kill_all()
-    assert kept(service)["bay-1"]["hold"]["id"] == "operator_stop"
+    assert kept(service)["bay-1"]["hold"]["id"] == "stopped_by"
     service.start()
     assert ": orchestrator start bay-1" in service.wait("HELD")["bay-1"]["reason"]
     assert plant.state(1)["operation"] == 0
-    assert kept(service)["bay-1"]["hold"]["id"] == "operator_stop"
+    assert kept(service)["bay-1"]["hold"]["id"] == "stopped_by"
 
 
 def test_a_stop_while_the_service_ends_is_kept(station: Station) -> None:
@@ -69,7 +69,7 @@ def test_a_stop_while_the_service_ends_is_kept(station: Station) -> None:
     assert service.ended() == 0
     service.start()
     if accepted:
-        assert service.wait("HELD")["bay-1"]["reason"] == HELD
+        assert unnamed(service.wait("HELD")["bay-1"]["reason"]) == HELD
     charging(plant, service, 2)
 
 
@@ -94,7 +94,7 @@ def test_a_reader_that_stands_still_delays_neither_the_stop_nor_what_is_kept(sta
     os.close(reader)
     os.close(writer)
     service.start()
-    assert service.wait("HELD")["bay-1"]["reason"] == HELD
+    assert unnamed(service.wait("HELD")["bay-1"]["reason"]) == HELD
 
 
 def test_what_no_disk_takes_is_said_and_the_end_is_a_bad_one(station: Station) -> None:

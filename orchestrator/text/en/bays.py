@@ -88,6 +88,13 @@ TEXTS: Mapping[str, str] = {
     "operator_stop": "stopped by the operator",
     "operator_pause": "paused by the operator",
     "operator_reset": "reset by the operator",
+    "stopped_by": "stopped by {who} at {asked_at}",
+    "estopped_by": "stopped by estop ({who}) at {asked_at}",
+    "paused_by": "paused by {who} at {asked_at}",
+    "reset_by": "reset by {who} at {asked_at}",
+    "started_by": "started by {who} at {asked_at}",
+    "on_behalf": "{user} for {person}",
+    "held_by_others": "left alone: {what}; if it may charge: orchestrator start {bay}, or --force",
     "not_running": "not running: {what}",
     "out_of_control": "the charger was not seen to stop: cut its mains; nothing can be started or reset here before it "
     "has stood by for {lasts_s:g} s",

@@ -62,6 +62,7 @@ FRAMES: Mapping[str, str] = {
     "unknown": "{id} ({params})",
     "where": "{where}: {what}",
     "place": " ({place})",
+    "because": "{what}: {because}",
     "list": ", ",
     "and": " and ",
     "then": "; ",

@@ -88,6 +88,13 @@ TEXTS: Mapping[str, str] = {
     "operator_stop": "작업자가 정지했습니다",
     "operator_pause": "작업자가 일시 정지했습니다",
     "operator_reset": "작업자가 리셋했습니다",
+    "stopped_by": "{who}이(가) {asked_at}에 정지했습니다",
+    "estopped_by": "{who}이(가) {asked_at}에 estop으로 정지했습니다",
+    "paused_by": "{who}이(가) {asked_at}에 일시 정지했습니다",
+    "reset_by": "{who}이(가) {asked_at}에 리셋했습니다",
+    "started_by": "{who}이(가) {asked_at}에 시작했습니다",
+    "on_behalf": "{person}({user} 권한)",
+    "held_by_others": "그대로 두었습니다: {what}. 충전해도 된다면: orchestrator start {bay}, 또는 --force",
     "not_running": "동작 중이 아닙니다: {what}",
     "out_of_control": "충전기의 정지가 확인되지 않았습니다: 주전원을 차단하십시오. {lasts_s:g}초 동안 대기 상태가 유지되기 "
     "전에는 시작도 리셋도 할 수 없습니다",

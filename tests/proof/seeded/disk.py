@@ -114,8 +114,8 @@ DISK: tuple[Seed, ...] = (
         ("tests/core/test_persisted.py",),
         (
             f"{CORE}persisted.py",
-            "return self.running, self.hold, self.paused, faults, resets,",
-            "return self.running, self.hold, self.paused, resets,",
+            "return self.running, self.hold, self.paused, self.paused_by, faults, resets,",
+            "return self.running, self.hold, self.paused, self.paused_by, resets,",
         ),
     ),
     part(

@@ -55,7 +55,7 @@ SURROUNDINGS: tuple[Seed, ...] = (
         (
             f"{SERVICE}reload.py",
             "        self._asked.set()\n",
-            "        threading.Thread(target=self.read, daemon=True).start()\n",
+            "        threading.Thread(target=self.read, args=(reading,), daemon=True).start()\n",
         ),
     ),
     hostile(

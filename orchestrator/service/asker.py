@@ -1,0 +1,88 @@
+"""The person behind a request: the user at the other end of the socket, for whom root acts, and why."""
+
+import pwd
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+
+from orchestrator.core.memory import Operator
+from orchestrator.core.operator import NAMED
+from orchestrator.lastresort.signing import one_line
+from orchestrator.model import Cause, Request
+from orchestrator.model.cause import parts, together
+
+ROOT = 0
+#: What a person's request becomes in the core.
+BECOMES = {
+    Request.STOP: "stopped_by",
+    Request.PAUSE: "paused_by",
+    Request.RESET: "reset_by",
+    Request.START: "started_by",
+}
+
+
+@cache
+def user_name(uid: int) -> str:
+    """The user's name. Asked of the system once: a directory service may take its time, and no stop waits for it."""
+    try:
+        return pwd.getpwuid(uid).pw_name
+    except (KeyError, OSError):
+        return f"uid {uid}"
+
+
+@dataclass(frozen=True, slots=True)
+class Asker:
+    """Who makes a request, and why; without a `uid`, nobody knows."""
+
+    uid: int | None = None  #: by the kernel's word
+    behind: str = ""  #: the person who became root by sudo: only root is believed
+    because: str = ""
+    estop: bool = False  #: by way of `orchestrator estop`
+    unix_s: float = field(default=0.0, compare=False)
+
+    @classmethod
+    def of(cls, request: Mapping[str, object], unix_s: float) -> "Asker":
+        """The asker of a request; `uid` was added to it by the control socket."""
+        uid = request.get("uid")
+        known = uid if isinstance(uid, int) else None
+        behind = _text(request.get("sudo_user")) if known == ROOT else ""
+        estop = request.get("means") == "estop"
+        return cls(known, "" if behind == user_name(ROOT) else behind, _text(request.get("because")), estop, unix_s)
+
+    @property
+    def person(self) -> str:
+        """The name of the person; "" if unknown."""
+        return self.behind or ("" if self.uid is None else user_name(self.uid))
+
+    @property
+    def who(self) -> str | Cause:
+        """For people: "kim", or "root for kim"."""
+        if self.uid is None or not self.behind:
+            return self.person
+        return Cause.of("on_behalf", user=user_name(self.uid), person=self.behind)
+
+    def cause(self, request: Request) -> Cause | None:
+        """What the request becomes; None if nobody knows who makes it."""
+        if self.uid is None:
+            return None
+        id_ = "estopped_by" if self.estop and request is Request.STOP else BECOMES[request]
+        because = {"because": self.because} if self.because else {}
+        return Cause.of(id_, who=self.who, asked_unix_s=self.unix_s, **because)
+
+
+NOBODY = Asker()  #: known
+
+
+def _text(value: object) -> str:
+    return one_line(value) if isinstance(value, str) else ""
+
+
+def held_by_others(operator: Operator, asker: Asker) -> Cause | None:
+    """The stops and pauses of other people that hold a bay; None if there are none."""
+    holds = [one for hold in (operator.hold, operator.paused_by) if hold is not None for one in parts(hold)]
+    others = [one for one in holds if one.id in NAMED and _person(one.param("who")) != asker.person]
+    return together(others) if others else None
+
+
+def _person(who: object) -> object:
+    return who.param("person") if isinstance(who, Cause) else who

@@ -1,0 +1,1 @@
+"""The command line towards the shell around it: examples, completion, manual page."""
