@@ -1,7 +1,7 @@
 """One bay in the running service: the devices' newest views in, one decision out, carried out and recorded."""
 
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from time import monotonic, time
@@ -15,6 +15,7 @@ from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 from orchestrator.service.asked import Answers, Asked, Requests
+from orchestrator.service.bayjournal import BayJournal
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.journal import Journal
@@ -22,7 +23,7 @@ from orchestrator.service.news import TICK_S, due_s
 from orchestrator.service.outlook import outlook
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
-from orchestrator.service.records import SnapshotRecorder, TimedLine, decision_lines, transition
+from orchestrator.service.records import transition
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status, contactor_fields, told
 from orchestrator.service.store import Store
@@ -56,11 +57,11 @@ class BayRunner:
         self._ending: Cause | None = None
         self._waits: Cause | None = None  # why the next run must wait for an operator
         self._asleep_s, self._closely = 0.0, True  # the BMU is read closely until the first decision
-        self._charger, self._battery, self._journal = charger, battery, journal
+        self._charger, self._battery = charger, battery
+        self._journal = BayJournal(bay, journal, language, snapshots=snapshots)
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
-        self._written: tuple[Cause | None, bool] | None = None  # of the contactor: problem, closed
-        self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
+        self._snapshot = Snapshot()
         self._requests = Requests()
         self._internal = ""
         self._by: Cause | None = None  # who made the request that is being decided
@@ -109,14 +110,10 @@ class BayRunner:
 
     def isolate(self) -> None:
         """Open the contactor for good, at the end of the service, and record that and the last decisions."""
-        self._put_timed(self._recorder.rest() if self._recorder is not None else [])
+        self._journal.rest()
         if self._contactor is not None:
             self._contactor.give_back()
-            self._write_down_contactor(self._contactor)
-
-    def _put_timed(self, lines: Iterable[TimedLine]) -> None:
-        for t_s, line in lines:
-            self._journal.put(self.name, line, t_s)
+            self._journal.contactor(self._contactor)
 
     def ask(self, asked: Asked) -> None:
         """Submit an operator's request; the next decision handles it."""
@@ -178,13 +175,8 @@ class BayRunner:
         if self._closely is not closely:
             self._closely = closely
             self._battery.attend(closely=closely)
-        clock, lines = WallClock(now_s, time()), []
-        if before is None or decision != before:
-            lines = list(decision_lines(before, decision, self._language, clock))
-        for line in lines:
-            self._journal.put(self.name, line, now_s)
-        if self._recorder is not None:
-            self._put_timed(self._recorder.lines(now_s, snapshot, memory, decision.state, news=bool(lines)))
+        clock = WallClock(now_s, time())
+        self._journal.decided(clock, before, decision, snapshot, memory)
         if before is None or before.state is not decision.state:
             self._say(transition(self.name, before, decision, clock))
         self._keep(self._memory, now_s)
@@ -221,19 +213,12 @@ class BayRunner:
         """Drive the contactor, if any, as decided: after the command, so that a stop goes first."""
         if self._contactor is not None:
             self._contactor.drive(now_s, closed=closed)
-            self._write_down_contactor(self._contactor)
-
-    def _write_down_contactor(self, contactor: Contactor) -> None:
-        now = (contactor.problem, contactor.closed_s is not None)
-        if now != self._written:
-            self._written = now
-            self._journal.put(self.name, ("contactor", contactor_fields(contactor, self._language)))
+            self._journal.contactor(self._contactor)
 
     def _take_over(self) -> None:
         bay = self.policy.take_over()
         if bay is not None:
-            if self._recorder is not None:
-                self._recorder.begin(bay)
+            self._journal.begin(bay)
             self._say(Cause.of("policy_in_force", bay=self.name, policy=name_of(bay)))
 
     def _keep(self, memory: Memory, now_s: float) -> None:

@@ -50,7 +50,7 @@ class Meter:
         self._journal = Journal(directory, MAX_MB, lambda: time.now_s, lambda: BEGAN_S + time.now_s, boot="virtual")
         made.journal.put = self._journal.put  # type: ignore[method-assign]  # what it is given is written
         for bay in made.bays:
-            bay._recorder = SnapshotRecorder(bay.policy.rules.bay)
+            bay._journal._recorder = SnapshotRecorder(bay.policy.rules.bay)
         made.on_step = self._step
         self._begin = self._end = (0.0, 0, 0)
         time.call_later(GATHER_S, self._write)

@@ -45,7 +45,7 @@ def script(seed: int) -> bytes:
 
         made.journal.put = put  # type: ignore[method-assign]  # what it is given is written down
         for runner in made.bays:
-            runner._recorder = SnapshotRecorder(runner.policy.rules.bay)
+            runner._journal._recorder = SnapshotRecorder(runner.policy.rules.bay)
         player.run()
     return b"".join(lines)
 
