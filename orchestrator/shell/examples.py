@@ -15,6 +15,10 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ("status 'bay-0*' --except bay-03 --watch", "some bays, refreshed"),
         ("status --check --problems", "for scripts: exit status 1 if something needs a person"),
     ),
+    "history": (
+        ("history bay-2 --since 7d", "what happened at this bay last week"),
+        ("history --station --limit 5", "the last beginnings, ends and failures of the station itself"),
+    ),
     "start": (
         ("start bay-1", "let it charge after a stop, a pause or a reset"),
         ("start --all", "every bay that nobody else has stopped"),
