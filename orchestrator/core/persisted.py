@@ -49,6 +49,7 @@ class Persisted:
     full: Age | None = None  #: how long the battery has not been charged all the way; None: not counted yet
     soc: tuple[Age, float] | None = None  #: the newest SOC of the battery in the bay
     serial: int | None = None  #: its serial number; None: it has none
+    typed: str = ""  #: its id as an operator typed it; the core knows nothing of it
 
     @classmethod
     def of(cls, memory: Memory, now_s: float) -> "Persisted":
@@ -87,7 +88,13 @@ class Persisted:
             (name, fault.latched, fault.raised is not None, len(fault.strikes)) for name, fault in self.faults.items()
         )
         resets = tuple(name for _, name in self.resets)
-        known = (self.uncontrollable is not None, self.session is not None, self.full_pct is None, self.serial)
+        known = (
+            self.uncontrollable is not None,
+            self.session is not None,
+            self.full_pct is None,
+            self.serial,
+            self.typed,
+        )
         return self.running, self.hold, self.paused, faults, resets, *known
 
     def aged(self, seconds: float, unseen_s: float | None = None) -> "Persisted":

@@ -5,6 +5,7 @@ The BMU forgets them with every boot. Nothing else is ever written to it (`link/
 
 from dataclasses import dataclass
 from math import inf
+from typing import Any
 
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.sdo_client import Key
@@ -101,7 +102,7 @@ class BmuSetup:
         self.start_due = self._any_tpdo and not self._left
         return write
 
-    def configured(self, reply: SdoAnswer, now_s: float, *, armed: bool) -> dict[str, float | None]:
+    def configured(self, reply: SdoAnswer, now_s: float, *, armed: bool) -> dict[str, Any]:
         """As `answered`, and what the link says of the heartbeat from now on; `armed`: it was waited for already."""
         written = isinstance(reply, SdoWritten)
         write = self.answered(written=written)

@@ -17,6 +17,7 @@ from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, 
 from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
+from orchestrator.service.identified import Identified
 from orchestrator.service.journal import Journal
 from orchestrator.service.news import TICK_S, due_s
 from orchestrator.service.past import Place
@@ -49,7 +50,8 @@ class BayRunner:
         self.last_s, self.due_s = 0.0, -inf  #: when the last decision was made, and when the next is due at the latest
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
-        self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
+        self._store, self._say, self._answers = store, say, Answers(store, lambda: self.ask(Asked(Request.STOP)))
+        self.identified = Identified(bay, store, journal, say, language)
         self._memory: Memory | None = None  # None before the first decision: the persisted state is still being read
         self._revision = 0  # the revision that persists this bay's memory
         self._ending: Cause | None = None
@@ -60,8 +62,7 @@ class BayRunner:
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
         self._written: tuple[Cause | None, bool] | None = None  # of the contactor: problem, closed
         self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
-        self._requests = Requests()
-        self._internal = ""
+        self._requests, self._internal = Requests(), ""
 
     @property
     def verified(self) -> bool:
@@ -77,7 +78,7 @@ class BayRunner:
     @property
     def owes(self) -> bool:
         """Whether somebody is waiting for an answer."""
-        return bool(self._requests or self._answers.waiting)
+        return bool(self._requests or self._answers.waiting or self.identified.asked)
 
     def has_news(self) -> bool:
         """Whether the next decision cannot wait for the tick. Any thread may ask."""
@@ -119,10 +120,6 @@ class BayRunner:
     def ask(self, asked: Asked) -> None:
         """Submit an operator's request; the next decision handles it."""
         self._requests.put(asked)
-
-    def _withdraw(self) -> None:
-        """Hold, as after a stop: a start could not be persisted."""
-        self.ask(Asked(Request.STOP))
 
     def run(self, now_s: float, asleep_s: float = 0.0) -> None:
         """Make one decision. An exception in our own code stops the bay and is passed to the next decision.
@@ -183,6 +180,7 @@ class BayRunner:
             self._put_timed(self._recorder.lines(now_s, snapshot, memory, decision.state, news=bool(lines)))
         if before is None or before.state is not decision.state:
             self._say(transition(self.name, before, decision, clock))
+        self.identified.follow(now_s, snapshot, self._memory)
         self._keep(self._memory, now_s)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
@@ -232,10 +230,11 @@ class BayRunner:
             self._say(Cause.of("policy_in_force", bay=self.name, policy=name_of(bay)))
 
     def _keep(self, memory: Memory, now_s: float) -> None:
-        persisted = Persisted.of(memory, now_s)
+        persisted = self.identified.kept(Persisted.of(memory, now_s))
         if self._waits and not persisted.hold:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)
+        self.identified.answer(self._revision)
 
     def status(self) -> dict[str, object]:
         """The bay's part of the status document."""
@@ -244,6 +243,7 @@ class BayRunner:
         contactor = self._contactor
         return {
             **bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language),
+            "identity": self.identified.status(),
             "contactor": contactor and contactor_fields(contactor, self._language),
             "port": self.place.port,
             "policy": self.policy.status(),

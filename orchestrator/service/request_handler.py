@@ -6,6 +6,7 @@ from orchestrator.config.station import Station
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause, Request
 from orchestrator.model.cause import plain
+from orchestrator.model.identity import LONGEST_ID, is_id
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.chosen import unknown
@@ -18,6 +19,8 @@ from orchestrator.text.catalogue import say
 
 #: The next decision handles a request; the answer comes when it is on disk, or after 2 s. Later means a hung loop.
 ANSWER_S = 3.0
+#: The verb that is no request to the core.
+IDENTIFY = "identify"
 #: An answer names no more unknown bays: its length is bounded.
 MOST_UNKNOWN = 20
 
@@ -56,7 +59,35 @@ class RequestHandler:
                 return self._drop(port)
             bays, others = (self._bays, {}) if names is None else self._meant(_names(names), verb)
             return self._ask(bays, Request(verb), others)
-        raise RequestError(Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", *map(str, Request))))
+        if verb == IDENTIFY:
+            return self._identify(request.get("bays"), request.get("battery"))
+        raise RequestError(
+            Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", *map(str, Request), IDENTIFY))
+        )
+
+    def _identify(self, names: object, battery: object) -> Later:
+        """Name the battery in one bay; answered with its identity once that is on disk."""
+        if not isinstance(battery, str) or not is_id(battery):
+            raise RequestError(Cause.of("battery_id_wrong", battery=f"{battery!r:.80}", longest=LONGEST_ID))
+        bay = self._named(_names(names)[0] if names else None, IDENTIFY)
+        self._store.refuse_not_persisted(self._clock())
+        named = bay.identified.name(battery)
+        self._wake(self._bays.index(bay))
+        end_s = self._clock() + ANSWER_S
+
+        def results() -> Answer | None:
+            if named.identity is not None and self._store.persisted_revision >= named.revision:
+                told = named.identity.cause
+                return {
+                    **self._results({bay.name: None}),
+                    "identity": {**plain(told), "text": say(told, self._language)},
+                }
+            if named.refusal is None and self._clock() < end_s:
+                return None
+            late = self._store.not_persisted(self._clock()) or Cause("no_answer")
+            return self._results({bay.name: named.refusal or late})
+
+        return results
 
     def _drop(self, port: str) -> Later:
         """Forget a charger without a bay; answered once that is on disk."""

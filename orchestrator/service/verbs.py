@@ -1,4 +1,4 @@
-"""The verbs of the running service: run it, show its status, and request start, pause, stop or reset of its bays.
+"""The verbs of the running service: run it, show its status, name a battery, and request a bay's start, pause, stop …
 
 Each imports its dependencies when it runs, so that none waits for another's libraries.
 """
@@ -45,6 +45,11 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
             request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
+    identify = verbs.add_parser("identify", help="say which battery is in a bay whose BMU tells no serial number")
+    identify.add_argument("bay", help="the bay's name")
+    identify.add_argument("--battery", required=True, metavar="ID", help="what is written on it, e.g. B-0042")
+    _add_socket(identify)
+    identify.set_defaults(run=_identify)
 
 
 def _add_except(parser: argparse.ArgumentParser) -> None:
@@ -81,3 +86,9 @@ def _request(arguments: argparse.Namespace) -> int:
     from orchestrator.service.request_verb import request
 
     return request(arguments)
+
+
+def _identify(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.identify_verb import identify
+
+    return identify(arguments)

@@ -58,7 +58,13 @@ def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
         "reason": said(bay.get("cause"), bay["reason"], language),
         "step_rule": said(bay.get("step_cause"), bay.get("step_rule", ""), language),
         "faults": [_fault(one, language) for one in bay["faults"]],
+        **({"identity": _told(bay["identity"], language)} if "identity" in bay else {}),
     }
+
+
+def _told(part: Mapping[str, Any], language: str) -> dict[str, Any]:
+    """A part that has its cause, and a text for it."""
+    return {**part, "text": said(part.get("cause"), part["text"], language)}
 
 
 def _fault(fault: Mapping[str, Any], language: str) -> dict[str, Any]:

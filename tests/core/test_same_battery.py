@@ -253,3 +253,40 @@ def test_an_exchange_across_a_restart_is_one() -> None:
     tells(world, 4712)
     world.run(2)
     assert "battery_exchanged" in world.raised
+
+
+# --- whether it may be another one ------------------------------------------------------------------------------------
+
+
+def test_a_battery_that_leaves_may_be_another_until_one_is_heard() -> None:
+    world = World().charging()
+    assert not world.memory.battery.another
+    world.leave()
+    world.until(S.IDLE)
+    assert world.memory.battery.another
+    world.run(60)
+    assert world.memory.battery.another
+    world.arrive()
+    world.run(1)
+    assert not world.memory.battery.another
+
+
+def test_an_exchange_that_only_the_soc_tells_is_another_battery() -> None:
+    world = full()
+    sleeps(world)
+    world.values["soc_pct"] = 60.0
+    world.battery_answers = True
+    found = 0
+    for _ in range(20):
+        world.tick()
+        found += world.memory.battery.another
+    assert found == 1
+    assert world.memory.battery.full_pct is None
+
+
+def test_a_sleeping_battery_is_not_another() -> None:
+    world = full()
+    sleeps(world)
+    assert not world.memory.battery.another
+    wakes(world)
+    assert not world.memory.battery.another

@@ -213,6 +213,7 @@ past = st.builds(
     full_pct=st.none() | figure,
     soc=st.none() | st.tuples(figure, figure),
     serial=st.none() | st.integers(1, 2**32 - 1),
+    typed=st.text(max_size=8),
 )
 place = st.builds(
     Place,

@@ -114,8 +114,7 @@ def _known(f: Facts, known: BatteryHistory) -> BatteryHistory:
         return known
     if known.full_s is None and f.soc is not None:
         known = changed(known, full_s=f.now_s)
-    if known.full_pct is not None:
-        known = same_battery.watched(f, known)
+    known = same_battery.watched(f, known)
     if known.boots != f.battery.boots and f.memory.state is not State.STOPPING:
         known = changed(known, boots=f.battery.boots)
     return known

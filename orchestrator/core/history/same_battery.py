@@ -24,7 +24,7 @@ def recognised(f: Facts, known: BatteryHistory) -> BatteryHistory:
         return known
     if before is None:
         return changed(known, serial=serial)
-    known = changed(known, serial=serial or None, full_pct=None, sight=None)
+    known = changed(known, another=True, serial=serial or None, full_pct=None)
     if not serial:  # it may just not have been told
         return known
     known = changed(known, full_s=None)
@@ -34,22 +34,34 @@ def recognised(f: Facts, known: BatteryHistory) -> BatteryHistory:
 
 
 def watched(f: Facts, known: BatteryHistory) -> BatteryHistory:
-    """Follow a full pack while its BMU is silent, and forget that it is full once it may be another one."""
-    if known.serial is None and not f.stalled and _may_be_another(f, known):
-        return changed(known, full_pct=None, sight=None)
-    now = None if f.battery.online else _sight(f, known)
-    return known if now == known.sight else changed(known, sight=now)
+    """Follow the pack while its BMU is silent, and forget what is known of it once it may be another one."""
+    before = f.memory.battery
+    if known.another is not before.another:  # found in this decision
+        return known
+    if known.exchange is not before.exchange:
+        return _forgotten(known)
+    silent = not f.battery.online
+    if f.stalled or (silent and known.another):
+        return known
+    if (silent or known.boots != f.battery.boots) and _may_be_another(f, known):
+        return _forgotten(known)
+    sight = _sight(f, known) if silent else None
+    return changed(known, another=False, sight=sight) if known.another or sight != known.sight else known
+
+
+def _forgotten(known: BatteryHistory) -> BatteryHistory:
+    """With a serial number, it will be known whether it is another."""
+    full_pct = known.full_pct if known.serial is not None else None
+    return changed(known, another=True, full_pct=full_pct, sight=None)
 
 
 def _may_be_another(f: Facts, known: BatteryHistory) -> bool:
     """Whether somebody can have exchanged it since it was last seen."""
     if f.battery_removed:
         return True
-    volts, boots = _seen_v(f), known.boots != f.battery.boots
-    if f.battery.online and not boots:
-        return False
+    volts, booted = _seen_v(f), known.boots != f.battery.boots
     seen_s, seen_v = known.sight or (f.now_s, _reported_v(f))
-    if f.now_s - seen_s > UNSEEN_S or (boots and volts is None):
+    if f.now_s - seen_s > UNSEEN_S or (booted and volts is None):
         return True
     return volts is not None and seen_v is not None and abs(volts - seen_v) > OTHER_V_SHARE * seen_v
 
