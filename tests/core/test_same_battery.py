@@ -186,7 +186,10 @@ def test_another_serial_number_or_none_is_another_battery(serial: int) -> None:
     hidden(world)
     wakes(world)
     tells(world, serial)
+    world.tick()
+    assert world.memory.battery.another
     world.run(10)
+    assert not world.memory.battery.another
     assert world.is_in(S.CHARGING)
     assert world.memory.battery.serial == (serial or None)
     assert "battery_exchanged" not in world.raised, "nothing was charging, so nothing is to be ended"

@@ -97,3 +97,10 @@ def test_it_is_read_again_after_a_silence() -> None:
     assert bench.link.serial is None
     assert answering(bench, 10.0, TELLS) == 1
     assert bench.link.serial == 1234
+
+
+def test_a_boot_gives_another_chance_to_a_bmu_that_did_not_answer() -> None:
+    bench = Bench()
+    answering(bench, 60.0, None)
+    bench.hear(HEARTBEAT, "00")
+    assert answering(bench, 60.0, None) == MOST_TRIES

@@ -41,7 +41,7 @@ def watched(f: Facts, known: BatteryHistory) -> BatteryHistory:
     if known.exchange is not before.exchange:
         return _forgotten(known)
     silent = not f.battery.online
-    if f.stalled or (silent and known.another):
+    if silent and known.another:
         return known
     if (silent or known.boots != f.battery.boots) and _may_be_another(f, known):
         return _forgotten(known)
