@@ -6,6 +6,8 @@ from tests.waiting import wait_until
 from tests.whole.station import Service, whole_station
 
 WITHIN_S = 15.0
+#: Below where the policy of these tests starts to charge a battery, above where it charges a full one again.
+WAKES_AT_PCT = 96.0
 
 
 def identity(service: Service) -> tuple[str, str]:
@@ -45,3 +47,17 @@ def test_a_bmu_that_tells_none(tmp_path: Path) -> None:
             assert refused.returncode == 1
             assert why in refused.stderr
         assert identity(service) == ("B-0042", "typed")
+
+
+def test_a_full_pack_whose_bmu_sleeps_is_not_charged_again(tmp_path: Path) -> None:
+    """Its BMU wakes at a SOC at which another battery would be charged."""
+    with whole_station(tmp_path, 1, "--pack", "demo", "--soc", "93", "--speed", "4") as (plant, service):
+        service.start().wait("FULL", timeout_s=60)
+        for _ in range(3):
+            soc_pct = service.status("bay-1")["bay-1"]["battery"]["soc_pct"]
+            plant.inject("battery_exchanged", value=WAKES_AT_PCT - soc_pct)
+            service.wait("OFFLINE")
+            service.wait("FULL")
+            plant.inject("soc_jump", value=0.0)
+        wait_until(lambda: service.path_of("bay-1").count("FULL") == 4, what="the journal")
+        assert service.path_of("bay-1")[-7:] == ["FULL", *["OFFLINE", "FULL"] * 3]
