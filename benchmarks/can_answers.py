@@ -37,7 +37,7 @@ def answer(cob_id: int, data: bytes) -> tuple[int, bytes] | None:
         return None
     time.sleep(WIRE_S)
     Count.reads += 1
-    word = WORDS[data[1] | data[2] << 8]
+    word = WORDS.get(data[1] | data[2] << 8, 0)  # such as no serial number
     return cob_id + REPLIES, bytes((VALUE,)) + data[1:4] + word.to_bytes(4, "little")
 
 

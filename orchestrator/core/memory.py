@@ -123,7 +123,11 @@ class BatteryHistory:
     full_s: float | None = event(None)  #: when it was last charged all the way; before that, when it was first seen
     full_pct: float | None = event(
         None, tells=ANYWHERE
-    )  #: its SOC when it was charged full here; None: it was not, or has been removed
+    )  #: its SOC when it was charged full here; None: it was not, or this may be another battery
+    serial: int | None = event(None)  #: the serial number of the battery that was last here; None: it has none
+    another: bool = event(default=False)  #: what is there, or comes next, may be another battery than the last one
+    sight: tuple[float, float | None] | None = measured(None)  #: when the charger last saw the pack of a silent BMU,
+    #: and its volts; None: the BMU is heard
     left_s: float | None = event(None)  #: when it was removed in mid-charge; None: it was not, or that is dealt with
     left_as: tuple[float | None, float | None] = event((None, None))  #: … and its SOC and volts then
     returned_s: float | None = event(None)  #: when one returned so soon that only its plug can have been loose

@@ -49,6 +49,8 @@ class Persisted:
     full_pct: float | None = None
     full: Age | None = None  #: how long the battery has not been charged all the way; None: not counted yet
     soc: tuple[Age, float] | None = None  #: the newest SOC of the battery in the bay
+    serial: int | None = None  #: its serial number; None: it has none
+    typed: str = ""  #: its id as an operator typed it; the core knows nothing of it
 
     @classmethod
     def of(cls, memory: Memory, now_s: float) -> "Persisted":
@@ -78,6 +80,7 @@ class Persisted:
             full_pct=memory.battery.full_pct,
             full=_age(memory.battery.full_s, now_s),
             soc=(now_s - soc_s, soc_pct) if soc_pct is not None else None,
+            serial=memory.battery.serial,
         )
 
     @property
@@ -87,7 +90,13 @@ class Persisted:
             (name, fault.latched, fault.raised is not None, len(fault.strikes)) for name, fault in self.faults.items()
         )
         resets = tuple(name for _, name in self.resets)
-        known = (self.uncontrollable is not None, self.session is not None, self.full_pct is None)
+        known = (
+            self.uncontrollable is not None,
+            self.session is not None,
+            self.full_pct is None,
+            self.serial,
+            self.typed,
+        )
         return self.running, self.hold, self.paused, self.paused_by, faults, resets, *known
 
     def aged(self, seconds: float, unseen_s: float | None = None) -> "Persisted":
@@ -147,6 +156,7 @@ class Persisted:
             full_pct=self.full_pct,
             full_s=None if self.full is None else now_s - self.full,
             unverified=self.running,
+            serial=self.serial,
             charge=(now_s - self.soc[0], self.soc[1]) if self.soc is not None else (0.0, None),
         )
 

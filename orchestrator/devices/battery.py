@@ -11,7 +11,7 @@ from math import inf
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.attention import Attention
 from orchestrator.devices.battery_view import BatteryView
-from orchestrator.devices.bmu_setup import HEARTBEAT, BmuSetup
+from orchestrator.devices.bmu_setup import BmuSetup
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.emergency import emergency_cob_id, emergency_of, is_emergency
 from orchestrator.devices.node_health import NOT_OURS, NodeHealth
@@ -19,6 +19,7 @@ from orchestrator.devices.other_masters import OtherMasters
 from orchestrator.devices.read_plan import ReadPlan
 from orchestrator.devices.requester import Requester, Send
 from orchestrator.devices.sdo_client import SdoClient, Verdict
+from orchestrator.devices.serial_number import SERIAL, SerialNumber
 from orchestrator.devices.whose_answer import whose_answer
 from orchestrator.model import BatteryLink, BatteryReading, Cause
 from orchestrator.model.moment import moment
@@ -26,9 +27,9 @@ from orchestrator.protocol.objects import TpdoEntry
 from orchestrator.protocol.sdo import (
     NmtState,
     SdoAbort,
+    SdoAnswer,
     SdoMalformed,
     SdoValue,
-    SdoWritten,
     heartbeat_cob_id,
     parse_reply,
     reply_cob_id,
@@ -56,13 +57,13 @@ class BatteryNode:
         self._plan = ReadPlan(config, budget)
         self._attention = Attention(self._plan)
         self._client = SdoClient(config.sdo_timeout_s)
-        self._setup = BmuSetup(config)
-        self._health = NodeHealth()
-        self._others = OtherMasters()
+        self._setup, self._serial = BmuSetup(config), SerialNumber()
+        self._health, self._others = NodeHealth(), OtherMasters()
         self._answer_s = -inf  # when the newest valid answer arrived
         self._requester = Requester(
-            self.node_id, budget, plan=self._plan, client=self._client, setup=self._setup, others=self._others
-        )
+            self.node_id, budget,
+            plan=self._plan, client=self._client, setup=self._setup, serial=self._serial, others=self._others,
+        )  # fmt: skip
         self._view = BatteryView(Cause.of("bmu_not_asked", node_id=self.node_id, bus=bus), on_change)
         self._handlers = self._frame_handlers()
 
@@ -109,6 +110,8 @@ class BatteryNode:
         """Do what is due: give up overdue requests, detect silence, send the next request by `send(cob_id, data)`."""
         self._watch(now_s)
         self._attention.follow(self._view.amps)
+        if self._serial.given_up(now_s):
+            self._view.set(serial=0)
         self.next_due_s = self._requester.ask(now_s, send, online=self._view.link.online)
         if self._view.link.online:
             self.next_due_s = min(self.next_due_s, self._answer_s + ANSWER_LIMIT_S)
@@ -171,20 +174,19 @@ class BatteryNode:
         if not isinstance(reply, SdoMalformed) and (polled := self._plan.get((reply.index, reply.sub))):
             self._view.doubted(polled.answers.other(verdict, self._client.first, reply, now_s))
 
-    def _accept(self, reply: SdoValue | SdoWritten | SdoAbort, now_s: float) -> None:
+    def _accept(self, reply: SdoAnswer, now_s: float) -> None:
         self._answer_s = now_s
         self._requester.hurry()
-        if not self._view.link.online or self._view.link.problem is not None:
-            self._view.set(online=True, problem=None)
+        if not self._view.link.online:
+            self._serial.arrived(now_s)
+            self._view.set(online=True, problem=None, serial=None)
         if self._others.active:
             self._others.ours_answered(self._client.asked_s)
         if self._client.writing:
-            self._configured(now_s, written=isinstance(reply, SdoWritten))
+            self._view.set(**self._setup.configured(reply, now_s, armed=self._view.link.heartbeat_s is not None))
             return
-        polled = self._plan.get((reply.index, reply.sub))
-        if polled is None:  # the heartbeat's period was read back
-            if isinstance(reply, SdoValue) and (found := self._setup.checked(reply.value)):
-                self._view.set(heartbeat_set=found, heartbeat_set_t_s=now_s)
+        if (polled := self._plan.get((reply.index, reply.sub))) is None:
+            self._told_once(reply, now_s)
             return
         if isinstance(reply, SdoAbort):
             polled.abort = reply
@@ -195,14 +197,12 @@ class BatteryNode:
             abort = next((polled.abort for polled in self._plan.objects if polled.abort), None)
             self._view.set(abort=abort.cause if abort else None, abort_code=abort.code if abort else 0)
 
-    def _configured(self, now_s: float, *, written: bool) -> None:
-        write = self._setup.answered(written=written)
-        if write.key != HEARTBEAT:
-            return
-        if not written:  # not every BMU allows it: without a heartbeat there is nothing to watch
-            self._view.set(heartbeat_s=None, heartbeat_t_s=None)
-        elif self._view.link.heartbeat_s is None or self._setup.rearms():
-            self._view.set(heartbeat_s=write.period_s, heartbeat_t_s=now_s)
+    def _told_once(self, reply: SdoAnswer, now_s: float) -> None:
+        """The serial number was read, or the heartbeat's period was read back."""
+        if (reply.index, reply.sub) == SERIAL:
+            self._view.set(serial=self._serial.answered(reply))
+        elif isinstance(reply, SdoValue) and (found := self._setup.checked(reply.value)):
+            self._view.set(heartbeat_set=found, heartbeat_set_t_s=now_s)
 
     def _on_heartbeat(self, data: bytes, now_s: float) -> None:
         if len(data) != 1 or data[0] == TOGGLE:
@@ -226,6 +226,7 @@ class BatteryNode:
         self._client.clear()
         self._others.clear()
         self._setup.booted()
+        self._serial.arrived(now_s)
         self._plan.restart(now_s)
         self._requester.hurry()
         self.next_due_s = now_s

@@ -5,11 +5,12 @@ The BMU forgets them with every boot. Nothing else is ever written to it (`link/
 
 from dataclasses import dataclass
 from math import inf
+from typing import Any
 
 from orchestrator.config.station import BatteryConfig
 from orchestrator.devices.sdo_client import Key
 from orchestrator.model import Cause
-from orchestrator.protocol.sdo import NmtState, write_request
+from orchestrator.protocol.sdo import NmtState, SdoAnswer, SdoWritten, write_request
 
 HEARTBEAT: Key = (0x1017, 0)
 _TPDO_TIMER = 0x17FF  #: + the TPDO's number: 0x1800, 0x1801, 0x1802 (§2.5 has a misprint: 0x1082)
@@ -100,6 +101,16 @@ class BmuSetup:
         self._any_tpdo |= written and write.key != HEARTBEAT
         self.start_due = self._any_tpdo and not self._left
         return write
+
+    def configured(self, reply: SdoAnswer, now_s: float, *, armed: bool) -> dict[str, Any]:
+        """As `answered`, and what the link says of the heartbeat from now on; `armed`: it was waited for already."""
+        written = isinstance(reply, SdoWritten)
+        write = self.answered(written=written)
+        if write.key != HEARTBEAT:
+            return {}
+        if not written:  # not every BMU allows it: without a heartbeat there is nothing to watch
+            return {"heartbeat_s": None, "heartbeat_t_s": None}
+        return {} if armed and not self.rearms() else {"heartbeat_s": write.period_s, "heartbeat_t_s": now_s}
 
     def heard(self, nmt_state: int) -> None:
         """A heartbeat came. A node that should send TPDOs is started again: the first start, which is unconfirmed, was

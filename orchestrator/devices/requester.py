@@ -9,6 +9,7 @@ from orchestrator.devices.other_masters import OtherMasters
 from orchestrator.devices.polled import Polled
 from orchestrator.devices.read_plan import ReadPlan
 from orchestrator.devices.sdo_client import Key, SdoClient
+from orchestrator.devices.serial_number import SERIAL, SerialNumber
 from orchestrator.protocol.sdo import NMT_COB_ID, NmtCommand, nmt_frame, read_request, request_cob_id
 
 Send = Callable[[int, bytes], None]
@@ -17,9 +18,11 @@ SILENT_S = 0.5  #: pause between requests to a node that is not online, so that 
 
 
 class Requester:
-    """Reads one BMU's objects, sets its timers and starts it. Belongs to the thread of its bus."""
+    """Reads one BMU's objects and serial number, sets its timers and starts it. Belongs to the thread of its bus."""
 
-    __slots__ = ("_budget", "_client", "_node_id", "_not_before_s", "_others", "_plan", "_setup", "_slot_s")
+    __slots__ = (
+        "_budget", "_client", "_node_id", "_not_before_s", "_others", "_plan", "_serial", "_setup", "_slot_s",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -29,10 +32,12 @@ class Requester:
         plan: ReadPlan,
         client: SdoClient,
         setup: BmuSetup,
+        serial: SerialNumber,
         others: OtherMasters,
     ) -> None:
         self._node_id, self._budget = node_id, budget
         self._plan, self._client, self._setup, self._others = plan, client, setup, others
+        self._serial = serial
         self._not_before_s = -inf  # when a silent node may be queried again
         self._slot_s: float | None = None  # when the bus's budget lets the next request go out, if reserved
 
@@ -46,7 +51,7 @@ class Requester:
             return now_s
         due_s = self._plan.due_s
         if due_s > now_s:
-            return due_s
+            return max(now_s, min(due_s, self._serial.due_s)) if self._client.may_ask(SERIAL) else due_s
         if self._slot_s is None:
             self._slot_s = self._budget.reserve(now_s)
         return self._slot_s
@@ -74,7 +79,13 @@ class Requester:
         if self._setup.check_due and online and self._client.may_ask(HEARTBEAT):
             return self._request(HEARTBEAT, now_s, send, online=online)
         chosen = self._plan.choose(now_s, self._client)
-        return self._request(chosen, now_s, send, online=online) if isinstance(chosen, Polled) else chosen
+        if isinstance(chosen, Polled):
+            return self._request(chosen, now_s, send, online=online)
+        if not online or not self._client.may_ask(SERIAL):
+            return chosen
+        if now_s < self._serial.due_s:
+            return min(chosen, self._serial.due_s)
+        return self._request(SERIAL, now_s, send, online=online)
 
     def _request(self, what: TimerWrite | Polled | Key, now_s: float, send: Send, *, online: bool) -> float:
         if self._slot_s is None:
@@ -91,7 +102,7 @@ class Requester:
             self._setup.sent(now_s)
         else:
             key, frame = what, read_request(*what)
-            self._setup.checking(now_s)
+            (self._serial.asked if what == SERIAL else self._setup.checking)(now_s)
         self._client.ask(key, now_s, write=isinstance(what, TimerWrite))
         if not online:
             self._not_before_s = now_s + SILENT_S

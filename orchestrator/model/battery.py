@@ -63,3 +63,4 @@ class BatteryLink:
     other_master_t_s: float | None = None  #: when that was
     heartbeat_set: Cause | None = None  #: what somebody else had set this node's heartbeat to when that was last found
     heartbeat_set_t_s: float | None = None  #: when that was; ours was written again at once
+    serial: int | None = None  #: serial number since it was last heard anew; 0: it has none; None: not read yet

@@ -125,7 +125,8 @@ class SdoMalformed:
     cause: Cause
 
 
-SdoReply = SdoValue | SdoWritten | SdoAbort | SdoMalformed
+SdoAnswer = SdoValue | SdoWritten | SdoAbort
+SdoReply = SdoAnswer | SdoMalformed
 
 
 def parse_reply(data: bytes | bytearray) -> SdoReply:

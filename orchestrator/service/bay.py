@@ -18,6 +18,7 @@ from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.bayjournal import BayJournal
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
+from orchestrator.service.identified import Identified
 from orchestrator.service.journal import Journal
 from orchestrator.service.news import TICK_S, due_s
 from orchestrator.service.outlook import outlook
@@ -51,7 +52,8 @@ class BayRunner:
         self.last_s, self.due_s = 0.0, -inf  #: when the last decision was made, and when the next is due at the latest
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
-        self._store, self._say, self._answers = store, say, Answers(store, self._withdraw)
+        self._store, self._say, self._answers = store, say, Answers(store, lambda: self.ask(Asked(Request.STOP)))
+        self.identified = Identified(bay, store, journal, say, language)
         self._memory: Memory | None = None  # None before the first decision: the persisted state is still being read
         self._revision = 0  # the revision that persists this bay's memory
         self._ending: Cause | None = None
@@ -62,8 +64,7 @@ class BayRunner:
         self._contactor = contactor
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
         self._snapshot = Snapshot()
-        self._requests = Requests()
-        self._internal = ""
+        self._requests, self._internal = Requests(), ""
         self._by: Cause | None = None  # who made the request that is being decided
 
     @property
@@ -80,7 +81,7 @@ class BayRunner:
     @property
     def owes(self) -> bool:
         """Whether somebody is waiting for an answer."""
-        return bool(self._requests or self._answers.waiting)
+        return bool(self._requests or self._answers.waiting or self.identified.asked)
 
     def has_news(self) -> bool:
         """Whether the next decision cannot wait for the tick. Any thread may ask."""
@@ -118,10 +119,6 @@ class BayRunner:
     def ask(self, asked: Asked) -> None:
         """Submit an operator's request; the next decision handles it."""
         self._requests.put(asked)
-
-    def _withdraw(self) -> None:
-        """Hold, as after a stop: a start could not be persisted."""
-        self.ask(Asked(Request.STOP))
 
     def run(self, now_s: float, asleep_s: float = 0.0) -> None:
         """Make one decision. An exception in our own code stops the bay and is passed to the next decision.
@@ -179,6 +176,7 @@ class BayRunner:
         self._journal.decided(clock, before, decision, snapshot, memory)
         if before is None or before.state is not decision.state:
             self._say(transition(self.name, before, decision, clock))
+        self.identified.follow(now_s, snapshot, self._memory)
         self._keep(self._memory, now_s)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
@@ -222,10 +220,11 @@ class BayRunner:
             self._say(Cause.of("policy_in_force", bay=self.name, policy=name_of(bay)))
 
     def _keep(self, memory: Memory, now_s: float) -> None:
-        persisted = Persisted.of(memory, now_s)
+        persisted = self.identified.kept(Persisted.of(memory, now_s))
         if self._waits and not persisted.hold:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)
+        self.identified.answer(self._revision)
 
     def status(self, *, closely: bool = False) -> dict[str, object]:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
@@ -235,6 +234,7 @@ class BayRunner:
         return {
             **bay_status(self.name, snapshot, decision, clock.now_s, clock.wall_s, self._language),
             **outlook(decision, snapshot, memory, rules, clock, self._language, closely=closely),
+            "identity": self.identified.status(),
             "contactor": contactor and contactor_fields(contactor, self._language),
             "port": self.place.port,
             "bmu": {"can": self.place.can, "node_id": self.place.node_id},

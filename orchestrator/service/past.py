@@ -105,6 +105,8 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
             faults[name] = _worse(faults[name], fault) if name in faults else fault
     sessions = [part.session for part in parts if part.session is not None]
     fulls = [part.full_pct for part in parts if part.full_pct is not None]
+    batteries = {(part.serial, part.typed) for part in parts}
+    serial, typed = batteries.pop() if len(batteries) == 1 else (None, "")
     return Persisted(
         running=any(part.running for part in parts),
         uncontrollable=max((one for part in parts if (one := part.uncontrollable) is not None), default=None),
@@ -117,6 +119,8 @@ def merged(parts: Sequence[Persisted], moves: Sequence[Cause]) -> Persisted:
         full_pct=min(fulls, default=None),
         full=max((part.full for part in parts if part.full is not None), default=None),
         soc=min((part.soc for part in parts if part.soc is not None), default=None),
+        serial=serial,
+        typed=typed,
     )
 
 

@@ -8,6 +8,7 @@ from orchestrator.config.station import Station
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause, Request
 from orchestrator.model.cause import plain
+from orchestrator.model.identity import LONGEST_ID, is_id
 from orchestrator.service.asked import Asked
 from orchestrator.service.asker import Asker, user_name
 from orchestrator.service.bay import BayRunner
@@ -23,7 +24,8 @@ from orchestrator.text.catalogue import say
 
 #: The next decision handles a request; the answer comes when it is on disk, or after 2 s. Later means a hung loop.
 ANSWER_S = 3.0
-RELOAD = "reload"
+#: The verbs that are no requests to the core.
+RELOAD, IDENTIFY = "reload", "identify"
 #: How long rereading the files may take, and how long a bay at rest may take to adopt its policy.
 READ_S, ADOPT_S = 8.0, 1.5
 #: An answer names no more unknown bays: its length is bounded.
@@ -71,7 +73,35 @@ class RequestHandler:
             bays, others = (self._bays, {}) if names is None else self._meant(_names(names), verb)
             spares = verb == Request.START and request.get("spares") is True
             return self._ask(bays, partial(Asked, Request(verb), asker, spares=spares), others)
-        raise RequestError(Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", RELOAD, *map(str, Request))))
+        if verb == IDENTIFY:
+            return self._identify(request.get("bays"), request.get("battery"), Asker.of(request, self._wall()))
+        raise RequestError(
+            Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", RELOAD, *map(str, Request), IDENTIFY))
+        )
+
+    def _identify(self, names: object, battery: object, asker: Asker) -> Later:
+        """Name the battery in one bay; answered with its identity once that is on disk."""
+        if not isinstance(battery, str) or not is_id(battery):
+            raise RequestError(Cause.of("battery_id_wrong", battery=f"{battery!r:.80}", longest=LONGEST_ID))
+        bay = self._named(_names(names)[0] if names else None, IDENTIFY)
+        self._store.refuse_not_persisted(self._clock())
+        named = bay.identified.name(battery)
+        self._wake(self._bays.index(bay))
+        end_s = self._clock() + ANSWER_S
+
+        def results() -> Answer | None:
+            if named.identity is not None and self._store.persisted_revision >= named.revision:
+                told = named.identity.cause
+                return {
+                    **self._results({bay.name: None}, IDENTIFY, asker),
+                    "identity": {**plain(told), "text": say(told, self._language)},
+                }
+            if named.refusal is None and self._clock() < end_s:
+                return None
+            late = self._store.not_persisted(self._clock()) or Cause("no_answer")
+            return self._results({bay.name: named.refusal or late}, IDENTIFY, asker)
+
+        return results
 
     def refused(self, request: Mapping[str, object], why: Cause) -> None:
         """Write down a request that reaches no bay."""

@@ -1,4 +1,4 @@
-"""The verbs of the running service: run it, show its status and history, and request start, pause, stop or reset.
+"""The verbs of the running service: run it, show its status and history, name a battery, request start, pause, stop …
 
 Each imports its dependencies when it runs, so that none waits for another's libraries.
 """
@@ -52,6 +52,7 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
             request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
+    _add_identify(verbs)
     _add_reload(verbs)
 
 
@@ -79,6 +80,14 @@ def _add_history(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     )
     _add_socket(history)
     history.set_defaults(run=_history)
+
+
+def _add_identify(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    identify = verbs.add_parser("identify", help="say which battery is in a bay whose BMU tells no serial number")
+    identify.add_argument("bay", help="the bay's name")
+    identify.add_argument("--battery", required=True, metavar="ID", help="what is written on it, e.g. B-0042")
+    _add_socket(identify)
+    identify.set_defaults(run=_identify)
 
 
 def _add_except(parser: argparse.ArgumentParser) -> None:
@@ -133,3 +142,9 @@ def _reload(arguments: argparse.Namespace) -> int:
     from orchestrator.service.reload_verb import reload
 
     return reload(arguments)
+
+
+def _identify(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.identify_verb import identify
+
+    return identify(arguments)

@@ -21,6 +21,7 @@ from orchestrator.sim.pack import Readout
 
 HEARTBEAT, TPDO_PARAMETERS, TPDO_COB_ID = 0x1017, 0x1800, 0x180
 DEVICE_NAME, NAME = 0x1008, b"TABOS battery management unit"  #: longer than the 4 bytes of one answer
+SERIAL = 0x1018, 4  #: of the identity object; 0 is none
 EMERGENCY, GUARD = 0x080, 0x700
 EVENT_TIMER = 5  #: sub-index of a TPDO's period in ms
 
@@ -70,6 +71,7 @@ class Bmu:
         *,
         layout: Layout = Layout.FIRST_HIGH,
         main_loop: bool = False,
+        serial: int = 0,
     ) -> None:
         self.port = NodePort(wire, loop, MainLoop(loop, seed=node_id) if main_loop else None)
         self.layout = layout
@@ -79,6 +81,7 @@ class Bmu:
         self._node = Node(self.port, node_id, capabilities=NodeCapabilities(sdo_servers=1, rpdos=1, tpdos=0))
         self._dictionary = self._node.object_dictionary
         self._dictionary.write(DEVICE_NAME, 0, NAME)
+        self._dictionary.write(*SERIAL, serial)
         for index in (index for tpdo in TPDOS for index in tpdo):
             self._dictionary[index] = Variable(DatatypeEnum.UNSIGNED32, "ro")
             self._dictionary.set_read_callback(index, 0, partial(self._read, index))

@@ -71,6 +71,7 @@ class Plant:
             layout=LAYOUTS[args.layout],
             main_loop=args.bmu == "mainloop",
             speed=args.speed,
+            serial=args.serial and args.serial + number,
         )
         return Rig(self._loop, self._wires[number // self._per_bus], SimulatedBay(charger, pack), setup)
 
@@ -216,6 +217,7 @@ def arguments(argv: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--bmu", choices=("immediate", "mainloop"), default="immediate", help="when the BMUs answer")
     parser.add_argument("--automatic", action="store_true", help="the chargers' rotary switches are on 5, not on 1")
     parser.add_argument("--speed", type=float, default=1.0, help="speed of the batteries relative to real time")
+    parser.add_argument("--serial", type=int, default=0, help="the first battery's serial number; 0: they have none")
     args = parser.parse_args(argv)
     last = args.node + -(-args.bays // len(args.can or [CAN])) - 1
     if args.bays < 1 or args.node < 1 or last > LAST_NODE_ID:

@@ -26,6 +26,7 @@ class Setup:
     line: SimulatedLine = field(default_factory=SimulatedLine)
     layout: Layout = Layout.FIRST_HIGH
     main_loop: bool = False  #: the BMU answers when its main loop gets to it
+    serial: int = 0  #: the battery's serial number; 0: it has none
     speed: float = 1.0  #: model seconds per real second
 
 
@@ -49,7 +50,10 @@ class Rig:
         self._speed = setup.speed
         self._advanced_s = loop.time()
         self.wire = ChargerWire(loop, bay.charger, line=setup.line, link=setup.link, now=self.catch_up)
-        self.bmu = Bmu(loop, can_wire, setup.node_id, self._readout, layout=setup.layout, main_loop=setup.main_loop)
+        self.bmu = Bmu(
+            loop, can_wire, setup.node_id, self._readout,
+            layout=setup.layout, main_loop=setup.main_loop, serial=setup.serial,
+        )  # fmt: skip
         self.wire.open()
 
     def catch_up(self) -> None:

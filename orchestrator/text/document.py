@@ -60,6 +60,7 @@ def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
         "faults": [_fault(one, language) for one in bay["faults"]],
         **({"limits": [_text(one, one["cause"], language) for one in bay["limits"]]} if "limits" in bay else {}),
         **({"next": _text(bay["next"], bay["next"], language)} if bay.get("next") else {}),
+        **({"identity": _text(bay["identity"], bay["identity"]["cause"], language)} if "identity" in bay else {}),
     }
 
 

@@ -311,8 +311,8 @@ SOC = (
          raised("figures_disagree", "soc_jump")),
     Edge(state_of_charge.battery_exchanged, None),
     Edge(state_of_charge.battery_exchanged, "a step, in which the BMU was not heard: this may be another battery",
-         {"exchange": (ago(4.9), "a step")}),
-    Edge(state_of_charge.battery_exchanged, None, {"exchange": (ago(5), "a step")}),
+         {"exchange": (ago(4.9), cause("a step"))}),
+    Edge(state_of_charge.battery_exchanged, None, {"exchange": (ago(5), cause("a step"))}),
 )  # fmt: skip
 
 FROZEN = "the charger has said 48.00 V and 10.00 A for 60 s, while the BMU's values moved by {} V and {} A: " \

@@ -319,10 +319,13 @@ def test_another_battery_is_not_judged_by_the_last_one() -> None:
     world.until(S.CHARGING, 10)
 
 
-def test_a_boot_is_another_battery() -> None:
+def test_a_boot_that_the_charger_did_not_watch_is_another_battery() -> None:
     world = full()
     world.values["soc_pct"] = 96.0
+    world.connected = False
     world.boot()
+    world.tick()
+    world.connected = True
     world.until(S.CHARGING, 10)
 
 

@@ -43,7 +43,7 @@ MADE_BY: dict[str, set[str]] = {
     "Stage": {"history/stage"},
     "Sequence": {"sequence"},
     "ChargerHistory": {"history/charger"},
-    "BatteryHistory": {"history/battery"},
+    "BatteryHistory": {"history/battery", "history/same_battery"},
     "Tables": {"rows"},
     "Witnessed": {"witnesses/followed"},
     "Session": {"history/session", "persisted"},

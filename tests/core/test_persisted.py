@@ -466,7 +466,7 @@ def assert_kept(before: Memory, before_s: float, after: Memory, after_s: float, 
             if then is not None and now is not None:
                 assert after_s - now == pytest.approx(before_s - then + gap_s)
         assert [after_s - t for t in kept.strikes] == pytest.approx([before_s - t + gap_s for t in fault.strikes])
-    for name in ("hold", "paused", "full_pct"):
+    for name in ("hold", "paused", "full_pct", "serial"):
         assert value_of(after, name) == value_of(before, name)
     assert [name for _, name in after.operator.resets] == [name for _, name in before.operator.resets]
     if before.session is not None:

@@ -99,14 +99,14 @@ class Bench:
             cob_id, data = frame
             self.now_s += latency_s
             if cob_id == REQUEST and data[0] == 0x40:
-                word = (TIMERS | words)[data[1] | data[2] << 8]
+                word = (ONCE | words)[data[1] | data[2] << 8]
                 self.node.on_frame(REPLY, b"\x43" + data[1:4] + word.to_bytes(4, "little"), self.now_s)
             elif cob_id == REQUEST:
                 self.node.on_frame(REPLY, b"\x60" + data[1:4] + bytes(4), self.now_s)
         self.now_s = end_s
 
 
+#: What is read beside them: the heartbeat period in ms, and no serial number.
+ONCE = {0x1017: 500, 0x1018: 0}
 #: A pack at 23.68 V, −0.08 A, 25.0 °C, 90 %, health 100 %, no status bit set, TTF and TTE not available.
-#: What reads return by default: the heartbeat period in ms.
-TIMERS = {0x1017: 500}
 WORDS = {0x6000: 0x0940FFF8, 0x6001: 0x0000FFFF, 0x6002: 0xFFFF5A64, 0x6003: 0x03E807D0, 0x6004: 0x000000FA}

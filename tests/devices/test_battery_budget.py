@@ -8,7 +8,7 @@ import pytest
 from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus_budget import BURST, EXCHANGE_BITS, TICK_S, BusBudget, Share
 from orchestrator.protocol.objects import Sweep
-from tests.devices.bmu_bench import WORDS, config
+from tests.devices.bmu_bench import ONCE, WORDS, config
 
 
 def reserve(budget: BusBudget, seconds: float) -> int:
@@ -117,7 +117,7 @@ class Station:
             node = cob_id - 0x600
             self.exchanges[node] += 1
             self.sent_s.append(self.now_s)
-            word = WORDS[data[1] | data[2] << 8].to_bytes(4, "little")
+            word = (ONCE | WORDS)[data[1] | data[2] << 8].to_bytes(4, "little")
             heappush(answers, (self.now_s + latency_s, node, b"\x43" + data[1:4] + word))
 
         while self.now_s < until_s:

@@ -77,7 +77,9 @@ def asked_in_10_s(bench: Bench, words: dict[int, int]) -> list[int]:
 
 
 EVERY_SWEEP = pytest.approx(200, rel=0.05)
-CLOSELY, AT_REST = [EVERY_SWEEP, EVERY_SWEEP, 10, 10, 20], [20, 20, 10, 10, 20]
+#: The serial number is read once meanwhile, which may delay one of them into the next seconds.
+TWICE_A_SECOND = pytest.approx(20, abs=1)
+CLOSELY, AT_REST = [EVERY_SWEEP, EVERY_SWEEP, 10, 10, TWICE_A_SECOND], [20, 20, 10, 10, 20]
 
 
 def test_volts_amps_and_status_each_sweep_temperature_twice_a_second_the_others_once() -> None:

@@ -8,11 +8,11 @@ from orchestrator.devices.two_answers import DOUBT_S
 from orchestrator.model.moment import moment
 from orchestrator.protocol.sdo import read_request, write_request
 from tests.core.said import say as text_of
-from tests.devices.bmu_bench import HEARTBEAT, REPLY, REQUEST, TIMERS, WORDS, Bench, config
+from tests.devices.bmu_bench import HEARTBEAT, ONCE, REPLY, REQUEST, WORDS, Bench, config
 
 TEMPERATURE, VOLTS = 0x6004, 0x6000
 FORGED = 0x00000258  # 60.0 °C
-ALL = WORDS | TIMERS
+ALL = WORDS | ONCE
 
 
 def online(**keys: float | None) -> Bench:

@@ -9,7 +9,7 @@ from orchestrator.devices.bus import IDLE_S, MOST_AT_ONCE, BatteryBus
 from orchestrator.devices.bus_budget import TICK_S, BusBudget
 from orchestrator.devices.requester import Send
 from orchestrator.model import Cause
-from tests.devices.bmu_bench import WORDS, config
+from tests.devices.bmu_bench import ONCE, WORDS, config
 
 #: linux/can/dev.h: what an interface takes before its driver says ENOBUFS.
 TRANSMIT_QUEUE = 10
@@ -41,7 +41,7 @@ class Port:
     def send(self, cob_id: int, data: bytes) -> None:
         self._sent += 1
         self.requests[cob_id - 0x600] = self.requests.get(cob_id - 0x600, 0) + 1
-        word = WORDS[data[1] | data[2] << 8].to_bytes(4, "little")
+        word = (ONCE | WORDS)[data[1] | data[2] << 8].to_bytes(4, "little")
         self._answers.append((self.now_s + self._latency_s, cob_id - 0x80, b"\x43" + data[1:4] + word))
 
     def receive(self, timeout_s: float, pause_s: float = 0.0) -> None:

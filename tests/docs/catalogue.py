@@ -69,8 +69,8 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("B15", "volts of charger and BMU differ"),
     Entry("B16", "amps of charger and BMU differ"),
     Entry("B17", "SOC or SOH implausible", "one doubt warns, two together stop"),
-    Entry("B18", "another battery", "a BMU that boots, or whose removal was seen, is qualified from the beginning; its "
-          "manual has no identity object, `probe` shows what there is"),
+    Entry("B18", "another battery", "one whose removal was seen, that nobody watched, or with another serial number is "
+          "qualified from the beginning (`core/history/same_battery.py`)"),
     Entry("B19", "two nodes with one id, babble", "`devices/node_health.py`: their answers do not count"),
     Entry("B20", "TPDO and SDO differ",
           "`devices/polled.py`: after two reads, 2 s, neither is believed, as if out of range; until then each is "

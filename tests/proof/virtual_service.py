@@ -357,6 +357,8 @@ def _close_all(closings: Iterable[Callable[[], object]], _within_s: float) -> bo
 class _Past:
     """The state persisted by the last run, as a hand-made memory."""
 
+    typed = ""  #: nobody has named a battery
+
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
 

@@ -111,6 +111,7 @@ class Battery:
 
     def __init__(self) -> None:
         self.now_s = 0.0
+        self.link = BatteryLink(online=True)
         self.attended: list[bool] = []  #: whether it was to be watched closely, each time that this changed
         self.values = {
             "voltage_v": VOLTS,
@@ -124,7 +125,7 @@ class Battery:
     @property
     def view(self) -> tuple[BatteryReading, BatteryLink]:
         fresh = {name: Measurement(value, self.now_s) for name, value in self.values.items()}
-        return BatteryReading(**fresh), BatteryLink(online=True)
+        return BatteryReading(**fresh), self.link
 
     def attend(self, *, closely: bool) -> None:
         self.attended.append(closely)

@@ -212,6 +212,8 @@ past = st.builds(
     | st.builds(Session, figure, figure, charged_ah=figure, soc_pct=st.none() | figure, result=causes),
     full_pct=st.none() | figure,
     soc=st.none() | st.tuples(figure, figure),
+    serial=st.none() | st.integers(1, 2**32 - 1),
+    typed=st.text(max_size=8),
 )
 place = st.builds(
     Place,

@@ -30,7 +30,7 @@ class Scene:
 
 
 @contextlib.contextmanager
-def bmu_on_virtual_bus(layout: Layout = Layout.FIRST_HIGH) -> Iterator[Scene]:
+def bmu_on_virtual_bus(layout: Layout = Layout.FIRST_HIGH, serial: int = 0) -> Iterator[Scene]:
     channel = f"bmu-{next(CHANNELS)}"
     with on_bus(interface="virtual", channel=channel) as client, Background() as background:
         bus = can.Bus(interface="virtual", channel=channel)
@@ -38,7 +38,7 @@ def bmu_on_virtual_bus(layout: Layout = Layout.FIRST_HIGH) -> Iterator[Scene]:
 
         def make() -> tuple[CanWire, Bmu]:
             wire = CanWire(background.loop, bus)
-            return wire, Bmu(background.loop, wire, 0x10, lambda: scene.told, layout=layout)
+            return wire, Bmu(background.loop, wire, 0x10, lambda: scene.told, layout=layout, serial=serial)
 
         wire, bmu = background.call(make)
         scene = Scene(client, bmu, background)
@@ -65,6 +65,13 @@ def test_the_manual_s_exchanges_in_its_order(scene: Scene) -> None:
     assert ask(0x610, "2B 00 18 05 F4 01 00 00") == "60 00 18 05 00 00 00 00"
     assert ask(0x610, "40 00 18 02 00 00 00 00") == "4F 00 18 02 FF 00 00 00"
     assert ask(0x610, "2F 00 18 02 FE 00 00 00") == "60 00 18 02 00 00 00 00"
+
+
+@pytest.mark.parametrize(("serial", "told"), [(0, "00 00 00 00"), (4711, "67 12 00 00")])
+def test_its_serial_number_if_it_has_one(serial: int, told: str) -> None:
+    with bmu_on_virtual_bus(serial=serial) as scene:
+        assert scene.client.wait(0x710) == "00"
+        assert scene.read(0x1018, 4) == f"43 18 10 04 {told}"
 
 
 FIRST_HIGH = {

@@ -20,6 +20,8 @@ FALLING_S, FALLING_PCT = 900.0, 2.0
 ENERGY_FACTOR, CAPACITY_FACTOR = 1.5, 3.0
 #: Below these nothing is compared: the figures are too coarse.
 LEAST_AH, LEAST_SOC_PCT, LEAST_A = 1.0, 10.0, 1.0
+#: The cause of an exchange that a serial number proves.
+OTHER_SERIAL = "other_serial"
 #: Faults that are only doubts when alone.
 DOUBTS = ("soc_jump", "soc_falls", "figures_disagree")
 
@@ -87,4 +89,5 @@ def battery_exchanged(f: Facts) -> Cause | None:
     exchange = f.memory.battery.exchange
     if exchange is None or f.now_s - exchange[0] >= EXCHANGE_NEWS_S:
         return None
-    return Cause.of("battery_exchanged", what=exchange[1])
+    what = exchange[1]
+    return what if what.id == OTHER_SERIAL else Cause.of("battery_exchanged", what=what)

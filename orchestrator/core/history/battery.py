@@ -11,6 +11,8 @@ from orchestrator.core.checks.state_of_charge import (
     SOC_STEP_PCT,
 )
 from orchestrator.core.facts import SLOW_STALE_S, Facts
+from orchestrator.core.history import same_battery
+from orchestrator.core.history.same_battery import OTHER_V_SHARE
 from orchestrator.core.memory import BatteryHistory
 from orchestrator.core.parts import changed
 from orchestrator.core.witnesses.measured import STILL_ABOVE_A
@@ -20,8 +22,6 @@ from orchestrator.model import Cause, State
 WARMTH_EVERY_S = 10.0
 #: A battery that is removed in mid-charge and back within this was not taken away: its plug is loose.
 LOOSE_PLUG_S = 60.0
-#: … unless its volts differ by this share: several times what a pack loses when its charge is cut off.
-OTHER_V_SHARE = 0.05
 
 Warmth = tuple[tuple[float, float], ...]  #: (t_s, °C), oldest first
 Steps = Mapping[str, Any]  #: at most one: `charge_step` or `exchange`
@@ -108,14 +108,13 @@ def thinned(warmth: Warmth, sample: tuple[float, float]) -> Warmth:
 
 
 def _known(f: Facts, known: BatteryHistory) -> BatteryHistory:
-    """A battery that was removed, or whose BMU booted, returns as an unknown one."""
+    """What is known of the battery itself; another one returns as an unknown one."""
+    known = same_battery.recognised(f, known)
     if f.energised:
         return known
     if known.full_s is None and f.soc is not None:
         known = changed(known, full_s=f.now_s)
-    gone = not (f.battery.online or f.stalled)
-    if known.full_pct is not None and (known.boots != f.battery.boots or gone):
-        known = changed(known, full_pct=None)
+    known = same_battery.watched(f, known)
     if known.boots != f.battery.boots and f.memory.state is not State.STOPPING:
         known = changed(known, boots=f.battery.boots)
     return known

@@ -101,6 +101,7 @@ TEXTS: Mapping[str, str] = {
     "time_to_full_disagrees": "the BMU {says|said} full in {full_min:.0f} min: that is {takes_ah:.1f} Ah, by "
     "{remaining_ah:.2f} Ah at {soc_pct:.0f} % it is {missing_ah:.1f} Ah",
     "soc_not_believed": "{whats}",
+    "other_serial": "the BMU's serial number is {serial}, and was {before}: this is another battery",
     "battery_exchanged": "{what}, in which the BMU was not heard: this may be another battery",
     "pack_too_low": "the pack {has|had} {pack_v:.2f} V at SOC {soc_pct:.0f} %: with {cells} {kind} cells{at} that {is|was} "
     "{cell_v:.2f} V a cell, where at least {bound_v:.2f} V belong to this SOC. It is another kind of pack, or its SOC "

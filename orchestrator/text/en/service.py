@@ -31,6 +31,15 @@ TEXTS: Mapping[str, str] = {
     # its output on standard error
     "service_begins": "{station}: bays: {bays}, control socket {socket}",
     "lines_left_out": "({lines} lines are left out here: nobody has read them in time)",
+    "identity_serial_number": "{battery}, its serial number",
+    "identity_typed": "{battery}, typed by an operator",
+    "identity_assumed": "{battery}, assumed from node 0x{node_id:02X} on {can}",
+    "identity_contradicted": "{battery}, its serial number, although an operator typed {typed}: look which battery it "
+    "is, then identify it again",
+    "identity_now": "{bay}: battery {what}",
+    "identify_nobody": "no battery is heard in {bay}, or it may be another one: connect it, then identify it",
+    "battery_id_wrong": "{battery} is no id of a battery: 1 to {longest} printable characters are, without blanks at "
+    "either end",
     "bay_begins": "{bay}: {state}: {reason}",
     "bay_goes": "{bay}: {before} → {state}: {reason}",
     "bay_internal": "{bay}: internal error, stopping: {error}",

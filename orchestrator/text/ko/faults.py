@@ -97,6 +97,7 @@ TEXTS: Mapping[str, str] = {
     "time_to_full_disagrees": "BMU의 완충 예상 시간 {full_min:.0f}분은 {takes_ah:.1f} Ah에 해당하지만, SOC {soc_pct:.0f} "
     "%에서 {remaining_ah:.2f} Ah라면 {missing_ah:.1f} Ah가 부족한 {것입니다|것이었습니다}",
     "soc_not_believed": "{whats}",
+    "other_serial": "BMU의 일련번호가 {serial}입니다. 이전 번호는 {before}였습니다: 다른 배터리입니다",
     "battery_exchanged": "{what}. 그 사이 BMU의 응답이 없었습니다: 다른 배터리일 수 있습니다",
     "pack_too_low": "팩 전압이 SOC {soc_pct:.0f} %에서 {pack_v:.2f} {V입니다|V였습니다}: {kind} 셀 {cells}직렬{at}이면 셀당 "
     "{cell_v:.2f} V인데, 이 SOC에서는 {bound_v:.2f} V 이상이어야 합니다. 다른 종류의 팩이거나 SOC가 틀렸습니다",

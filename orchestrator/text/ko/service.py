@@ -31,6 +31,14 @@ TEXTS: Mapping[str, str] = {
     # its output on standard error
     "service_begins": "{station}: 베이 {bays}개, 제어 소켓 {socket}",
     "lines_left_out": "(제때 읽지 않아 {lines}줄을 생략했습니다)",
+    "identity_serial_number": "{battery}(일련번호)",
+    "identity_typed": "{battery}(운영자가 입력)",
+    "identity_assumed": "{battery}({can}의 노드 0x{node_id:02X}에서 추정)",
+    "identity_contradicted": "{battery}(일련번호). 그러나 운영자는 {typed}|을 입력했습니다: 어떤 배터리인지 확인한 뒤 다시 "
+    "지정하십시오",
+    "identity_now": "{bay}: 배터리 {what}",
+    "identify_nobody": "{bay}에서 응답하는 배터리가 없거나 다른 배터리일 수 있습니다: 연결한 뒤 지정하십시오",
+    "battery_id_wrong": "{battery}: 배터리 ID가 아닙니다. 앞뒤에 공백이 없는 인쇄 가능한 문자 1~{longest}자여야 합니다",
     "bay_begins": "{bay}: {state}: {reason}",
     "bay_goes": "{bay}: {before} → {state}: {reason}",
     "bay_internal": "{bay}: 내부 에러로 정지하고 있습니다: {error}",
