@@ -15,6 +15,7 @@ from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 from orchestrator.service.asked import Answers, Asked, Requests
+from orchestrator.service.bayrecord import BayRecord
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.journal import Journal
@@ -44,6 +45,7 @@ class BayRunner:
         *,
         contactor: Contactor | None = None,
         starts: Starts | None = None,
+        record: BayRecord | None = None,
         snapshots: bool = True,
         language: str = "en",
     ) -> None:
@@ -59,7 +61,7 @@ class BayRunner:
         self._asleep_s = 0.0
         self._closely = True  # how often the BMU is read, until the first decision
         self._charger, self._battery, self._journal = charger, battery, journal
-        self._contactor = contactor
+        self._contactor, self._record = contactor, record
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
         self._written: tuple[Cause | None, bool] | None = None  # of the contactor: problem, closed
         self._snapshot, self._recorder = Snapshot(), SnapshotRecorder(bay) if snapshots else None
@@ -104,6 +106,8 @@ class BayRunner:
     def isolate(self) -> None:
         """Open the contactor for good, at the end of the service, and record that and the last decisions."""
         self._put_timed(self._recorder.rest() if self._recorder is not None else [])
+        if self._record is not None:
+            self._record.rest()
         if self._contactor is not None:
             self._contactor.give_back()
             self._write_down_contactor(self._contactor)
@@ -156,8 +160,8 @@ class BayRunner:
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         if self.verified and self.decision is not None and self.decision.state is not State.QUALIFYING:
             self._take_over()
-        snapshot = self._snapshot = self._look(now_s, asleep_s, request)
-        before = self.decision
+        snapshot, before = self._look(now_s, asleep_s, request), self.decision
+        self._snapshot = snapshot
         memory = self._memory or self._store.past(self.place).memory(now_s)
         decision, self._memory = decide(now_s, snapshot, memory, self.policy.rules)
         self._charger.command(decision.command, grant(snapshot, now_s) if decision.command else None)
@@ -180,6 +184,8 @@ class BayRunner:
         if before is None or before.state is not decision.state:
             self._say(transition(self.name, before, decision, clock))
         self._keep(self._memory, now_s)
+        if self._record is not None:
+            self._record.take(clock, snapshot, decision, self.policy.rules.bay)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """Everything known about the bay now."""
@@ -203,9 +209,8 @@ class BayRunner:
             moves=self._starts.moves(self.name),
             running_persisted=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
         )
-        if self._contactor is not None:
-            connected, problem = self._contactor.connects(reading), self._contactor.problem
-            snapshot = replace(snapshot, connected=connected, contactor_problem=problem)
+        if (fitted := self._contactor) is not None:
+            return replace(snapshot, connected=fitted.connects(reading), contactor_problem=fitted.problem)
         return snapshot
 
     def _drive(self, now_s: float, *, closed: bool) -> None:
@@ -237,10 +242,9 @@ class BayRunner:
         """The bay's part of the status document."""
         decision = self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER)
         decision = told(decision, self._snapshot, self._memory, self.policy.rules)
-        contactor = self._contactor
         return {
             **bay_status(self.name, self._snapshot, decision, monotonic(), time(), self._language),
-            "contactor": contactor and contactor_fields(contactor, self._language),
+            "contactor": self._contactor and contactor_fields(self._contactor, self._language),
             "port": self.place.port,
             "policy": self.policy.status(),
         }

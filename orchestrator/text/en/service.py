@@ -28,6 +28,12 @@ TEXTS: Mapping[str, str] = {
     "journal_hangs": "the journal has not been written for {lasted_s:.0f} s: its disk hangs",
     "journal_failed": "the journal cannot be written: {error:word}: {file}",
     "journal_again": "the journal is being written again",
+    "record_failed": "the record of charges cannot be written: {error:word}: {file}",
+    "record_internal": "the record of charges: internal error: {error}",
+    "record_again": "the record of charges is being written again",
+    # why a charge ended, where the record found it open
+    "service_died": "the service died; last sign of life: {last_at}",
+    "end_unseen": "nobody saw the end of this charge",
     # its output on standard error
     "service_begins": "{station}: bays: {bays}, control socket {socket}",
     "lines_left_out": "({lines} lines are left out here: nobody has read them in time)",

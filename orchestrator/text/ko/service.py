@@ -28,6 +28,12 @@ TEXTS: Mapping[str, str] = {
     "journal_hangs": "저널이 {lasted_s:.0f}초 동안 기록되지 않았습니다: 디스크가 멈추어 있습니다",
     "journal_failed": "저널을 기록할 수 없습니다: {error:word}: {file}",
     "journal_again": "저널이 다시 기록되고 있습니다",
+    "record_failed": "충전 기록을 쓸 수 없습니다: {error:word}: {file}",
+    "record_internal": "충전 기록: 내부 에러: {error}",
+    "record_again": "충전 기록이 다시 기록되고 있습니다",
+    # why a charge ended, where the record found it open
+    "service_died": "서비스가 비정상 종료되었습니다; 마지막 동작 확인: {last_at}",
+    "end_unseen": "이 충전의 종료가 확인되지 않았습니다",
     # its output on standard error
     "service_begins": "{station}: 베이 {bays}개, 제어 소켓 {socket}",
     "lines_left_out": "(제때 읽지 않아 {lines}줄을 생략했습니다)",

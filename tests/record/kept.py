@@ -1,0 +1,48 @@
+"""A bay of the bench whose charges are recorded, over runs of the service; time is simulated."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from orchestrator.core.persisted import Persisted
+from orchestrator.model import Cause
+from orchestrator.service.recorder import Recorder
+from tests.service.bench import Bench
+
+#: 2026-11-28T06:00:00Z, at the monotonic moment 0.
+WALL_S = 1_795_845_600.0
+
+
+class Kept:
+    """One station over its runs; `off_s` is how far the wall clock has been stepped."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory, self.off_s, self.boot = directory, 0.0, "boot-1"
+        self.said: list[Cause] = []
+        self.recorder, self.bench = self._begin(None, 1000.0)
+
+    def _begin(self, persisted: Persisted | None, now_s: float) -> tuple[Recorder, Bench]:
+        recorder = Recorder(self.directory, 5.0, self.wall, self.said.append, boot=self.boot)
+        self.bench = Bench(self.directory, persisted, now_s=now_s, wall=self.wall, recorder=recorder)
+        recorder.turn()
+        return recorder, self.bench
+
+    def wall(self) -> float:
+        return WALL_S + self.bench.now_s + self.off_s
+
+    def persisted(self) -> Persisted:
+        assert self.bench.bay._memory is not None
+        return Persisted.of(self.bench.bay._memory, self.bench.now_s)
+
+    def again(self, persisted: Persisted, down_s: float = 5.0) -> None:
+        """The next run of the service, with this state from the last one; nothing else of it is left."""
+        charger = self.bench.charger.reading
+        self.bench.store._ownership.give_up()  # as when its process ends
+        self.recorder, _ = self._begin(persisted.aged(down_s), self.bench.now_s + down_s)
+        self.bench.charger.reading = charger
+
+    def records(self) -> list[dict[str, Any]]:
+        """All that is on the disk."""
+        self.recorder.turn()
+        found = sorted((self.directory / "sessions").glob("*.jsonl"))
+        return [json.loads(line) for path in found for line in path.read_bytes().splitlines()]
