@@ -14,3 +14,8 @@ def utc(unix_s: float) -> str:
 def month(unix_s: float) -> str:
     """The month in UTC: "2026-11"; "" for a time that no calendar has."""
     return utc(unix_s)[:7]
+
+
+def unix_s(text: str) -> float:
+    """The inverse of `utc`; a time without a zone is local. ValueError for anything else."""
+    return datetime.fromisoformat(text).timestamp()

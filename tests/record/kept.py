@@ -34,11 +34,14 @@ class Kept:
         assert self.bench.bay._memory is not None
         return Persisted.of(self.bench.bay._memory, self.bench.now_s)
 
-    def again(self, persisted: Persisted, down_s: float = 5.0) -> None:
+    def again(self, persisted: Persisted, down_s: float = 5.0, boot: str = "") -> None:
         """The next run of the service, with this state from the last one; nothing else of it is left."""
         charger = self.bench.charger.reading
         self.bench.store._ownership.give_up()  # as when its process ends
-        self.recorder, _ = self._begin(persisted.aged(down_s), self.bench.now_s + down_s)
+        now_s, boot = (50.0, boot) if boot else (self.bench.now_s + down_s, self.boot)
+        self.off_s += 0.0 if boot == self.boot else self.bench.now_s + down_s - now_s
+        self.boot = boot
+        self.recorder, _ = self._begin(persisted.aged(down_s), now_s)
         self.bench.charger.reading = charger
 
     def records(self) -> list[dict[str, Any]]:

@@ -1,0 +1,297 @@
+"""Lives of a recorded bay: kills, power cuts at any byte, clock steps and restarts, against the charger's own current.
+
+    python -m tests.record.lives 2000        lives, and a power cut at every byte of every write of one charge
+
+The record is right if no charge is in it twice, none is lost, ids are in the order of the charges, and the sum of their
+Ah is the integral of the charger's current: but for what no disk had when a run ended, which is worked out here.
+"""
+
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from random import Random
+from typing import Any
+from unittest.mock import patch
+
+from orchestrator.core.persisted import COUNTERS_S, Persisted
+from orchestrator.model import Operation, Request, State
+from orchestrator.record.lines import decoded
+from orchestrator.service import rotating
+from tests.record.kept import Kept
+from tests.service.bench import STEP_S
+
+#: The first reading of a run, and the one under way when it ends, are not counted: at 14 A each.
+EDGE_AH = 2 * STEP_S * 14.0 / 3600
+#: Runs of the service in a life, and how far a clock steps.
+RUNS = 5
+WEEK_S, YEAR_S = 7 * 86_400.0, 365 * 86_400.0
+STEPS_S = (WEEK_S, -WEEK_S, YEAR_S, -60 * YEAR_S, 30.0, -30.0)
+
+
+class PowerCutError(BaseException):
+    """No `except Exception` sees the power go."""
+
+
+class Life:
+    """One station from its first charge on."""
+
+    def __init__(self, seed: int, directory: Path) -> None:
+        self.dice, self.kept, self.had = Random(seed), Kept(directory), Counter[str]()
+        self.true_ah = 0.0  # what the charger has delivered
+        self.lost_ah = 0.0  # … of it, what no disk had when a run ended
+        self.budget: int | None = None  # bytes until the power goes
+        self.history: list[tuple[float, Persisted, float]] = []  # (true Ah, state, when) of this run's decisions
+        self.recorded_ah = 0.0  # true Ah at the newest record on the disk
+        self.runs = 0
+        self.ids: list[str] = []  # in the order in which their charges began
+
+    def run(self) -> None:
+        with ExitStack() as stack:
+            for name, fake in (
+                ("orchestrator.service.bay.time", self.kept.wall),
+                ("orchestrator.service.recorder.append", self._append),
+                ("orchestrator.record.charge.CHECKPOINT_S", 8.0),
+            ):
+                stack.enter_context(patch(name, fake))
+            for _ in range(self.dice.randint(1, RUNS)):
+                self._one_run()
+                self._dies()
+            self._one_run()
+            self.kept.recorder.turn()
+        self.judge()
+
+    # --- what happens -------------------------------------------------------------------------------------------------
+
+    def _one_run(self) -> None:
+        for _ in range(self.dice.randint(1, 4)):
+            what = self.dice.choice(("start", "start", "stop", "pause", "full", "clock", "nothing"))
+            self.had[what] += 1
+            if what == "clock":
+                self.kept.off_s += self.dice.choice(STEPS_S)
+            elif what == "full":
+                self.kept.bench.battery.values["soc_pct"] = 100.0
+            elif what != "nothing":
+                self.kept.bench.battery.values["soc_pct"] = 50.0
+                self._steps(1, Request(what))
+            self._steps(self.dice.randint(0, 100))
+        self.kept.bench.battery.values["soc_pct"] = 50.0
+
+    def _steps(self, count: int, request: Request | None = None) -> None:
+        for _ in range(count):
+            self._step(request)
+            self.kept.recorder.turn()
+            self.recorded_ah = self.true_ah if self._wrote else self.recorded_ah
+
+    def _step(self, request: Request | None = None) -> None:
+        bench, self._wrote = self.kept.bench, False
+        if request is not None:
+            bench.ask(request)
+        else:
+            bench.step()
+        if bench.charger.reading.operation is Operation.RUNNING:
+            self.true_ah += bench.charger.reading.current_a * STEP_S / 3600
+        newest = self.kept.recorder._last_id
+        if newest and newest not in self.ids:
+            self.ids.append(newest)
+        self.history.append((self.true_ah, self.kept.persisted(), bench.now_s))
+
+    # --- how it ends --------------------------------------------------------------------------------------------------
+
+    def _dies(self) -> None:
+        how = self.dice.choice(("killed", "power", "power at a write", "in order"))
+        self.had[how] += 1
+        if how == "power at a write":
+            for _ in range(150):
+                self._step()
+                if self.kept.recorder._waiting:
+                    break
+            self._cut()
+        elif how == "in order":
+            self.kept.bench.bay.isolate()
+            self.kept.recorder.turn()
+            self.recorded_ah = self.true_ah
+        persisted_ah, persisted = self._on_disk(orderly=how == "in order")
+        self.lost_ah += self.true_ah - max(persisted_ah, self.recorded_ah) if persisted.session else 0.0
+        self.lost_ah += self.true_ah - self.recorded_ah if persisted.session is None else 0.0
+        self._again(persisted, how)
+
+    def _cut(self) -> None:
+        """The power goes while records are written, at any byte."""
+        self.budget = self.dice.choice((0, self.dice.randrange(4000)))
+        try:
+            self.kept.recorder.turn()
+        except PowerCutError:
+            self.had["torn"] += 1
+        self.recorded_ah = self.true_ah if self._wrote else self.recorded_ah
+        self.budget = None
+
+    def _on_disk(self, *, orderly: bool) -> tuple[float, Persisted]:
+        """What the store had on the disk: its last change that matters, or counters up to 30 s old."""
+        newest = self.history[-1]
+        back = 0 if orderly else self.dice.randint(0, int(COUNTERS_S / STEP_S))
+        same = [one for one in self.history[-back - 1 :] if one[1].gist == newest[1].gist]
+        true_ah, persisted, at_s = same[0]
+        return true_ah, persisted.aged(self.kept.bench.now_s - at_s)
+
+    def _again(self, persisted: Persisted, how: str) -> None:
+        self.runs += 1
+        reading = self.kept.bench.charger.reading
+        boot = f"boot-{self.runs + 1}" if "power" in how else ""
+        if how != "killed" or self.dice.random() < 0.5:
+            self.kept.off_s += self.dice.choice((0.0, 0.0, *STEPS_S))
+        off = {"operation": Operation.STOPPED, "current_a": 0.0}  # by the guardian
+        self.kept.bench.charger.reading = type(reading)(**{**_fields(reading), **off})
+        self.kept.again(persisted, self.dice.uniform(1.0, 600.0), boot)
+        self.history = []
+        self._steps(1)
+
+    def _append(self, path: Path, data: bytes, *, durable: bool) -> None:
+        if self.budget is not None and self.budget < len(data):
+            rotating.append(path, data[: self.budget], durable=True)
+            raise PowerCutError
+        rotating.append(path, data, durable=durable)
+        self._wrote = True
+
+    # --- what must hold -----------------------------------------------------------------------------------------------
+
+    def judge(self) -> None:
+        charges = charges_in(self.kept.directory)
+        assert self.ids == sorted(self.ids), "the ids are in another order than the charges"
+        assert charges.keys() <= set(self.ids), "a charge is there that nobody has begun"
+        left_open = [id_ for id_, charge in charges.items() if charge["type"] != "end"]
+        assert len(left_open) <= 1, f"{len(left_open)} charges are open in one bay"
+        state = self.kept.bench.bay.decision
+        assert state is not None
+        assert bool(left_open) <= (state.session is not None), "a charge is open that the core does not have"
+        sum_ah = sum(charge["charger"]["ah"] for charge in charges.values())
+        edges_ah = EDGE_AH * (self.runs + 1)
+        now_ah = self.true_ah - self.recorded_ah  # since the newest record
+        least_ah = self.true_ah - self.lost_ah - now_ah - edges_ah
+        assert least_ah <= sum_ah <= self.true_ah + edges_ah, (
+            f"{sum_ah:.4f} Ah are recorded of {self.true_ah:.4f}, of which {self.lost_ah:.4f} could not be known"
+        )
+        for charge in charges.values():
+            shares_ah = sum(rule["ah"] for rule in charge["rules"])
+            assert abs(shares_ah - charge["charger"]["ah"]) < 1e-4, "the rules' Ah are not the charge's"
+
+
+def charges_in(directory: Path) -> Mapping[str, Any]:
+    """All that is known of each charge, by id; AssertionError if a record is there twice, or missing."""
+    found: dict[str, dict[str, Any]] = {}
+    seen: set[tuple[str, int]] = set()
+    for path in sorted((directory / "sessions").glob("*.jsonl")):
+        for line in path.read_bytes().splitlines():
+            record = decoded(line)
+            if record is None:
+                continue
+            key = (record["id"], record["n"])
+            assert key not in seen, f"record {key} is there twice"
+            seen.add(key)
+            now = found.get(record["id"])
+            if now is None or record["n"] > now["n"]:
+                found[record["id"]] = {**(now or {}), **record}
+    for id_ in found:
+        numbers = sorted(number for one, number in seen if one == id_)
+        assert numbers == list(range(len(numbers))), f"records of {id_} are missing: {numbers}"
+    return found
+
+
+def _fields(reading: object) -> dict[str, Any]:
+    return {name: getattr(reading, name) for name in type(reading).__slots__}  # type: ignore[attr-defined]
+
+
+def live(seed: int) -> Counter[str]:
+    """One life; AssertionError if its record is wrong."""
+    with tempfile.TemporaryDirectory() as directory:
+        life = Life(seed, Path(directory))
+        try:
+            life.run()
+        except AssertionError as error:
+            raise AssertionError(f"life {seed}: {error}") from error
+        finally:
+            life.kept.bench.store._ownership.give_up()
+        life.had["charges"] += len(charges_in(Path(directory)))
+        return life.had
+
+
+class Writes:
+    """The writes of one charge with a pause: what was on the disk before each, what it added, and the bay's state."""
+
+    def __init__(self) -> None:
+        self.all: list[tuple[bytes, bytes, Persisted, float]] = []
+        with tempfile.TemporaryDirectory() as directory, ExitStack() as stack:
+            self.kept = Kept(Path(directory))
+            stack.enter_context(patch("orchestrator.service.bay.time", self.kept.wall))
+            stack.enter_context(patch("orchestrator.service.recorder.append", self._append))
+            self.kept.bench.charging()
+            for request, state in ((Request.PAUSE, State.SUSPENDED), (Request.START, State.CHARGING)):
+                self.kept.recorder.turn()
+                self.kept.bench.ask(request)
+                self.kept.bench.until(state)
+            self.kept.bench.battery.values["soc_pct"] = 100.0
+            self.kept.recorder.turn()
+            self.kept.bench.until(State.FULL)
+            self.kept.recorder.turn()
+            self.kept.bench.store._ownership.give_up()
+
+    def _append(self, path: Path, data: bytes, *, durable: bool) -> None:
+        before = path.read_bytes() if path.exists() else b""
+        self.all.append((before, data, self.kept.persisted(), self.kept.bench.now_s))
+        rotating.append(path, data, durable=durable)
+
+
+def cut(before: bytes, written: bytes, persisted: Persisted, at_s: float) -> None:
+    """The power goes when so much is written; AssertionError if the next run makes a wrong record of that."""
+    with tempfile.TemporaryDirectory() as name:
+        directory = Path(name)
+        (directory / "sessions").mkdir()
+        (directory / "sessions" / "2026-11.jsonl").write_bytes(before + written)
+        kept = Kept(directory)
+        kept.bench.now_s = at_s
+        known = [record for line in (before + written).splitlines() if (record := decoded(line)) is not None]
+        with patch("orchestrator.service.bay.time", kept.wall):
+            kept.again(persisted, 30.0, "another boot")
+            for _ in range(10):
+                kept.bench.step()
+                kept.recorder.turn()
+        kept.bench.store._ownership.give_up()
+        charges, session = charges_in(directory), persisted.session
+        assert len(charges) == int(bool(known) or session is not None), "a charge is lost, or there twice"
+        known_ah = max((record["charger"]["ah"] for record in known), default=0.0)
+        least_ah = max(known_ah, session.charged_ah if session is not None else 0.0)
+        for charge in charges.values():
+            assert abs(charge["charger"]["ah"] - least_ah) <= EDGE_AH, "its Ah are lost, or there twice"
+            assert (charge["type"] == "end") is (session is None or known[-1:] != [] and known[-1]["type"] == "end")
+
+
+def cuts(stride: int) -> int:
+    """A power cut at every so many bytes of every write of a charge; how many there were."""
+    count = 0
+    for number, (before, data, persisted, at_s) in enumerate(Writes().all):
+        for size in sorted({*range(0, len(data), stride), len(data) - 1, len(data)}):
+            try:
+                cut(before, data[:size], persisted, at_s)
+            except AssertionError as error:
+                raise AssertionError(f"write {number}, cut after {size} of {len(data)} bytes: {error}") from error
+            count += 1
+    return count
+
+
+def main(count: int) -> int:
+    had, wrong = Counter[str](), 0
+    for seed in range(count):
+        try:
+            had += live(seed)
+        except AssertionError as error:
+            wrong += 1
+            print(error, flush=True)
+    print(f"{count} lives, {wrong} wrong: {', '.join(f'{what} {times}' for what, times in sorted(had.items()))}")
+    print(f"{cuts(1)} power cuts, one at each byte of each write of a charge: all well")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 2000))
