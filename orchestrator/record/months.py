@@ -30,11 +30,12 @@ def current(unix_s: float, names: Iterable[str]) -> str:
 
 
 def newest(unix_s: float, names: Iterable[str]) -> list[str]:
-    """The files in which an open charge is: paused ones are recorded every day."""
+    """The files in which an open charge and the newest one are: paused ones are recorded every day.
+
+    If the clock has gone back, what was written last may be in any file.
+    """
     known = files(names)
-    now = current(unix_s, known)
-    around = [name for name in known if name <= now][-2:]  # a clock far ahead may have left files beyond them
-    return sorted({*around, *known[-2:]})
+    return known if known and known[-1] > current(unix_s, known) else known[-2:]
 
 
 def outdated(unix_s: float, names: Iterable[str], years: float) -> list[str]:

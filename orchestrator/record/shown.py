@@ -10,6 +10,11 @@ from orchestrator.record.stamp import from_fields
 from orchestrator.record.table import began, ended, lasted, length_s, sentence, values, why_ended
 from orchestrator.text.catalogue import say
 
+#: How it is said where a battery's id is from.
+SOURCES = {"assumed": "battery_assumed"}
+#: A pause that lasts.
+DASH = "…"
+
 
 def shown(charge: Record, language: str, width: int) -> str:
     """All of it, for people."""
@@ -24,7 +29,7 @@ def shown(charge: Record, language: str, width: int) -> str:
 def _head(charge: Record, language: str) -> Iterator[Cause]:
     battery, policy, by = charge["battery"], charge["policy"], charge.get("by")
     yield Cause.of("charge_of", id=charge["id"], bay=charge["bay"], station=charge["station"])
-    yield Cause.of(f"battery_{battery['source']}", battery=battery["id"])
+    yield Cause.of(SOURCES[battery["source"]], battery=battery["id"])
     yield Cause.of("charge_time", begin_at=began(charge), end_at=ended(charge), lasted=lasted(length_s(charge)))
     yield Cause.of("charge_ended", why=why_ended(charge, language))
     yield Cause.of("charge_took", **charge["charger"], bmu_ah=charge["bmu"]["ah"], bmu_wh=charge["bmu"]["wh"])
@@ -54,6 +59,3 @@ def _faults(charge: Record, language: str) -> Iterator[str]:
     for fault in charge["faults"]:
         times = f" (×{fault['times']})" if fault["times"] > 1 else ""
         yield f"{fault['effect']}{times}: {sentence(fault['cause'], language)}"
-
-
-DASH = "…"

@@ -56,6 +56,7 @@ class Life:
                 ("orchestrator.record.charge.CHECKPOINT_S", 8.0),
             ):
                 stack.enter_context(patch(name, fake))
+            self._steps(1)
             for _ in range(self.dice.randint(1, RUNS)):
                 self._one_run()
                 self._dies()
@@ -159,8 +160,7 @@ class Life:
 
     def judge(self) -> None:
         charges = charges_in(self.kept.directory)
-        assert self.ids == sorted(self.ids), "the ids are in another order than the charges"
-        assert charges.keys() <= set(self.ids), "a charge is there that nobody has begun"
+        assert [id_ for id_ in self.ids if id_ in charges] == sorted(charges), "the ids are not in the charges' order"
         left_open = [id_ for id_, charge in charges.items() if charge["type"] != "end"]
         assert len(left_open) <= 1, f"{len(left_open)} charges are open in one bay"
         state = self.kept.bench.bay.decision
@@ -264,7 +264,8 @@ def cut(before: bytes, written: bytes, persisted: Persisted, at_s: float) -> Non
         least_ah = max(known_ah, session.charged_ah if session is not None else 0.0)
         for charge in charges.values():
             assert abs(charge["charger"]["ah"] - least_ah) <= EDGE_AH, "its Ah are lost, or there twice"
-            assert (charge["type"] == "end") is (session is None or known[-1:] != [] and known[-1]["type"] == "end")
+            over = session is None or "end" in {record["type"] for record in known}
+            assert (charge["type"] == "end") is over, "whether it goes on is wrong"
 
 
 def cuts(stride: int) -> int:
