@@ -1,16 +1,20 @@
 """A bay of the bench whose charges are recorded, over runs of the service; time is simulated."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Cause
+from orchestrator.record.lines import decoded
 from orchestrator.service.recorder import Recorder
-from tests.service.bench import Bench
+from tests.service.bench import STEP_S, Bench
 
 #: 2026-11-28T06:00:00Z, at the monotonic moment 0.
 WALL_S = 1_795_845_600.0
+#: The first reading of a run, and the one under way when it ends, are not counted: at 14 A each.
+EDGE_AH = 2 * STEP_S * 14.0 / 3600
 
 
 class Kept:
@@ -49,3 +53,24 @@ class Kept:
         self.recorder.turn()
         found = sorted((self.directory / "sessions").glob("*.jsonl"))
         return [json.loads(line) for path in found for line in path.read_bytes().splitlines()]
+
+
+def charges_in(directory: Path) -> Mapping[str, Any]:
+    """All that is known of each charge, by id; AssertionError if a record is there twice, or missing."""
+    found: dict[str, dict[str, Any]] = {}
+    seen: set[tuple[str, int]] = set()
+    for path in sorted((directory / "sessions").glob("*.jsonl")):
+        for line in path.read_bytes().splitlines():
+            record = decoded(line)
+            if record is None:
+                continue
+            key = (record["id"], record["n"])
+            assert key not in seen, f"record {key} is there twice"
+            seen.add(key)
+            now = found.get(record["id"])
+            if now is None or record["n"] > now["n"]:
+                found[record["id"]] = {**(now or {}), **record}
+    for id_ in found:
+        numbers = sorted(number for one, number in seen if one == id_)
+        assert numbers == list(range(len(numbers))), f"records of {id_} are missing: {numbers}"
+    return found

@@ -1,6 +1,6 @@
 """Lives of a recorded bay: kills, power cuts at any byte, clock steps and restarts, against the charger's own current.
 
-    python -m tests.record.lives 2000        lives, and a power cut at every byte of every write of one charge
+    python -m tests.record.lives 2000        also power cuts at every byte of every write of a charge (`cuts.py`)
 
 The record is right if no charge is in it twice, none is lost, ids are in the order of the charges, and the sum of their
 Ah is the integral of the charger's current: but for what no disk had when a run ended, which is worked out here.
@@ -9,7 +9,6 @@ Ah is the integral of the charger's current: but for what no disk had when a run
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from random import Random
@@ -17,14 +16,12 @@ from typing import Any
 from unittest.mock import patch
 
 from orchestrator.core.persisted import COUNTERS_S, Persisted
-from orchestrator.model import Operation, Request, State
-from orchestrator.record.lines import decoded
+from orchestrator.model import Operation, Request
 from orchestrator.service import rotating
-from tests.record.kept import Kept
+from tests.record.cuts import cuts
+from tests.record.kept import EDGE_AH, Kept, charges_in
 from tests.service.bench import STEP_S
 
-#: The first reading of a run, and the one under way when it ends, are not counted: at 14 A each.
-EDGE_AH = 2 * STEP_S * 14.0 / 3600
 #: Runs of the service in a life, and how far a clock steps.
 RUNS = 5
 WEEK_S, YEAR_S = 7 * 86_400.0, 365 * 86_400.0
@@ -178,27 +175,6 @@ class Life:
             assert abs(shares_ah - charge["charger"]["ah"]) < 1e-4, "the rules' Ah are not the charge's"
 
 
-def charges_in(directory: Path) -> Mapping[str, Any]:
-    """All that is known of each charge, by id; AssertionError if a record is there twice, or missing."""
-    found: dict[str, dict[str, Any]] = {}
-    seen: set[tuple[str, int]] = set()
-    for path in sorted((directory / "sessions").glob("*.jsonl")):
-        for line in path.read_bytes().splitlines():
-            record = decoded(line)
-            if record is None:
-                continue
-            key = (record["id"], record["n"])
-            assert key not in seen, f"record {key} is there twice"
-            seen.add(key)
-            now = found.get(record["id"])
-            if now is None or record["n"] > now["n"]:
-                found[record["id"]] = {**(now or {}), **record}
-    for id_ in found:
-        numbers = sorted(number for one, number in seen if one == id_)
-        assert numbers == list(range(len(numbers))), f"records of {id_} are missing: {numbers}"
-    return found
-
-
 def _fields(reading: object) -> dict[str, Any]:
     return {name: getattr(reading, name) for name in type(reading).__slots__}  # type: ignore[attr-defined]
 
@@ -215,70 +191,6 @@ def live(seed: int) -> Counter[str]:
             life.kept.bench.store._ownership.give_up()
         life.had["charges"] += len(charges_in(Path(directory)))
         return life.had
-
-
-class Writes:
-    """The writes of one charge with a pause: what was on the disk before each, what it added, and the bay's state."""
-
-    def __init__(self) -> None:
-        self.all: list[tuple[bytes, bytes, Persisted, float]] = []
-        with tempfile.TemporaryDirectory() as directory, ExitStack() as stack:
-            self.kept = Kept(Path(directory))
-            stack.enter_context(patch("orchestrator.service.bay.time", self.kept.wall))
-            stack.enter_context(patch("orchestrator.service.recorder.append", self._append))
-            self.kept.bench.charging()
-            for request, state in ((Request.PAUSE, State.SUSPENDED), (Request.START, State.CHARGING)):
-                self.kept.recorder.turn()
-                self.kept.bench.ask(request)
-                self.kept.bench.until(state)
-            self.kept.bench.battery.values["soc_pct"] = 100.0
-            self.kept.recorder.turn()
-            self.kept.bench.until(State.FULL)
-            self.kept.recorder.turn()
-            self.kept.bench.store._ownership.give_up()
-
-    def _append(self, path: Path, data: bytes, *, durable: bool) -> None:
-        before = path.read_bytes() if path.exists() else b""
-        self.all.append((before, data, self.kept.persisted(), self.kept.bench.now_s))
-        rotating.append(path, data, durable=durable)
-
-
-def cut(before: bytes, written: bytes, persisted: Persisted, at_s: float) -> None:
-    """The power goes when so much is written; AssertionError if the next run makes a wrong record of that."""
-    with tempfile.TemporaryDirectory() as name:
-        directory = Path(name)
-        (directory / "sessions").mkdir()
-        (directory / "sessions" / "2026-11.jsonl").write_bytes(before + written)
-        kept = Kept(directory)
-        kept.bench.now_s = at_s
-        known = [record for line in (before + written).splitlines() if (record := decoded(line)) is not None]
-        with patch("orchestrator.service.bay.time", kept.wall):
-            kept.again(persisted, 30.0, "another boot")
-            for _ in range(10):
-                kept.bench.step()
-                kept.recorder.turn()
-        kept.bench.store._ownership.give_up()
-        charges, session = charges_in(directory), persisted.session
-        assert len(charges) == int(bool(known) or session is not None), "a charge is lost, or there twice"
-        known_ah = max((record["charger"]["ah"] for record in known), default=0.0)
-        least_ah = max(known_ah, session.charged_ah if session is not None else 0.0)
-        for charge in charges.values():
-            assert abs(charge["charger"]["ah"] - least_ah) <= EDGE_AH, "its Ah are lost, or there twice"
-            over = session is None or "end" in {record["type"] for record in known}
-            assert (charge["type"] == "end") is over, "whether it goes on is wrong"
-
-
-def cuts(stride: int) -> int:
-    """A power cut at every so many bytes of every write of a charge; how many there were."""
-    count = 0
-    for number, (before, data, persisted, at_s) in enumerate(Writes().all):
-        for size in sorted({*range(0, len(data), stride), len(data) - 1, len(data)}):
-            try:
-                cut(before, data[:size], persisted, at_s)
-            except AssertionError as error:
-                raise AssertionError(f"write {number}, cut after {size} of {len(data)} bytes: {error}") from error
-            count += 1
-    return count
 
 
 def main(count: int) -> int:

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.record.lives import cuts, live
+from tests.record.cuts import cuts
+from tests.record.lives import live
 
 
 @pytest.mark.parametrize("seed", range(8))
