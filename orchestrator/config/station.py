@@ -109,6 +109,9 @@ class JournalConfig:
         "how long the record of charges is kept, beside the journal and not counted in max_mb", unit="years", ge=1,
         default=5.0,
     )  # fmt: skip
+    curves_days: float = key(
+        "how long the curves of charges are kept, some 20 kB for each; 0: none are", unit="days", ge=0, default=365.0
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,6 +11,7 @@ from orchestrator.model import Decision, Session, Snapshot
 from orchestrator.record import charge as charges
 from orchestrator.record import lines
 from orchestrator.record.charge import Charge
+from orchestrator.record.curve import Curve
 from orchestrator.record.look import Look
 from orchestrator.record.stamp import Stamp
 from orchestrator.service.past import Place
@@ -28,6 +29,7 @@ class BayRecord:
         self._recorder, self._station = recorder, station
         self._place = Place.of(bay)
         self._charge: Charge | None = None
+        self._curve = Curve()
         self._over: Charge | None = None  # ended in the record, and still open in the core
         self._pending: list[Charge] | None = None  # left open by earlier runs; None: not known yet
         self._early: deque[tuple[Look, BayConfig]] = deque(maxlen=MOST_EARLY)
@@ -44,6 +46,7 @@ class BayRecord:
     def rest(self) -> None:
         """The service ends: record what has been counted until now."""
         if self._charge is not None:
+            self._recorder.put_curve(self._charge.id, self._curve.rest(), ended=True)
             self._put(self._charge, self._charge.last)
 
     def _look(self, clock: WallClock, snapshot: Snapshot, decision: Decision) -> Look:
@@ -87,7 +90,7 @@ class BayRecord:
             if not look.runs:
                 return  # its end did not reach the core's memory: it is ended once more
             counted = over.amounts.counted.at_most(session)
-        self._over = None
+        self._over, self._curve = None, Curve()
         head = self._head(bay)
         id_ = self._recorder.new_id(look.stamp.unix_s)
         charge = charges.begun(id_, head, look, session, counted)
@@ -96,7 +99,10 @@ class BayRecord:
 
     def _keep(self, charge: Charge, look: Look) -> None:
         """The charge as it is now, recorded if that is due."""
-        self._charge = charge
+        self._charge, ended = charge, charge.result is not None
+        self._curve.take(look, look.stamp.since(charge.begin), charge.amounts.ah)
+        if ended or charge.due or self._curve.is_due(look.now_s):
+            self._recorder.put_curve(charge.id, self._curve.rest(), ended=ended)
         if charge.result is not None or charges.is_due(charge, look.stamp):
             self._put(charge, look.stamp)
 

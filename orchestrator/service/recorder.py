@@ -18,6 +18,7 @@ from orchestrator.record.charge import Charge
 from orchestrator.record.earlier import Earlier
 from orchestrator.record.lines import CHECKPOINT, Record, encoded
 from orchestrator.record.ulid import CHANCE, after
+from orchestrator.service.curves import Curves
 from orchestrator.service.disk import code_of, make_directory, sync_directory
 from orchestrator.service.rotating import append, cut_off
 
@@ -43,10 +44,13 @@ class Recorder:
         say: Callable[[Cause], None] = lambda _: None,
         *,
         boot: str = "",
+        curves_days: float = 0.0,
     ) -> None:
         self.boot = boot  #: of the machine
         self._folder, self._years, self._wall, self._say = directory / months.FOLDER, years, wall, say
         self._waiting: deque[Record] = deque()
+        self._curves = Curves(self._folder, curves_days) if curves_days else None
+        self._points: deque[tuple[str, str, bool]] = deque(maxlen=MOST)  # (charge, lines, whether it has ended)
         self._problem: Cause | None = None
         self._name = ""  # of the file being written; "" before the first
         self._opened: list[Charge] = []
@@ -90,6 +94,11 @@ class Recorder:
         self._waiting.append(record)
         self._wake.set()
 
+    def put_curve(self, id_: str, text: str, *, ended: bool) -> None:
+        """Have these points of a charge written, sooner or later; the oldest are lost where no disk takes them."""
+        self._points.append((id_, text, ended))
+        self._wake.set()
+
     def failed(self, error: Exception) -> None:
         """A defect in keeping the record: it costs the record, not the charge."""
         self._settle(Cause.of("record_internal", error=repr(error)))
@@ -123,6 +132,7 @@ class Recorder:
                 self._load()
             if self.loaded:
                 self._write()
+                self._write_curves()
         except OSError as error:
             self._name = ""  # what came of it is looked at before the next record
             self._settle(Cause.of("record_failed", error=code_of(error), file=str(error.filename or self._folder)))
@@ -169,6 +179,16 @@ class Recorder:
             self._name = now
         for _ in range(count):
             self._waiting.popleft()
+
+    def _write_curves(self) -> None:
+        while self._points:
+            id_, text, ended = self._points[0]
+            if self._curves is not None and text:
+                self._curves.write(id_, text, self._wall())
+            if self._curves is not None and ended:
+                self._curves.end(id_)
+            if self._points[0][0] == id_:  # the oldest may have been dropped meanwhile
+                self._points.popleft()
 
     def _begin(self, path: Path) -> None:
         """A new month, or the first record of this run."""

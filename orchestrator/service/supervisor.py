@@ -30,13 +30,12 @@ from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.ports import REQUESTS, ChargerPorts
-from orchestrator.service.recorder import Recorder
 from orchestrator.service.reload import Reload
 from orchestrator.service.request_handler import RequestHandler
 from orchestrator.service.starts import Starts
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
-from orchestrator.service.wiring import can_buses, open_contactor, stray_port
+from orchestrator.service.wiring import can_buses, open_contactor, recorder, stray_port
 from orchestrator.text.catalogue import say
 
 #: The heartbeat period: the guardian acts after five missed ones.
@@ -70,7 +69,7 @@ class Supervisor:
         self._journal = Journal(kept.directory, kept.max_mb, monotonic, time, boot=boot, say=self._say)
         places = [Place.of(bay) for bay in station.bays]
         self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_persisted=self._on_persisted)
-        self._recorder = Recorder(kept.directory, kept.sessions_years, time, self._say, boot=boot)
+        self._recorder = recorder(kept, boot, self._say)
         self._bays: list[BayRunner] = []
         self._build(ports)
         self._strays = Strays(

@@ -26,7 +26,7 @@ class Kept:
         self.recorder, self.bench = self._begin(None, 1000.0)
 
     def _begin(self, persisted: Persisted | None, now_s: float) -> tuple[Recorder, Bench]:
-        recorder = Recorder(self.directory, 5.0, self.wall, self.said.append, boot=self.boot)
+        recorder = Recorder(self.directory, 5.0, self.wall, self.said.append, boot=self.boot, curves_days=365.0)
         self.bench = Bench(self.directory, persisted, now_s=now_s, wall=self.wall, recorder=recorder)
         recorder.turn()
         return recorder, self.bench
