@@ -4,10 +4,11 @@ An end has all of a charge, so of the many checkpoints only those of open charge
 """
 
 from collections.abc import Iterable, Iterator
+from gzip import GzipFile
 from pathlib import Path
 
 from orchestrator.record.lines import BEGIN, CHECKPOINT, Record, decoded, scanned
-from orchestrator.record.months import files
+from orchestrator.record.months import PACKED, files
 
 
 class Charges:
@@ -46,5 +47,5 @@ def charges_in(folder: Path) -> Iterator[Record]:
     charges = Charges()
     for name in files(path.name for path in folder.iterdir()):
         with (folder / name).open("rb") as file:
-            charges.take(file)
+            charges.take(GzipFile(fileobj=file) if name.endswith(PACKED) else file)
     yield from charges.all()

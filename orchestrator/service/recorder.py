@@ -10,6 +10,8 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
+from gzip import GzipFile
 from pathlib import Path
 
 from orchestrator.model import Cause
@@ -20,7 +22,7 @@ from orchestrator.record.lines import CHECKPOINT, Record, encoded
 from orchestrator.record.ulid import CHANCE, after
 from orchestrator.service.curves import Curves
 from orchestrator.service.disk import code_of, make_directory, sync_directory
-from orchestrator.service.rotating import append, cut_off
+from orchestrator.service.rotating import append, cut_off, pack
 
 #: More records waiting for a disk than this: checkpoints are dropped.
 MOST = 1000
@@ -162,7 +164,7 @@ class Recorder:
 
     def _take(self, name: str, earlier: Earlier) -> None:
         with (self._folder / name).open("rb") as file:
-            earlier.take(file)
+            earlier.take(GzipFile(fileobj=file) if name.endswith(months.PACKED) else file)
 
     def _write(self) -> None:
         if not self._waiting:
@@ -191,10 +193,13 @@ class Recorder:
                 self._points.popleft()
 
     def _begin(self, path: Path) -> None:
-        """A new month, or the first record of this run."""
+        """A new month, or the first record of this run: old months go, and finished ones are compressed."""
         make_directory(self._folder)
         for name in months.outdated(self._wall(), {*self._names(), path.name}, self._years):
             os.unlink(self._folder / name)  # noqa: PTH108 - as in disk.py
+        with suppress(OSError):  # they stay as they are: the next month tries again
+            for name in months.finished({*self._names(), path.name}):
+                pack(self._folder / name)
 
     def _names(self) -> list[str]:
         try:

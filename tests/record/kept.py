@@ -1,5 +1,6 @@
 """A bay of the bench whose charges are recorded, over runs of the service; time is simulated."""
 
+import gzip
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -51,25 +52,30 @@ class Kept:
     def records(self) -> list[dict[str, Any]]:
         """All that is on the disk."""
         self.recorder.turn()
-        found = sorted((self.directory / "sessions").glob("*.jsonl"))
-        return [json.loads(line) for path in found for line in path.read_bytes().splitlines()]
+        return [json.loads(line) for line in lines_in(self.directory)]
+
+
+def lines_in(directory: Path) -> list[bytes]:
+    """Every line of every file, in the order of the months."""
+    paths = sorted(path for path in (directory / "sessions").iterdir() if path.is_file())
+    files = [gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes() for path in paths]
+    return [line for data in files for line in data.splitlines()]
 
 
 def charges_in(directory: Path) -> Mapping[str, Any]:
     """All that is known of each charge, by id; AssertionError if a record is there twice, or missing."""
     found: dict[str, dict[str, Any]] = {}
     seen: set[tuple[str, int]] = set()
-    for path in sorted((directory / "sessions").glob("*.jsonl")):
-        for line in path.read_bytes().splitlines():
-            record = decoded(line)
-            if record is None:
-                continue
-            key = (record["id"], record["n"])
-            assert key not in seen, f"record {key} is there twice"
-            seen.add(key)
-            now = found.get(record["id"])
-            if now is None or record["n"] > now["n"]:
-                found[record["id"]] = {**(now or {}), **record}
+    for line in lines_in(directory):
+        record = decoded(line)
+        if record is None:
+            continue
+        key = (record["id"], record["n"])
+        assert key not in seen, f"record {key} is there twice"
+        seen.add(key)
+        now = found.get(record["id"])
+        if now is None or record["n"] > now["n"]:
+            found[record["id"]] = {**(now or {}), **record}
     for id_ in found:
         numbers = sorted(number for one, number in seen if one == id_)
         assert numbers == list(range(len(numbers))), f"records of {id_} are missing: {numbers}"

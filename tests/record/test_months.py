@@ -2,7 +2,7 @@
 
 import pytest
 
-from orchestrator.record.months import current, newest, outdated
+from orchestrator.record.months import current, finished, newest, outdated
 
 #: 2026-11-28.
 NOW_S = 1_795_845_600.0
@@ -16,6 +16,7 @@ YEAR_S = 365.25 * 86_400
         (NOW_S, ["2026-10.jsonl"], "2026-11.jsonl"),
         (NOW_S, ["2026-12.jsonl"], "2026-11.jsonl"),
         (5.0, ["2026-10.jsonl", "2026-11.jsonl", "curves"], "2026-11.jsonl"),  # a clock that was never set
+        (5.0, ["2026-10.jsonl.gz"], "2026-10.jsonl"),
         (5.0, [], "1970-01.jsonl"),
         (1e18, ["2026-11.jsonl"], "2026-11.jsonl"),  # a year that no calendar has
         (1e18, [], "1970-01.jsonl"),
@@ -30,6 +31,10 @@ def test_the_file_is_that_of_the_month(unix_s: float, names: list[str], expected
     [
         (["2026-09.jsonl", "2026-10.jsonl", "2026-11.jsonl"], ["2026-10.jsonl", "2026-11.jsonl"]),
         (["2026-11.jsonl"], ["2026-11.jsonl"]),
+        (
+            ["2026-09.jsonl.gz", "2026-10.jsonl", "2026-10.jsonl.gz"],
+            ["2026-09.jsonl.gz", "2026-10.jsonl", "2026-10.jsonl.gz"],
+        ),
         ([], []),
         (
             ["2026-09.jsonl", "2026-10.jsonl", "2026-11.jsonl", "2031-01.jsonl"],
@@ -57,3 +62,9 @@ MONTHS = [f"{year}-{month:02}.jsonl" for year in range(2020, 2027) for month in 
 )
 def test_whole_months_go_after_five_years(unix_s: float, names: list[str], expected: list[str]) -> None:
     assert outdated(unix_s, names, 5.0) == expected
+
+
+def test_months_that_are_over_are_compressed() -> None:
+    names = ["2026-08.jsonl", "2026-08.jsonl.gz", "2026-09.jsonl", "2026-10.jsonl", "2026-11.jsonl"]
+    assert finished(names) == ["2026-09.jsonl"]  # what was added to August when the clock was wrong stays beside it
+    assert finished(names[-2:]) == []

@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Request, State
+from orchestrator.record.reading import charges_in
 from tests.record.kept import WALL_S, Kept
 
 
@@ -213,3 +214,23 @@ def test_the_thread_writes_and_ends(tmp_path: Path) -> None:
     assert recorder.stalled(0.0)
     (file,) = (tmp_path / "sessions").iterdir()
     assert file.read_bytes().endswith(b'"n":0}\n')
+
+
+def test_a_finished_month_is_compressed_and_still_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = Kept(tmp_path)
+    monkeypatch.setattr("orchestrator.service.bay.time", kept.wall)
+    for _ in range(4):
+        kept.bench.charging()
+        kept.recorder.turn()
+        kept.off_s += 31 * 86400.0
+        kept.bench.ask(Request.STOP)
+        kept.bench.until(State.HELD)
+        kept.bench.ask(Request.START)
+        kept.recorder.turn()
+    names = sorted(path.name for path in (tmp_path / "sessions").glob("*.jsonl*"))
+    assert (
+        names
+        == ["2026-11.jsonl.gz", "2026-12.jsonl.gz", "2027-01.jsonl.gz", "2027-02.jsonl", "2027-03.jsonl"][-len(names) :]
+    )
+    found = list(charges_in(tmp_path / "sessions"))
+    assert [one["type"] for one in found] == ["end"] * 4
