@@ -10,6 +10,7 @@ import sys
 import tempfile
 from collections import Counter
 from contextlib import ExitStack
+from itertools import takewhile
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -130,8 +131,9 @@ class Life:
         """What the store had on the disk: its last change that matters, or counters up to 30 s old."""
         newest = self.history[-1]
         back = 0 if orderly else self.dice.randint(0, int(COUNTERS_S / STEP_S))
-        same = [one for one in self.history[-back - 1 :] if one[1].gist == newest[1].gist]
-        true_ah, persisted, at_s = same[0]
+        since = self.history[-back - 1 :]
+        same = list(takewhile(lambda one: one[1].gist == newest[1].gist, reversed(since)))
+        true_ah, persisted, at_s = same[-1]
         return true_ah, persisted.aged(self.kept.bench.now_s - at_s)
 
     def _again(self, persisted: Persisted, how: str) -> None:
