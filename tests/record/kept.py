@@ -57,7 +57,7 @@ class Kept:
 
 def lines_in(directory: Path) -> list[bytes]:
     """Every line of every file, in the order of the months."""
-    paths = sorted(path for path in (directory / "sessions").iterdir() if path.is_file())
+    paths = sorted((directory / "sessions").glob("*.jsonl*"))
     files = [gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes() for path in paths]
     return [line for data in files for line in data.splitlines()]
 
