@@ -26,13 +26,15 @@ EDGES: dict[str, tuple[str, ...]] = {
     "interlock": ("config.policy", "config.station", "errors", "keys", "model"),
     "core": ("config.amperes", "config.policy", "config.station", "errors", "keys", "model"),
     # What must work when nothing else does. Only the station file needs PyYAML.
+    # It is folded from the core's decisions by their states alone, and read without any of the core.
+    "record": ("columns", "core.states", "errors", "model", "show", "text"),
     "lastresort": ("config.ports", "errors", "protocol.standby"),
     "link": ("errors", "extras", "keys", "lastresort.line_settings", "lastresort.port_owner", "model", "protocol"),
     # The devices know the link only as a typing.Protocol: they run on anything that sends and receives.
     "devices": ("config.policy", "config.station", "errors", "interlock", "keys", "model", "protocol"),
     "service": (
         "columns", "config", "core", "devices", "errors", "gist", "interlock", "keys", "lastresort", "link", "model",
-        "page", "protocol", "show", "text",
+        "page", "protocol", "record", "show", "text",
     ),
     "commissioning": (
         "config", "devices", "errors", "keys", "link", "model", "protocol", "service.socketfile", "text",
@@ -52,7 +54,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     "cli": (
         "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",
-        "link", "model", "protocol", "service", "shell", "show", "sim", "text", "workbench",
+        "link", "model", "protocol", "record", "service", "shell", "show", "sim", "text", "workbench",
     ),
     "shell": ("lastresort.asking", "service.where", "workbench.verbs"),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
@@ -83,7 +85,7 @@ LIBRARY = frozenset({
 })  # fmt: skip
 #: … and none of these built-in functions.
 IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "open", "print"})
-CLOCK_READERS = ("cli", "commissioning", "demo", "lastresort", "service", "sim", "workbench.verbs")
+CLOCK_READERS = ("cli", "commissioning", "demo", "lastresort", "record.utc", "service", "sim", "workbench.verbs")
 CLOCKS = frozenset({
     "clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "monotonic", "monotonic_ns", "perf_counter",
     "perf_counter_ns", "process_time", "process_time_ns", "strftime", "thread_time", "thread_time_ns", "time",

@@ -105,6 +105,13 @@ class JournalConfig:
     directory: Path = key("where the journal is kept")
     snapshots: bool = key("also what every decision was made from, for a replay; false spares an SD card", default=True)
     max_mb: float = key("the most that it may take; the oldest goes first", unit="MB", ge=1, default=256.0)
+    sessions_years: float = key(
+        "how long the record of charges is kept, beside the journal and not counted in max_mb", unit="years", ge=1,
+        default=5.0,
+    )  # fmt: skip
+    curves_days: float = key(
+        "how long the curves of charges are kept, some 20 kB for each; 0: none are", unit="days", ge=0, default=365.0
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

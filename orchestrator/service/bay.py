@@ -16,6 +16,7 @@ from orchestrator.interlock import grant
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 from orchestrator.service.asked import Answers, Asked, Requests
 from orchestrator.service.bayjournal import BayJournal
+from orchestrator.service.bayrecord import BayRecord
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.identified import Identified
@@ -45,6 +46,7 @@ class BayRunner:
         *,
         contactor: Contactor | None = None,
         starts: Starts | None = None,
+        record: BayRecord | None = None,
         snapshots: bool = True,
         language: str = "en",
     ) -> None:
@@ -61,7 +63,7 @@ class BayRunner:
         self._asleep_s, self._closely = 0.0, True  # the BMU is read closely until the first decision
         self._charger, self._battery = charger, battery
         self._journal = BayJournal(bay, journal, language, snapshots=snapshots)
-        self._contactor = contactor
+        self._contactor, self._record = contactor, record
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
         self._snapshot = Snapshot()
         self._requests, self._internal = Requests(), ""
@@ -112,6 +114,8 @@ class BayRunner:
     def isolate(self) -> None:
         """Open the contactor for good, at the end of the service, and record that and the last decisions."""
         self._journal.rest()
+        if self._record is not None:
+            self._record.rest()
         if self._contactor is not None:
             self._contactor.give_back()
             self._journal.contactor(self._contactor)
@@ -158,8 +162,8 @@ class BayRunner:
     def _step(self, now_s: float, asleep_s: float, request: Request | None) -> None:
         if self.verified and self.decision is not None and self.decision.state is not State.QUALIFYING:
             self._take_over()
-        snapshot = self._snapshot = self._look(now_s, asleep_s, request)
-        before = self.decision
+        snapshot, before = self._look(now_s, asleep_s, request), self.decision
+        self._snapshot = snapshot
         memory = self._memory or self._store.past(self.place).memory(now_s)
         decision, self._memory = decide(now_s, snapshot, memory, self.policy.rules)
         self._charger.command(decision.command, grant(snapshot, now_s) if decision.command else None)
@@ -178,6 +182,8 @@ class BayRunner:
             self._say(transition(self.name, before, decision, clock))
         self.identified.follow(now_s, snapshot, self._memory)
         self._keep(self._memory, now_s)
+        if self._record is not None:
+            self._record.take(clock, snapshot, decision, self.policy.rules.bay)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """Everything known about the bay now."""
@@ -202,9 +208,8 @@ class BayRunner:
             running_persisted=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
             asked_by=self._by,
         )
-        if self._contactor is not None:
-            connected, problem = self._contactor.connects(reading), self._contactor.problem
-            snapshot = replace(snapshot, connected=connected, contactor_problem=problem)
+        if (fitted := self._contactor) is not None:
+            return replace(snapshot, connected=fitted.connects(reading), contactor_problem=fitted.problem)
         return snapshot
 
     def _drive(self, now_s: float, *, closed: bool) -> None:

@@ -54,7 +54,7 @@ class RotatingFile:
 
     def _append(self, data: bytes) -> None:
         path = self._parts.open
-        append(path, data if self._mended else _cut_off(path) + data, durable=self._durable)
+        append(path, data if self._mended else cut_off(path) + data, durable=self._durable)
         self._mended = True
 
     def _rotate(self) -> None:
@@ -114,7 +114,7 @@ def append(path: Path, data: bytes, *, durable: bool) -> None:
             raise
 
 
-def _cut_off(path: Path) -> bytes:
+def cut_off(path: Path) -> bytes:
     """The bytes to write before the next line: a line end, if a power failure has cut off the last line."""
     size = size_of(path)
     if not size:

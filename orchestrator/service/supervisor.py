@@ -18,10 +18,10 @@ from orchestrator.devices.battery import BatteryNode
 from orchestrator.devices.bus import BatteryBus
 from orchestrator.devices.bus_budget import BusBudget
 from orchestrator.devices.charger import ChargerPort
-from orchestrator.link.can import CanBus
 from orchestrator.model import Cause
 from orchestrator.model.moment import moment
 from orchestrator.service.bay import BayRunner
+from orchestrator.service.bayrecord import BayRecord
 from orchestrator.service.boot import boot_id, boottime
 from orchestrator.service.closing import close_all
 from orchestrator.service.console import Console
@@ -35,7 +35,7 @@ from orchestrator.service.request_handler import RequestHandler
 from orchestrator.service.starts import Starts
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
-from orchestrator.service.wiring import open_contactor, stray_port
+from orchestrator.service.wiring import can_buses, open_contactor, recorder, stray_port
 from orchestrator.text.catalogue import say
 
 #: The heartbeat period: the guardian acts after five missed ones.
@@ -46,8 +46,8 @@ STOP_S = 3.0
 LOCK_S = 0.3
 #: … and it has this long.
 LOAD_S = 3.0
-#: The time limits at the end for closing the control socket, writing changes, and closing everything else.
-CONTROL_S, KEEP_S, CLOSE_S = 0.2, 2.5, 2.5
+#: The time limits at the end: closing the control socket, writing changes, closing everything else, and the records.
+CONTROL_S, KEEP_S, CLOSE_S, RECORDS_S = 0.2, 2.5, 2.5, 1.0
 
 
 class Supervisor:
@@ -69,7 +69,7 @@ class Supervisor:
         self._journal = Journal(kept.directory, kept.max_mb, monotonic, time, boot=boot, say=self._say)
         places = [Place.of(bay) for bay in station.bays]
         self._store = Store(kept.directory, places, monotonic, time, boot=boot, on_persisted=self._on_persisted)
-        self._buses: list[BatteryBus] = []
+        self._recorder = recorder(kept, boot, self._say)
         self._bays: list[BayRunner] = []
         self._build(ports)
         self._strays = Strays(
@@ -87,10 +87,7 @@ class Supervisor:
     def _build(self, ports: ChargerPorts) -> None:
         """Create the devices for every bay; nothing is opened yet."""
         nodes: dict[str, list[BatteryNode]] = {name: [] for name in self._station.can}
-        buses = {
-            name: CanBus(name, settings, [bay.battery.node_id for bay in self._station.bays if bay.battery.can == name])
-            for name, settings in self._station.can.items()
-        }
+        buses = can_buses(self._station)
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
         alone = len(self._station.bays) == 1
         starts = Starts(0.0 if alone else self._station.stagger_s, self._station.source.at("stagger_s"))
@@ -102,6 +99,7 @@ class Supervisor:
             runner = BayRunner(
                 bay, port, node, self._journal, self._store, self._say,
                 contactor=contactor, starts=starts, snapshots=snapshots, language=self._language,
+                record=BayRecord(self._recorder, self._station.station, bay),
             )  # fmt: skip
             self._bays.append(runner)
         ports.changed = self._changed
@@ -138,6 +136,7 @@ class Supervisor:
             self._strays.begin()
         self._console.start()
         self._journal.start()
+        self._recorder.start()
         self._reload.start()
         self._control.start()
         if not known and self._store.wait(LOAD_S):
@@ -205,7 +204,8 @@ class Supervisor:
     def _beat(self, now_s: float) -> None:
         """Tell the guardian that every loop makes progress; end if the guardian is gone."""
         devices: tuple[ChargerPort | BatteryBus, ...] = (*self._ports, *self._buses)
-        well = not any(worker.stalled(now_s) for worker in (*devices, self._control, self._journal, self._store))
+        writers = (self._journal, self._recorder, self._store)
+        well = not any(worker.stalled(now_s) for worker in (*devices, self._control, *writers))
         self._beat_s = now_s
         self._lost = self._guardian.beat(now_s, well=well)
         self._ending = self._ending or self._lost
@@ -243,7 +243,7 @@ class Supervisor:
         verdicts = [Cause.of("not_verified", chargers=tuple(unverified))] if unverified else []
         verdicts += [Cause.of("not_written", problem=not_persisted)] if not_persisted is not None else []
         self._say(Cause.of("ended", verdicts=tuple(verdicts)) if verdicts else Cause("ended_well"))
-        self._journal.close()
+        close_all([self._journal.close, self._recorder.close], RECORDS_S)
         return 1 if verdicts or self._lost or self._unable else 0
 
     def _unverified(self) -> list[str | Cause]:

@@ -1,16 +1,20 @@
-"""Creates what a bay may have besides charger and BMU: a contactor, and an earlier run's charger on another port."""
+"""Creates what a station has besides its bays' devices: buses, contactors, an earlier run's charger on another port."""
 
 from collections.abc import Callable
 from functools import partial
+from time import time
 
-from orchestrator.config.station import BayConfig, ChargerConfig, Limits
+from orchestrator.config.station import BayConfig, ChargerConfig, JournalConfig, Limits, Station
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.keys import Range
+from orchestrator.link.can import CanBus
 from orchestrator.link.gpio import OutputLine, need_gpiod
+from orchestrator.model import Cause
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.guarded import GuardedOutput, GuardianLink
 from orchestrator.service.past import Place
 from orchestrator.service.ports import charger_port
+from orchestrator.service.recorder import Recorder
 
 
 def stray_port(guardian: GuardianLink, poke: Callable[[], None], place: Place) -> ChargerPort:
@@ -27,3 +31,14 @@ def open_contactor(bay: BayConfig, guardian: GuardianLink) -> Contactor | None:
     need_gpiod()
     open_output = partial(OutputLine.open, config.chip, config.line, active_low=config.active_low)
     return Contactor(partial(GuardedOutput, bay.name, open_output, guardian))
+
+
+def can_buses(station: Station) -> dict[str, CanBus]:
+    """The station's CAN buses by name, each with the ids of its BMUs; none of them is open yet."""
+    ids = {name: [bay.battery.node_id for bay in station.bays if bay.battery.can == name] for name in station.can}
+    return {name: CanBus(name, settings, ids[name]) for name, settings in station.can.items()}
+
+
+def recorder(kept: JournalConfig, boot: str, say: Callable[[Cause], None]) -> Recorder:
+    """What writes the record of charges, beside the journal."""
+    return Recorder(kept.directory, kept.sessions_years, time, say, boot=boot, curves_days=kept.curves_days)

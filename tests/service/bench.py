@@ -30,9 +30,11 @@ from orchestrator.model import (
 )
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import BayRunner
+from orchestrator.service.bayrecord import BayRecord
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Entry, Place
+from orchestrator.service.recorder import Recorder
 from orchestrator.service.records import Line
 from orchestrator.service.store import Store
 from orchestrator.text.catalogue import say
@@ -147,6 +149,7 @@ class Bench:
         now_s: float = 1000.0,
         wall: Callable[[], float] = time.time,
         contactor: Contactor | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         self.charger, self.battery = Charger(), Battery()
         self.now_s = now_s
@@ -159,8 +162,9 @@ class Bench:
         self.store = Store(directory, [place], lambda: self.now_s, time.time)
         self.store._begin([Entry(place, persisted or Persisted(), 1)])
         self.bay = BayRunner(
-            chosen, self.charger, self.battery, self.journal, self.store, into(self.said), contactor=contactor
-        )
+            chosen, self.charger, self.battery, self.journal, self.store, into(self.said), contactor=contactor,
+            record=BayRecord(recorder, "a station", chosen) if recorder is not None else None,
+        )  # fmt: skip
 
     def step(self, count: int = 1) -> State:
         for _ in range(count):

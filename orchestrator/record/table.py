@@ -1,0 +1,140 @@
+"""The charges as a table for people, and as CSV for spreadsheets. Pure."""
+
+import csv
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from orchestrator.columns import aligned, beside, folded, width_of
+from orchestrator.model import Cause
+from orchestrator.model.cause import from_plain
+from orchestrator.record.lines import Record
+from orchestrator.record.stamp import Stamp, from_fields
+from orchestrator.text.catalogue import say
+
+HEAD = ("BEGAN", "BAY", "BATTERY", "LASTED", "SOC", "AH", "KWH", "WHY IT ENDED")
+#: With less room for the reason, it goes below its charge.
+LEAST_WHY = 24
+DASH = "–"
+#: A spreadsheet in Korean takes UTF-8 for what it is only behind this.
+BOM = "\ufeff"
+VALUES_HEAD = ("", "BEGIN", "END", "LOWEST", "HIGHEST")
+
+
+def table(charges: Sequence[Record], language: str, width: int) -> str:
+    """One line a charge, where there is room."""
+    rows = [HEAD, *(_cells(charge, language) for charge in charges)]
+    widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
+    lines = []
+    for number, cells in enumerate(rows):
+        fixed, why = beside(cells[:-1], widths, width), cells[-1]
+        if width and width - width_of(fixed) < LEAST_WHY:
+            lines += [fixed.rstrip(), *([folded(f"  {why}", width)] if number and why else [])]
+        else:
+            lines.append(folded(why, width, fixed).rstrip())
+    return "\n".join(lines)
+
+
+def _cells(charge: Record, language: str) -> tuple[str, ...]:
+    battery, soc = charge.get("battery") or {}, (charge.get("values") or {}).get("soc_pct")
+    return (
+        began(charge)[:16],
+        str(charge.get("bay", DASH)),
+        str(battery.get("id", DASH)),
+        lasted(length_s(charge)),
+        f"{soc['begin']:.0f}→{soc['end']:.0f} %" if soc else DASH,
+        f"{charge['charger']['ah']:.2f}",
+        f"{charge['charger']['wh'] / 1000:.3f}",
+        why_ended(charge, language),
+    )
+
+
+def why_ended(charge: Record, language: str) -> str:
+    """The sentence for its result; of an open charge that it goes on."""
+    result = charge.get("result")
+    return sentence(result, language) if result else say(Cause("charge_open"), language)
+
+
+def sentence(cause: object, language: str) -> str:
+    """The sentence for a cause in a record; its data where it is not understood here."""
+    try:
+        return say(from_plain(cause), language)
+    except ValueError:
+        return str(cause)
+
+
+def began(charge: Record) -> str:
+    """When it began, in the station's time."""
+    return _stamp(charge, "begin").local()
+
+
+def ended(charge: Record) -> str:
+    """When it ended, or was last recorded, in the station's time."""
+    return _stamp(charge, "end" if "end" in charge else "last").local()
+
+
+def length_s(charge: Record) -> float:
+    """How long it has lasted."""
+    known = charge.get("lasted_s")
+    return float(known) if known is not None else _stamp(charge, "last").since(_stamp(charge, "begin"))
+
+
+def _stamp(charge: Record, name: str) -> Stamp:
+    try:
+        return from_fields(charge.get(name))
+    except ValueError:
+        return Stamp(0.0, 0, 0.0, "")
+
+
+def lasted(seconds: float) -> str:
+    """A length of time in two units."""
+    minutes, hours = int(seconds) // 60, int(seconds) // 3600
+    if hours:
+        return f"{hours} h {minutes % 60:02} min"
+    return f"{minutes} min" if minutes else f"{int(seconds)} s"
+
+
+def values(charge: Record) -> str:
+    """The measured values, in a table."""
+    known = charge.get("values") or {}
+    rows = [
+        (name, *(f"{one[part]:g}" for part in ("begin", "end", "lowest", "highest")))
+        for name, one in known.items()
+        if one
+    ]
+    return aligned([VALUES_HEAD, *rows])
+
+
+#: The columns of the CSV: name → where it is in a record.
+COLUMNS = {
+    "id": ("id",), "station": ("station",), "bay": ("bay",), "battery": ("battery", "id"),
+    "battery_source": ("battery", "source"), "begin": ("begin", "utc"), "end": ("end", "utc"),
+    "lasted_s": ("lasted_s",), "energised_s": ("energised_s",), "paused_s": ("paused_s",), "pauses": ("pause_count",),
+    "charger_ah": ("charger", "ah"), "charger_wh": ("charger", "wh"), "bmu_ah": ("bmu", "ah"), "bmu_wh": ("bmu", "wh"),
+    "soc_begin_pct": ("values", "soc_pct", "begin"), "soc_end_pct": ("values", "soc_pct", "end"),
+    "soh_pct": ("values", "soh_pct", "end"), "temperature_highest_c": ("values", "temperature_c", "highest"),
+    "step_changes": ("step_changes",), "policy": ("policy", "name"), "policy_sha256": ("policy", "sha256"),
+    "by": ("by",), "result": ("result", "id"), "stop_verified_ms": ("stop_verified_ms",),
+}  # fmt: skip
+
+
+def as_csv(charges: Sequence[Record], language: str) -> str:
+    """RFC 4180; the last column is the reason as a sentence."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow([*COLUMNS, "why"])
+    for charge in charges:
+        writer.writerow([*(_guarded(_found(charge, path)) for path in COLUMNS.values()), why_ended(charge, language)])
+    return BOM + text.getvalue()
+
+
+def _found(charge: Record, path: Sequence[str]) -> Any:  # noqa: ANN401 - whatever the record has there
+    value: Any = charge
+    for name in path:
+        value = value.get(name) if isinstance(value, dict) else None
+    return "" if value is None else value
+
+
+def _guarded(value: object) -> object:
+    """A name from a file is no formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value

@@ -1,0 +1,127 @@
+"""One bay's charges, kept for the record: folds the bay's decisions, and has the recorder write what is due."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from time import localtime
+
+from orchestrator import __version__
+from orchestrator.config.station import BayConfig
+from orchestrator.model import Decision, Session, Snapshot
+from orchestrator.record import charge as charges
+from orchestrator.record import lines
+from orchestrator.record.charge import Charge
+from orchestrator.record.curve import Curve
+from orchestrator.record.look import Look
+from orchestrator.record.stamp import Stamp
+from orchestrator.service.past import Place
+from orchestrator.service.recorder import Recorder
+from orchestrator.service.wallclock import WallClock
+
+#: Decisions that wait until the earlier records are read; the core's counters bridge a gap.
+MOST_EARLY = 2000
+
+
+class BayRecord:
+    """Used by the control loop's thread only."""
+
+    def __init__(self, recorder: Recorder, station: str, bay: BayConfig) -> None:
+        self._recorder, self._station = recorder, station
+        self._place = Place.of(bay)
+        self._charge: Charge | None = None
+        self._curve = Curve()
+        self._over: Charge | None = None  # ended in the record, and still open in the core
+        self._pending: list[Charge] | None = None  # left open by earlier runs; None: not known yet
+        self._early: deque[tuple[Look, BayConfig]] = deque(maxlen=MOST_EARLY)
+
+    def take(self, clock: WallClock, snapshot: Snapshot, decision: Decision, bay: BayConfig) -> None:
+        """One more decision, under this policy. Nothing that fails here may reach the charger."""
+        try:
+            self._early.append((self._look(clock, snapshot, decision), bay))
+            while self._early and self._recorder.loaded:
+                self._take(*self._early.popleft())
+        except Exception as error:  # noqa: BLE001 - whatever it is, the bay goes on
+            self._recorder.failed(error)
+
+    def rest(self) -> None:
+        """The service ends: record what has been counted until now."""
+        if self._charge is not None:
+            self._recorder.put_curve(self._charge.id, self._curve.rest(), ended=True)
+            self._put(self._charge, self._charge.last)
+
+    def _look(self, clock: WallClock, snapshot: Snapshot, decision: Decision) -> Look:
+        offset_min = localtime(clock.wall_s).tm_gmtoff // 60
+        return Look(Stamp(clock.wall_s, offset_min, clock.now_s, self._recorder.boot), snapshot, decision, clock.told)
+
+    def _take(self, look: Look, bay: BayConfig) -> None:
+        session = look.session
+        if self._pending is None:
+            self._pending = self._recorder.opened(self._place.bay, self._place.port)
+            self._over = self._recorder.last(self._place.bay)
+        if self._pending and not self._go_on(self._pending, look, session):
+            return
+        charge = self._charge
+        if charge is not None and session is not None and session.started_s == charge.started_s:
+            self._keep(charges.follow(charge, look), look)
+            return
+        if charge is not None:
+            self._put(charges.unseen(charge), charge.last)
+        if session is not None:
+            self._begin(look, session, bay)
+
+    def _go_on(self, pending: Sequence[Charge], look: Look, session: Session | None) -> bool:
+        """Go on with the charge left open that the core goes on with; the others have ended unseen. False: not yet."""
+        if session is None and look.snapshot.not_persisted is not None:
+            return False  # the core may have had no disk to remember it from: the next start will
+        same = [one for one in pending if session is not None and charges.is_same(one, session, look.stamp)][-1:]
+        for one in pending:
+            if one not in same:
+                self._put(charges.lost(one), one.last)
+        self._pending = []
+        if same and session is not None:
+            self._keep(charges.resumed(same[0], look, session), look)
+            return False
+        return True
+
+    def _begin(self, look: Look, session: Session, bay: BayConfig) -> None:
+        over, counted = self._over, None
+        if over is not None and charges.is_same(over, session, look.stamp):
+            self._over = over if session.result is None else None
+            if not look.runs:
+                return  # its end did not reach the core's memory: it is ended once more
+            counted = over.amounts.counted.at_most(session)
+        self._over, self._curve = None, Curve()
+        head = self._head(bay)
+        id_ = self._recorder.new_id(look.stamp.unix_s)
+        charge = charges.begun(id_, head, look, session, counted)
+        self._recorder.put(lines.begin(charge))
+        self._keep(replace(charge, number=1, due=False), look)
+
+    def _keep(self, charge: Charge, look: Look) -> None:
+        """The charge as it is now, recorded if that is due."""
+        self._charge, ended = charge, charge.result is not None
+        self._curve.take(look, look.stamp.since(charge.begin), charge.amounts.ah)
+        if ended or charge.due or self._curve.is_due(look.now_s):
+            self._recorder.put_curve(charge.id, self._curve.rest(), ended=ended)
+        if charge.result is not None or charges.is_due(charge, look.stamp):
+            self._put(charge, look.stamp)
+
+    def _put(self, charge: Charge, now: Stamp) -> None:
+        ended = charge.result is not None
+        self._recorder.put(lines.end(charge) if ended else lines.checkpoint(charge))
+        self._charge = None if ended else charges.wrote(charge, now)
+
+    def _head(self, bay: BayConfig) -> Mapping[str, object]:
+        """What does not change of a charge that begins now."""
+        battery, policy = bay.battery, bay.policy
+        node = f"0x{battery.node_id:02X}"
+        return {
+            "station": self._station,
+            "bay": self._place.bay,
+            "port": self._place.port,
+            "battery": {"id": f"{battery.can}/{node}", "source": "assumed", "can": battery.can, "node": node},
+            "policy": {"name": policy.policy, "sha256": policy.source.digest},
+            "software": __version__,
+            "by": None,  # who asked for it, once requests say so
+            "contactor_fitted": bay.contactor is not None,
+        }  # fmt: skip
