@@ -29,6 +29,7 @@ class Kind(Enum):
     SESSION_ENDS = auto()  #: entering one ends the charge; a pause, a restart and a silent device do not end it
     ALIKE = auto()  #: at rest, waiting for a person or not: moving between them is no progress of a charge
     DONE = auto()  #: nothing interrupted is waiting here to continue
+    BY_PERSON = auto()  #: only a person makes it go on
     PASSING = auto()  #: left again within seconds, in any surroundings
 
 
@@ -42,6 +43,7 @@ TABLE: Mapping[State, frozenset[Kind]] = {
     }),
     S.HELD: frozenset({
         K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.OBEYS, K.SESSION_ENDS, K.ALIKE, K.DONE,
+        K.BY_PERSON,
     }),
     S.QUALIFYING: frozenset({K.AT_WORK, K.AT_REST, K.RESTING, K.SETTLED, K.READY, K.OBEYS, K.PASSING}),
     S.PRECHARGE_PULSE: frozenset({K.ENERGISED, K.PRECHARGING, K.AT_WORK, K.READY, K.OBEYS, K.MAY_RUN}),
@@ -52,8 +54,8 @@ TABLE: Mapping[State, frozenset[Kind]] = {
     }),
     S.SUSPENDED: frozenset({K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS}),
     S.STOPPING: frozenset({K.UNVERIFIED, K.MAY_RUN, K.PASSING}),
-    S.TRIPPED: frozenset({K.AT_REST, K.SETTLED, K.QUIET, K.SESSION_ENDS}),
-    S.UNCONTROLLABLE: frozenset({K.UNVERIFIED, K.MAY_RUN}),
+    S.TRIPPED: frozenset({K.AT_REST, K.SETTLED, K.QUIET, K.SESSION_ENDS, K.BY_PERSON}),
+    S.UNCONTROLLABLE: frozenset({K.UNVERIFIED, K.MAY_RUN, K.BY_PERSON}),
 }  # fmt: skip
 
 
@@ -71,5 +73,6 @@ UNVERIFIED, UNSEEN = _of(K.UNVERIFIED), _of(K.UNSEEN)
 AT_REST, RESTING, SETTLED, QUIET = _of(K.AT_REST), _of(K.RESTING), _of(K.SETTLED), _of(K.QUIET)
 STARTABLE, READY, OBEYS, MAY_RUN = _of(K.STARTABLE), _of(K.READY), _of(K.OBEYS), _of(K.MAY_RUN)
 SESSION_ENDS, ALIKE, DONE, PASSING = _of(K.SESSION_ENDS), _of(K.ALIKE), _of(K.DONE), _of(K.PASSING)
+BY_PERSON = _of(K.BY_PERSON)
 #: States that need standby first; everything else is considered only after that.
 UNPROVED = UNVERIFIED | {State.OFFLINE}

@@ -84,13 +84,16 @@ def _cause(id_: str, **params: object) -> dict[str, object]:
 
 def _owners(path: Path) -> list[str]:
     """Who may use the socket: its owner, or that of the closed directory which hides it, and root."""
-    for place in (path, *path.parents):
-        try:
-            uid = place.stat().st_uid
-        except OSError:
-            continue
-        try:
-            return list(dict.fromkeys((pwd.getpwuid(uid).pw_name, "root")))
-        except KeyError:
-            return [f"uid {uid}", "root"]
-    return ["root"]
+    uid = next(place for place in (path, *path.parents) if _there(place)).stat().st_uid
+    try:
+        return list(dict.fromkeys((pwd.getpwuid(uid).pw_name, "root")))
+    except KeyError:
+        return [f"uid {uid}", "root"]
+
+
+def _there(path: Path) -> bool:
+    try:
+        path.stat()
+    except OSError:  # not there, or in a closed directory
+        return False
+    return True

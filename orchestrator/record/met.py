@@ -4,15 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from orchestrator.core.states import AT_REST
-from orchestrator.model import State
+from orchestrator.core.states import AT_REST, ENERGISED, MAY_RUN
 from orchestrator.record.look import Look
 from orchestrator.record.stamp import figure
 
 #: The fault table is not longer; a file may be.
 MOST = 200
 #: A stop has been sent, and standby is not verified yet.
-STOPPING = frozenset({State.STOPPING, State.UNCONTROLLABLE})
+STOPPING = MAY_RUN - ENERGISED
 
 
 @dataclass(frozen=True, slots=True)

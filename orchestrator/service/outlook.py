@@ -7,6 +7,7 @@ from orchestrator.core.finish import goes_full, target
 from orchestrator.core.limits import bounds, limit, lowest
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import BY_PERSON
 from orchestrator.model import Cause, Decision, Effect, Snapshot, State
 from orchestrator.model.cause import SEVERAL
 from orchestrator.service.forecast import bmu_minutes, own_minutes
@@ -28,8 +29,6 @@ NEXT = {
     State.TRIPPED: "next_reset",
     State.UNCONTROLLABLE: "next_mains",
 }
-#: The states that only a person ends.
-BY_PERSON = frozenset({State.HELD, State.TRIPPED, State.UNCONTROLLABLE})
 #: What says of a bay in another state that a person must start it.
 TO_GO_ON = "to_go_on"
 

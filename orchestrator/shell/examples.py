@@ -19,6 +19,12 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ("history bay-2 --since 7d", "what happened at this bay last week"),
         ("history --station --limit 5", "the last beginnings, ends and failures of the station itself"),
     ),
+    "sessions": (
+        ("sessions --since 7d", "the charges of a week"),
+        ("sessions show 4QZ7", "one of them: the end of its id will do"),
+        ("sessions --bay bay-2 --limit 10 --csv", "the last ten of a bay, for a spreadsheet"),
+    ),
+    "identify": (("identify bay-1 --battery B-0042", "what is written on the battery that was just connected"),),
     "start": (
         ("start bay-1", "let it charge after a stop, a pause or a reset"),
         ("start --all", "every bay that nobody else has stopped"),

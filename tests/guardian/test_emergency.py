@@ -286,7 +286,7 @@ def test_both_witnesses_have_to_agree(
         service.start()
         assert service.told.wait(5.0)
         wait_until(lambda: len(asked) >= 2)
-        assert asked[0] == {"verb": "stop", "bays": None}
+        assert asked[0] == {"verb": "stop", "bays": None, "means": "estop"}
         wait_until(lambda: service._seen[1])
         seen = service.sees(port, 1.0)
         assert (seen[1] if seen else None) == why
@@ -452,7 +452,7 @@ def test_a_file_that_has_lost_every_port_leads_to_the_service(tmp_path: Path, by
             done = estop(str(file), by, path, cwd=tmp_path)
         else:
             done = estop(str(file), cwd=tmp_path, ORCHESTRATOR_SOCKET=path)
-        assert {"verb": "stop", "bays": None} in asked
+        assert {"verb": "stop", "bays": None, "means": "estop"} in asked
         assert (done.returncode, done.stdout) == (1, "")
         assert "the service holds bay-1 until an operator starts it\n" in done.stderr
         assert f"{file} is damaged: " in done.stderr

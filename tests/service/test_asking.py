@@ -1,13 +1,13 @@
 """The client side of the control socket: an answer, a refusal, or the reason for neither."""
 
 import os
+import pwd
 import socket
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from pwd import getpwuid
 from threading import Event, Thread
 
 import pytest
@@ -134,10 +134,14 @@ def test_who_is_hung_up_on_asks_again_if_that_does_no_harm(tmp_path: Path, verb:
         waiting.join()
 
 
+@pytest.mark.parametrize("named", [True, False])
 @pytest.mark.parametrize("seen", [True, False])
-def test_who_may_not_ask_is_told_who_may(*, seen: bool) -> None:
-    """By name, even where the folder does not let us look at the socket itself."""
-    who = " and ".join(dict.fromkeys((getpwuid(os.geteuid()).pw_name, "root")))
+def test_who_may_not_ask_is_told_who_may(monkeypatch: pytest.MonkeyPatch, *, seen: bool, named: bool) -> None:
+    """By name if the machine has one, even where the folder does not let us look at the socket itself."""
+    who = " and ".join(dict.fromkeys((pwd.getpwuid(os.geteuid()).pw_name, "root")))
+    if not named:
+        monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)
+        who = f"uid {os.geteuid()} and root"
     open_folder, closed_folder = (0o711, 0o700) if os.geteuid() == 0 else (0o700, 0)
     with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
         path = Path(folder, "control.sock")

@@ -12,10 +12,11 @@ from orchestrator.config.load import load_policy
 from orchestrator.config.station import BayConfig
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
+from orchestrator.core.states import BY_PERSON
 from orchestrator.model import BatteryStatus, Decision, Request, Snapshot, State
 from orchestrator.page import painted
 from orchestrator.service.bay_page import bay_blocks
-from orchestrator.service.outlook import BY_PERSON, NEXT, outlook
+from orchestrator.service.outlook import NEXT, outlook
 from orchestrator.service.status import bay_status
 from orchestrator.service.wallclock import WallClock
 from tests.core import bays
