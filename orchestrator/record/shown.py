@@ -11,7 +11,7 @@ from orchestrator.record.table import began, ended, lasted, length_s, sentence, 
 from orchestrator.text.catalogue import say
 
 #: How it is said where a battery's id is from.
-SOURCES = {"assumed": "battery_assumed"}
+SOURCES = {"assumed": "battery_assumed", "typed": "battery_typed", "serial_number": "battery_serial_number"}
 #: A pause that lasts.
 DASH = "…"
 
@@ -35,7 +35,7 @@ def _head(charge: Record, language: str) -> Iterator[Cause]:
     yield Cause.of("charge_took", **charge["charger"], bmu_ah=charge["bmu"]["ah"], bmu_wh=charge["bmu"]["wh"])
     yield Cause.of("charge_policy", policy=policy["name"], sha256=policy["sha256"], software=charge["software"])
     if by:
-        yield Cause.of("charge_by", by=by)
+        yield Cause.of("charge_by", by=sentence(by, language))
     if charge.get("stop_verified_ms") is not None:
         yield Cause.of("charge_stop", took_ms=charge["stop_verified_ms"])
 

@@ -183,7 +183,7 @@ class BayRunner:
         self.identified.follow(now_s, snapshot, self._memory)
         self._keep(self._memory, now_s)
         if self._record is not None:
-            self._record.take(clock, snapshot, decision, self.policy.rules.bay)
+            self._record.take(clock, snapshot, decision, self.policy.rules.bay, self.identified.identity)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """Everything known about the bay now."""

@@ -7,7 +7,8 @@ from time import localtime
 
 from orchestrator import __version__
 from orchestrator.config.station import BayConfig
-from orchestrator.model import Decision, Session, Snapshot
+from orchestrator.model import Decision, Request, Session, Snapshot
+from orchestrator.model.identity import Identity, Source
 from orchestrator.record import charge as charges
 from orchestrator.record import lines
 from orchestrator.record.charge import Charge
@@ -32,12 +33,15 @@ class BayRecord:
         self._curve = Curve()
         self._over: Charge | None = None  # ended in the record, and still open in the core
         self._pending: list[Charge] | None = None  # left open by earlier runs; None: not known yet
-        self._early: deque[tuple[Look, BayConfig]] = deque(maxlen=MOST_EARLY)
+        self._by: Mapping[str, object] | None = None  # who has asked for the next charge, if anybody
+        self._early: deque[tuple[Look, BayConfig, Identity]] = deque(maxlen=MOST_EARLY)
 
-    def take(self, clock: WallClock, snapshot: Snapshot, decision: Decision, bay: BayConfig) -> None:
-        """One more decision, under this policy. Nothing that fails here may reach the charger."""
+    def take(
+        self, clock: WallClock, snapshot: Snapshot, decision: Decision, bay: BayConfig, identity: Identity
+    ) -> None:
+        """One more decision, under this policy, of this battery. Nothing that fails here may reach the charger."""
         try:
-            self._early.append((self._look(clock, snapshot, decision), bay))
+            self._early.append((self._look(clock, snapshot, decision), bay, identity))
             while self._early and self._recorder.loaded:
                 self._take(*self._early.popleft())
         except Exception as error:  # noqa: BLE001 - whatever it is, the bay goes on
@@ -53,8 +57,10 @@ class BayRecord:
         offset_min = localtime(clock.wall_s).tm_gmtoff // 60
         return Look(Stamp(clock.wall_s, offset_min, clock.now_s, self._recorder.boot), snapshot, decision, clock.told)
 
-    def _take(self, look: Look, bay: BayConfig) -> None:
-        session = look.session
+    def _take(self, look: Look, bay: BayConfig, identity: Identity) -> None:
+        session, asked = look.session, look.snapshot
+        if self._charge is None and asked.request is Request.START and asked.asked_by and look.decision.answer is None:
+            self._by = look.plainly(asked.asked_by)
         if self._pending is None:
             self._pending = self._recorder.opened(self._place.bay, self._place.port)
             self._over = self._recorder.last(self._place.bay)
@@ -62,12 +68,12 @@ class BayRecord:
             return
         charge = self._charge
         if charge is not None and session is not None and session.started_s == charge.started_s:
-            self._keep(charges.follow(charge, look), look)
+            self._keep(charges.follow(_of(charge, identity), look), look)
             return
         if charge is not None:
             self._put(charges.unseen(charge), charge.last)
         if session is not None:
-            self._begin(look, session, bay)
+            self._begin(look, session, bay, identity)
 
     def _go_on(self, pending: Sequence[Charge], look: Look, session: Session | None) -> bool:
         """Go on with the charge left open that the core goes on with; the others have ended unseen. False: not yet."""
@@ -83,7 +89,7 @@ class BayRecord:
             return False
         return True
 
-    def _begin(self, look: Look, session: Session, bay: BayConfig) -> None:
+    def _begin(self, look: Look, session: Session, bay: BayConfig, identity: Identity) -> None:
         over, counted = self._over, None
         if over is not None and charges.is_same(over, session, look.stamp):
             self._over = over if session.result is None else None
@@ -91,7 +97,7 @@ class BayRecord:
                 return  # its end did not reach the core's memory: it is ended once more
             counted = over.amounts.counted.at_most(session)
         self._over, self._curve = None, Curve()
-        head = self._head(bay)
+        head, self._by = self._head(bay, identity), None
         id_ = self._recorder.new_id(look.stamp.unix_s)
         charge = charges.begun(id_, head, look, session, counted)
         self._recorder.put(lines.begin(charge))
@@ -111,17 +117,28 @@ class BayRecord:
         self._recorder.put(lines.end(charge) if ended else lines.checkpoint(charge))
         self._charge = None if ended else charges.wrote(charge, now)
 
-    def _head(self, bay: BayConfig) -> Mapping[str, object]:
+    def _head(self, bay: BayConfig, identity: Identity) -> Mapping[str, object]:
         """What does not change of a charge that begins now."""
-        battery, policy = bay.battery, bay.policy
-        node = f"0x{battery.node_id:02X}"
+        policy = bay.policy
         return {
             "station": self._station,
             "bay": self._place.bay,
             "port": self._place.port,
-            "battery": {"id": f"{battery.can}/{node}", "source": "assumed", "can": battery.can, "node": node},
+            "battery": _fields(identity),
             "policy": {"name": policy.policy, "sha256": policy.source.digest},
             "software": __version__,
-            "by": None,  # who asked for it, once requests say so
+            "by": self._by,
             "contactor_fitted": bay.contactor is not None,
         }  # fmt: skip
+
+
+def _of(charge: Charge, identity: Identity) -> Charge:
+    """The charge, of this battery: who tells or types which one it is may do so after the begin."""
+    if identity.source is Source.ASSUMED or charge.head["battery"] == _fields(identity):
+        return charge  # a battery that has just left is not known any more, and its charge ends with that
+    return replace(charge, head={**charge.head, "battery": _fields(identity)})
+
+
+def _fields(identity: Identity) -> Mapping[str, object]:
+    node = f"0x{identity.node_id:02X}"
+    return {"id": identity.id, "source": identity.source.value, "can": identity.can, "node": node}

@@ -8,6 +8,8 @@ import pytest
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Request, State
 from orchestrator.record.reading import charges_in
+from orchestrator.service.asked import Asked
+from orchestrator.service.asker import Asker
 from tests.record.kept import WALL_S, Kept
 
 
@@ -31,7 +33,7 @@ def test_a_charge_has_a_begin_and_an_end_with_all_of_it(kept: Kept) -> None:
     assert (begin["type"], begin["n"], end["type"], end["n"]) == ("begin", 0, "end", 1)
     assert begin["id"] == end["id"]
     assert end["bay"] == "bay-1"
-    assert end["battery"] == {"id": "can0/0x10", "source": "assumed", "can": "can0", "node": "0x10"}
+    assert end["battery"] == {"id": "can0:0x10", "source": "assumed", "can": "can0", "node": "0x10"}
     assert end["policy"]["name"] == "li-ion-48v"
     assert len(end["policy"]["sha256"]) == 12
     assert end["by"] is None
@@ -47,6 +49,27 @@ def test_a_charge_has_a_begin_and_an_end_with_all_of_it(kept: Kept) -> None:
     assert end["bmu"]["ah"] == pytest.approx(end["charger"]["ah"], rel=0.2)
     assert 0 < end["stop_verified_ms"] < 3000
     assert end["contactor_closed"] is None
+
+
+def test_who_asked_for_a_charge_and_which_battery_it_was_stand_with_it(kept: Kept) -> None:
+    kept.bench.charging()
+    kept.bench.ask(Request.STOP)
+    kept.bench.until(State.HELD)
+    kept.bench.bay.ask(Asked(Request.START, Asker(behind="kim", uid=0, because="night shift", unix_s=WALL_S)))
+    kept.bench.charging()
+    kept.bench.bay.identified.name("B-0042")
+    kept.bench.step()
+    kept.bench.ask(Request.STOP)
+    kept.bench.until(State.HELD)
+    kept.bench.ask(Request.START)
+    kept.bench.charging()
+    _, first, second, second_end, third = kept.records()
+    assert first["by"] is None
+    assert second["by"] == second_end["by"]
+    assert (second["by"]["id"], second["by"]["params"]["because"]) == ("started_by", "night shift")
+    assert (second["battery"]["source"], second_end["battery"]["source"]) == ("assumed", "typed")
+    assert second_end["battery"]["id"] == third["battery"]["id"] == "B-0042"
+    assert third["by"] is None
 
 
 def test_a_pause_is_part_of_the_charge_with_its_reason(kept: Kept) -> None:

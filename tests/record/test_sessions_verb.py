@@ -77,8 +77,8 @@ def test_bay_battery_time_and_number_choose(journal: Path, capsys: pytest.Captur
     assert count("--limit", "2") == 2
     assert count("--bay", "bay-*") == 3
     assert count("--bay", "bay-2") == 0
-    assert count("--battery", "can0/0x10") == 3
-    assert count("--battery", "can0/0x11") == 0
+    assert count("--battery", "can0:0x10") == 3
+    assert count("--battery", "can0:0x11") == 0
     assert count("--since", "2026-11-28T00:00Z") == 3
     assert count("--since", "2126-11-28") == 0
 
@@ -97,7 +97,7 @@ def test_one_charge_is_shown_by_the_end_of_its_id(journal: Path, capsys: pytest.
     _, stopped, _ = json.loads(said(capsys, "--json", "--journal", str(journal)))
     page = said(capsys, "show", stopped["id"][-6:].lower(), "--journal", str(journal))
     assert f"charge {stopped['id']}: bay-1, a station" in page
-    assert "battery can0/0x10, assumed from its node id" in page
+    assert "battery can0:0x10, assumed from its node id" in page
     assert "ended: stopped by the operator" in page
     assert "Pauses:" in page
     assert "paused by the operator" in page
