@@ -9,7 +9,7 @@ from orchestrator.service.journal import EVENTS_SHARE
 #: What one charging bay writes for a replay, compressed, by the number of bays on its CAN bus: up to that many, bytes a
 #: second. Several bays write less each: their records have much in common. Measured, with a margin, by
 #: `tests/proof/test_journal_size.py`, with volts that never stand still.
-SNAPSHOTS_B_S = ((2, 55.0), (128, 45.0))
+SNAPSHOTS_B_S = ((2, 50.0), (4, 38.0), (128, 30.0))
 ALONE_B_S = 80.0
 #: What its events add: some twenty kilobytes for a charge of two hours, written as text and again compressed.
 EVENTS_B_S = 3.0

@@ -32,10 +32,10 @@ def the_station(bays: int, max_mb: float, *, snapshots: bool = True, buses: int 
         ),
         (
             the_station(16, 1000.0),
-            "with 16 bays charging day and night, 1000 MB hold about 14 days to replay; about 66",
+            "with 16 bays charging day and night, 1000 MB hold about 22 days to replay; about 46",
         ),
-        (the_station(64, 500.0, buses=4), "500 MB hold about 43 hours to replay; about 265 MB are written a day"),
-        (the_station(16, 1000.0, buses=16), "1000 MB hold about 12 days to replay"),
+        (the_station(64, 500.0, buses=4), "500 MB hold about 65 hours to replay; about 182 MB are written a day"),
+        (the_station(16, 1000.0, buses=16), "1000 MB hold about 13 days to replay"),
         (
             the_station(2, 20.0, snapshots=False),
             "20 MB hold the events of about 4 days, and nothing to replay; about 1",
