@@ -53,4 +53,4 @@ def test_what_only_the_disk_shows_counts_as_well(capsys: pytest.CaptureFixture[s
 def test_a_station_without_errors_is_told_how_far_its_journal_reaches(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(STATIONS / "two-bays-rs485.yaml")]) == 0
     reach, _summary = capsys.readouterr().out.splitlines()
-    assert ": journal: with 2 bays charging day and night, 256 MB hold about 24 days to replay" in reach
+    assert ": journal: with 2 bays charging day and night, 256 MB hold about 27 days to replay" in reach
