@@ -94,6 +94,8 @@ class Time:
     def wait(self, until_s: float) -> None:
         """Let others run until then (`inf`: without a limit), or until woken."""
         me = self._running
+        if getcurrent() is not me.let:
+            raise OSError("a thread of the real machine, left over from another test: it has no turn here")
         if until_s < inf:
             self.wake(me, max(until_s, self.now_s))
         following = self._next()
