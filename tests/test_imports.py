@@ -43,7 +43,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "sim": ("model", "protocol.objects"),
     # It checks and tries the core itself, on the models of the emulators, without any line in between.
     "workbench": (
-        "columns", "config", "core", "errors", "extras", "keys", "model", "protocol.objects",
+        "columns", "config", "core", "errors", "extras", "keys", "model", "protocol.objects", "record.utc",
         "service.journal_files", "service.parts", "service.records", "service.rows", "service.timespan", "sim.charger",
         "sim.chemistry", "sim.pack", "text",
     ),

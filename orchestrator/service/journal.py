@@ -18,9 +18,10 @@ from typing import TypeVar
 
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain
+from orchestrator.record.utc import utc
 from orchestrator.service.disk import code_of
 from orchestrator.service.packed import PackedFile
-from orchestrator.service.records import Line, rfc3339
+from orchestrator.service.records import Line
 from orchestrator.service.rotating import RotatingFile
 from orchestrator.text.catalogue import say
 
@@ -213,7 +214,7 @@ def _drained(waiting: "deque[T]") -> Iterator[T]:
 
 def _line(entry: Entry) -> bytes:
     t_s, wall_s, bay, (kind, fields) = entry
-    head = {"t": t_s, "wall": rfc3339(wall_s), "bay": bay, "kind": kind}
+    head = {"t": t_s, "wall": utc(wall_s), "bay": bay, "kind": kind}
     said = fields() if callable(fields) else fields
     text = json.dumps({**head, **said}, ensure_ascii=False, separators=(",", ":")) + "\n"
     return text.encode(errors="backslashreplace")  # file names need not be valid text; the result is still JSON

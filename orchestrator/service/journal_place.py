@@ -11,7 +11,7 @@ from orchestrator.lastresort.asking import ask
 from orchestrator.model import Cause
 from orchestrator.service.journal_files import files_of
 from orchestrator.service.parts import stream_of
-from orchestrator.service.where import HERE, find_socket
+from orchestrator.service.where import HERE, find_socket, may_be_there
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
 
@@ -35,7 +35,7 @@ def journal_place(named: str | None, socket: str | None, here: Path = HERE, inst
     try:
         return _told(find_socket(None))
     except OrchestratorError:
-        if _is_there(installed):
+        if may_be_there(installed):
             return installed
     cause = Cause.of("journal_unfound", file=str(here), directory=str(installed))
     raise UsageError(say(cause, own_language()))
@@ -58,14 +58,6 @@ def _written(station: Path) -> str:
         return wiring(station).journal
     except OSError:
         return ""
-
-
-def _is_there(path: Path) -> bool:
-    """Whether it exists; one that we may not look for counts: reading reports who may."""
-    try:
-        return path.exists()
-    except PermissionError:
-        return True
 
 
 def event_files(directory: Path) -> list[Path]:

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, fields
-from datetime import UTC, datetime
 from functools import partial
 
 from orchestrator.config.station import BayConfig
@@ -37,16 +36,6 @@ WHOLE_S = 600.0
 GATHER_S = 5.0
 #: … and so many of them.
 MAX_ROWS = 250
-
-
-def rfc3339(wall_s: float) -> str:
-    """A wall-clock time in UTC, for people and programs."""
-    return datetime.fromtimestamp(wall_s, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-
-
-def unix_s(wall: str) -> float:
-    """The inverse of `rfc3339`; a time without a zone is local. ValueError for anything else."""
-    return datetime.fromisoformat(wall).timestamp()
 
 
 def decision_lines(

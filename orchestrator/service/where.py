@@ -22,7 +22,7 @@ def find_socket(named: str | None, here: Path = HERE, installed: Path = INSTALLE
         return Path(name)
     if written := _written(here):
         return Path(written)
-    if _may_be_there(installed):
+    if may_be_there(installed):
         return installed
     raise NoSocketError(Cause.of("service_not_found", station=os.path.abspath(here), installed=str(installed)))  # noqa: PTH100 - for people
 
@@ -43,7 +43,7 @@ def _written(station: Path) -> str:
         return ""
 
 
-def _may_be_there(path: Path) -> bool:
+def may_be_there(path: Path) -> bool:
     """Whether it exists; one in a directory that we may not look into counts: connecting reports who may."""
     try:
         return path.exists()

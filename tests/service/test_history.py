@@ -14,13 +14,13 @@ from orchestrator.columns import width_of
 from orchestrator.errors import NoServiceError, UsageError
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain
+from orchestrator.record.utc import utc
 from orchestrator.service import history as reading
 from orchestrator.service.history import Happened, Story
 from orchestrator.service.history_page import HistoryPage, as_json
 from orchestrator.service.history_verb import ON_PAGE, last_events
 from orchestrator.service.journal import Journal
 from orchestrator.service.journal_place import event_files, journal_place
-from orchestrator.service.records import rfc3339
 from orchestrator.text.catalogue import say
 from tests.whole.station import orchestrator
 
@@ -30,7 +30,7 @@ HOT_TEXT = "the pack has 45.2 °C, the limit is 45 °C (p.yaml:3); it charges ag
 
 
 def record(kind: str, bay: str = "bay-1", t_s: float = 100.0, **more: Any) -> dict[str, Any]:
-    return {"t": t_s, "wall": rfc3339(NOW_S + t_s), "bay": bay, "kind": kind, **more}
+    return {"t": t_s, "wall": utc(NOW_S + t_s), "bay": bay, "kind": kind, **more}
 
 
 def goes(before: str | None, to: str, cause: Cause, **more: Any) -> dict[str, Any]:
@@ -227,7 +227,7 @@ def test_bays_by_pattern_and_by_time(journal: Path) -> None:
 def test_for_programs_there_is_an_object_on_each_line(journal: Path) -> None:
     one = json.loads(shown(journal, "bay-20", "--json")[0])
     assert one == {
-        "wall": rfc3339(NOW_S + 9.5), "bay": "bay-20", "kind": "transition", "id": "over_temperature",
+        "wall": utc(NOW_S + 9.5), "bay": "bay-20", "kind": "transition", "id": "over_temperature",
         "text": f"A → HELD: {HOT_TEXT}", "level": "", "by": "",
     }  # fmt: skip
 

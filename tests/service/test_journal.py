@@ -18,13 +18,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestrator.record.utc import utc
 from orchestrator.service import journal as journal_module
 from orchestrator.service import rotating
 from orchestrator.service.journal import BACKLOG, STALL_S, VERSION, Journal
 from orchestrator.service.journal_files import files_of, lines_of
 from orchestrator.service.packed import PackedFile
 from orchestrator.service.parts import MIN_PART, PARTS, order, size_of
-from orchestrator.service.records import rfc3339
 from orchestrator.service.rotating import RotatingFile
 from tests.core.said import say
 from tests.waiting import wait_until
@@ -449,5 +449,5 @@ def test_a_gap_is_a_line_of_its_own_before_what_has_lost_its_base(tmp_path: Path
 
 
 def test_times_are_utc_to_the_millisecond() -> None:
-    assert rfc3339(0.0) == "1970-01-01T00:00:00.000Z"
-    assert rfc3339(1_795_395_996.25) == "2026-11-23T01:06:36.250Z"
+    assert utc(0.0) == "1970-01-01T00:00:00.000Z"
+    assert utc(1_795_395_996.25) == "2026-11-23T01:06:36.250Z"

@@ -15,6 +15,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.errors import Finding
 from orchestrator.model import Snapshot
+from orchestrator.record.utc import unix_s, utc
 from orchestrator.service.journal_files import (
     STREAMS,
     Fields,
@@ -26,7 +27,7 @@ from orchestrator.service.journal_files import (
     unreadable,
 )
 from orchestrator.service.parts import stream_of
-from orchestrator.service.records import WHOLE_S, rfc3339, unix_s
+from orchestrator.service.records import WHOLE_S
 from orchestrator.workbench.replay.converting import SENTENCES, UNREADABLE, OlderError, snapshot_of, whole
 from orchestrator.workbench.replay.events import Event, Events, run_of
 from orchestrator.workbench.replay.rows import rows_of
@@ -69,7 +70,7 @@ class _Bay:
 
 
 def _earlier(since: str) -> str:
-    return rfc3339(max(unix_s(since) - WHOLE_S - SLACK_S, 0.0))
+    return utc(max(unix_s(since) - WHOLE_S - SLACK_S, 0.0))
 
 
 class Recording:
@@ -172,7 +173,7 @@ class Recording:
         bay.snapshot = rows[-1][1]
         gap, bay.gap = bay.gap, False
         return [
-            (Recorded(line["bay"], at_s, rfc3339(begin_s + at_s), snapshot, gap=gap and not number), at_s)
+            (Recorded(line["bay"], at_s, utc(begin_s + at_s), snapshot, gap=gap and not number), at_s)
             for number, (at_s, snapshot) in enumerate(rows)
         ]
 
