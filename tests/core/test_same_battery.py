@@ -212,7 +212,8 @@ def test_another_battery_has_not_been_charged_all_the_way_by_the_last_one() -> N
     assert world.memory.battery.full_s == pytest.approx(world.now_s - 5, abs=1)
 
 
-def test_a_battery_exchanged_in_mid_charge_ends_the_charge() -> None:
+def silent_in_mid_charge() -> World:
+    """A charge of battery 4711 whose BMU has been silent for 5 s and is about to speak again."""
     world = World().charging()
     tells(world, 4711)
     world.run(1)
@@ -220,6 +221,11 @@ def test_a_battery_exchanged_in_mid_charge_ends_the_charge() -> None:
     world.battery_answers = False
     world.run(5)
     world.battery_answers = True
+    return world
+
+
+def test_a_battery_exchanged_in_mid_charge_ends_the_charge() -> None:
+    world = silent_in_mid_charge()
     world.run(1)
     assert world.memory.session is not None
     tells(world, 4712)
@@ -235,13 +241,7 @@ def test_a_battery_exchanged_in_mid_charge_ends_the_charge() -> None:
 
 
 def test_the_same_battery_goes_on_with_its_charge() -> None:
-    world = World().charging()
-    tells(world, 4711)
-    world.run(1)
-    tells(world, None)
-    world.battery_answers = False
-    world.run(5)
-    world.battery_answers = True
+    world = silent_in_mid_charge()
     tells(world, 4711)
     world.run(5)
     assert "battery_exchanged" not in world.raised
