@@ -54,7 +54,9 @@ class BayRunner:
         self.last_s, self.due_s = 0.0, -inf  #: when the last decision was made, and when the next is due at the latest
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
-        self._store, self._say, self._answers = store, say, Answers(store, lambda: self.ask(Asked(Request.STOP)))
+        self._store, self._say = store, say
+        # A start that could not be persisted is withdrawn: the bay is held, as after a stop.
+        self._answers = Answers(store, lambda: self.ask(Asked(Request.STOP)))
         self.identified = Identified(bay, store, journal, say, language)
         self._memory: Memory | None = None  # None before the first decision: the persisted state is still being read
         self._revision = 0  # the revision that persists this bay's memory
