@@ -196,7 +196,6 @@ class Gateway:
             asking.ask: self._ask,
             port_owner.services: lambda ports: (self._holder(ports), []),
             running_service._listens: lambda _: self.door is not None,
-            running_service._listens: lambda _: self.door is not None,
             boot.boot_id: lambda: f"boot {self.boots}",
             can_module._open_bus: lambda _: Driver(self.bus, self.time),
             gpio.OutputLine: SimpleNamespace(open=partial(VirtualLine.open, self.kernel)),

@@ -3,8 +3,10 @@
 import fcntl
 import os
 import termios
+from collections.abc import Callable
 from math import inf
 from random import Random
+from threading import Thread
 from typing import Any
 
 import pytest
@@ -92,6 +94,26 @@ def test_only_the_thread_that_calls_waits(kernel: Kernel) -> None:
     kernel.time.wait(1010.0)
     kernel.time.close()
     assert told == [("alive", 1.0), ("open", 5.0)]
+
+
+def test_a_thread_of_the_real_machine_changes_nothing(kernel: Kernel) -> None:
+    """One that another test left behind would start or end what it must not."""
+    said: list[str] = []
+
+    def left_over(call: Callable[[], object]) -> None:
+        try:
+            call()
+        except OSError as error:
+            said.append(str(error))
+
+    for call in (kernel.time.me, lambda: kernel.time.wait(inf), lambda: kernel.time.start(lambda: None)):
+        thread = Thread(target=left_over, args=(call,))
+        thread.start()
+        thread.join(5.0)
+    assert said == ["a thread of the real machine, left over from another test: it has no turn here"] * 3
+    started_s = kernel.time.now_s
+    kernel.time.wait(started_s + 5.0)
+    assert kernel.time.now_s == pytest.approx(started_s + 5.0, abs=0.01)
 
 
 def test_who_is_killed_in_a_call_keeps_its_locks_until_the_call_is_over(kernel: Kernel) -> None:

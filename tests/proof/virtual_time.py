@@ -84,7 +84,9 @@ class Time:
         return self.call_at(self.now_s, callback, *args)
 
     def me(self) -> Runner:
-        """Whose turn it is."""
+        """Whose turn it is: the caller."""
+        if getcurrent() is not self._running.let:
+            raise OSError("a thread of the real machine, left over from another test: it has no turn here")
         return self._running
 
     def wake(self, runner: Runner, at_s: float | None = None) -> None:
@@ -93,9 +95,7 @@ class Time:
 
     def wait(self, until_s: float) -> None:
         """Let others run until then (`inf`: without a limit), or until woken."""
-        me = self._running
-        if getcurrent() is not me.let:
-            raise OSError("a thread of the real machine, left over from another test: it has no turn here")
+        me = self.me()
         if until_s < inf:
             self.wake(me, max(until_s, self.now_s))
         following = self._next()
@@ -107,7 +107,7 @@ class Time:
 
     def start(self, target: Callable[[], object], process: Any = None) -> Runner:
         """A new thread, in its starter's process unless another is given."""
-        runner = Runner(greenlet(parent=self._main.let), process or self._running.process)
+        runner = Runner(greenlet(parent=self._main.let), process or self.me().process)
         runner.let.run = partial(self._live, runner, target)
         self._runners.append(runner)
         self.wake(runner)
