@@ -144,9 +144,10 @@ def pytest_configure(config: pytest.Config) -> None:
             known.cache_clear()
             known()
         return
-    if os.environ[TESTS] == ALL:
-        return
     ago, reach, seconds = _ago(), _reach(), _seconds()
+    if os.environ[TESTS] == ALL:  # it has lived through the quick ones
+        config.args[:] = [name for name in config.args if seconds.get(name, inf) > QUICK_S] or config.args
+        return
     recent = sorted((name for name in config.args if name in ago), key=ago.__getitem__)[:RECENT]
     quick = [name for name in config.args if seconds.get(name, 0.0) <= QUICK_S] or config.args
     if os.environ[TESTS] == QUICK:

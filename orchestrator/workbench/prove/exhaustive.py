@@ -1,8 +1,9 @@
 """Explores every situation that a bay can reach, on all cores: every property must hold, and every charge must end."""
 
 import gc
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -60,14 +61,24 @@ def walk_of(rules: Rules) -> Walk:
 def here(walk: Walk) -> Each:
     """An `Each` that runs in this process, with this walk."""
 
-    def each(function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
-        return (function(walk, *job) for job in jobs)
+    def each(function: Callable[..., T], jobs: deque[Any]) -> Iterator[T]:
+        while jobs:
+            yield function(walk, *jobs.popleft())
 
     return each
 
 
-def _on(pool: Executor, function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
-    return pool.map(partial(_with_the_walk, function), jobs)
+def _on(pool: Executor, function: Callable[..., T], jobs: deque[Any]) -> Iterator[T]:
+    """No process waits for the others while there are jobs."""
+    under_way: deque[Future[T]] = deque()
+    try:
+        while jobs or under_way:
+            while jobs:
+                under_way.append(pool.submit(_with_the_walk, function, jobs.popleft()))
+            yield under_way.popleft().result()
+    finally:  # whoever has found what it looked for does not wait for the rest
+        for future in under_way:
+            future.cancel()
 
 
 _walk: Walk | None = None  # one per process, so that it reports nothing twice

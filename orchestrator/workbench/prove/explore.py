@@ -5,6 +5,7 @@ each gist represents the others. So every finding is real, with the shortest sto
 found is absent up to these cuts. Properties are data (`properties.py`); nothing here knows their meaning.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
@@ -130,8 +131,8 @@ class Walk:
 class Each(Protocol):
     """Applies a function to many jobs, in order: here, or in several processes."""
 
-    def __call__(self, function: Callable[..., T], jobs: Iterable[tuple[Any, ...]]) -> Iterator[T]:
-        """`function(walk, *job)` for each job."""
+    def __call__(self, function: Callable[..., T], jobs: deque[Any]) -> Iterator[T]:
+        """`function(walk, *job)` for each job, also for those that are added while results are taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,16 +166,16 @@ class Explorer:
     def run(self, until: str = "", most: int = 1_000_000) -> None:
         """Explore everything reachable, or until the property `until` is violated, or up to `most` nodes."""
         first = Node(Place(Memory(), BEGIN_S))
-        level, seen = [first], {self.walk.gist(first.place.memory)}
+        seen: set[object] = {self.walk.gist(first.place.memory)}
         self.nodes = [first]
-        while level:
-            jobs = [(node.place, self._first_of_its_outline(node)) for node in level]
-            following: list[Node] = []
-            for node, expanded in zip(level, self.each(_expand, jobs), strict=True):
-                following += self._learn(node, expanded, seen)
-                if until in self.found or len(self.nodes) >= most:
-                    return
-            level = following
+        jobs = deque([self._job(first)])
+        for number, expanded in enumerate(self.each(_expand, jobs)):
+            jobs += map(self._job, self._learn(self.nodes[number], expanded, seen))
+            if until in self.found or len(self.nodes) >= most:
+                return
+
+    def _job(self, node: Node) -> tuple[Place, bool]:
+        return node.place, self._first_of_its_outline(node)
 
     def _first_of_its_outline(self, node: Node) -> bool:
         """Pairs are tried only once per outline, because there are so many."""

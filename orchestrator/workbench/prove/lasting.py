@@ -4,6 +4,7 @@ Each memory is left alone, with small steps of time after every change of state 
 there is none. To change for ever without news from outside is a livelock.
 """
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from math import inf
 
@@ -29,7 +30,7 @@ def reaches(explorer: Explorer, endings: Sequence[Ending] = ENDINGS) -> None:
     """Hold every ending against every node, and every property on the way; the first node that breaks one is kept."""
     batteries = {battery for _, battery in explorer.walk.inputs.constants()}
     places = [node.place for node in explorer.nodes]
-    jobs = [(ENDINGS.index(ending), places) for ending in endings if ending.battery in batteries]
+    jobs = deque((ENDINGS.index(ending), places) for ending in endings if ending.battery in batteries)
     _keep(explorer, explorer.nodes, explorer.each(_missed, jobs), f"of {len(jobs)} endings")
 
 
@@ -39,10 +40,10 @@ def settles(explorer: Explorer, some: Iterable[Node] | None = None) -> None:
     places = [node.place for node in nodes]
     soon = [explorer.soon.get(explorer.walk.gist(place.memory), {}) for place in places]
     constants = list(explorer.walk.inputs.constants())
-    jobs = [
+    jobs = deque(
         ([(*one, [known.get(one) for known in soon]) for one in constants[at : at + TOGETHER]], places)
         for at in range(0, len(constants), TOGETHER)
-    ]
+    )
     _keep(explorer, nodes, explorer.each(_endless, jobs), f"of {len(jobs)} searches for livelocks")
 
 
