@@ -216,7 +216,7 @@ def returns_as_another(world: World) -> None:
 def waiting() -> World:
     """Qualified while another bay begins its charge."""
     world = World()
-    world.ours = {"waits": "bay-2 begins a charge"}
+    world.ours = {"waits": cause("bay-2 begins a charge")}
     world.until(S.QUALIFYING)
     world.run(60)
     return world

@@ -34,7 +34,7 @@ from orchestrator.model import (
 from orchestrator.sim.bay import SimulatedBay as Plant
 from orchestrator.sim.charger import Push, SimulatedCharger
 from orchestrator.sim.pack import Pack
-from tests.core.said import cause, reason_of
+from tests.core.said import cause, fits, reason_of
 from tests.core.world import bay
 
 TICK_S = 0.1
@@ -112,6 +112,7 @@ class Site:
         snapshot = Snapshot(self.reading, self.link, self.values, self.battery_link, request)
         before = self.decision
         self.decision, self.memory = decide(self.now_s, snapshot, self.memory, self.rules)
+        fits(self.decision)
         command = self.decision.command
         self.schedule.give(command)
         self.grant = grant(snapshot, self.now_s) if command else None

@@ -36,7 +36,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.protocol.objects import ObjectMap
-from tests.core.said import cause, say
+from tests.core.said import cause, fits, say
 
 STEPS_A = (2.0, 5.0, 8.0, 11.0, 14.0)
 #: A binary fraction, so that a limit can be hit exactly.
@@ -214,6 +214,7 @@ class World:
         snapshot = replace(self.snapshot(request, internal), asked_by=asked_by)
         decision, self.memory = decide(self.now_s, snapshot, self.memory, self.rules)
         self.decisions.append(decision)
+        fits(decision)
         return decision
 
     def forget(self, fault: str) -> None:

@@ -2,18 +2,19 @@
 
 mutmut makes and tries the mutants; pyproject.toml sets the modules and tests. The results go to docs/mutation.md, where
 people write the reasons for survivors. Arguments select mutants, such as `orchestrator.protocol.frame.*`; the default
-is new mutants and those of changed functions. Each is tried with a few likely tests; survivors without a reason are
-tried again with the quick ones of all that reach them, and then with all.
+is new mutants and those of changed functions. Each is tried with a few likely tests of those that run the changed
+statement; survivors without a reason are tried again with all of these.
 """
 
 import json
 import os
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from tests.mutation.mutants import ALL, FEW, QUICK, TESTS, Mutant
+from tests.mutation.mutants import ALL, FEW, TESTS, Mutant
 from tests.mutation.page import GOAL_PCT, Reasons, page, reasons, score
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -24,12 +25,12 @@ PAGE = ROOT / "docs" / "mutation.md"
 def main(patterns: Sequence[str]) -> int:
     """Try them and write the page; 1 if too many survive, one survives without a reason, or some were not tried."""
     known = reasons(PAGE.read_text(encoding="utf-8")) if PAGE.exists() else {}
+    _note_lines()
     os.environ[TESTS] = FEW
     _mutmut("run", "--max-children", "1", *patterns)
-    for tests in (QUICK, ALL):
-        if living := [mutant.name for mutant in _unexplained(_mutants(), known)]:
-            os.environ[TESTS] = tests
-            _mutmut("run", "--max-children", "1", *living)
+    if living := [mutant.name for mutant in _unexplained(_mutants(), known)]:
+        os.environ[TESTS] = ALL
+        _mutmut("run", "--max-children", "1", *living)
     mutants = list(_mutants())
     PAGE.write_text(page(mutants, known), encoding="utf-8")
     unexplained = _unexplained(mutants, known)
@@ -41,6 +42,14 @@ def main(patterns: Sequence[str]) -> int:
         f"{untried} not tried"
     )
     return int(score(mutants) < GOAL_PCT or bool(unexplained or untried))
+
+
+def _note_lines() -> None:
+    """Run the tests once without mutants, to see which lines each of them runs."""
+    chosen = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mutmut"]
+    options = [*chosen["pytest_add_cli_args"], *chosen["pytest_add_cli_args_test_selection"]]
+    MUTANTS.mkdir(exist_ok=True)
+    subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "tests.mutation.lines", *options], cwd=ROOT, check=True)
 
 
 def _unexplained(mutants: Iterable[Mutant], known: Reasons) -> list[Mutant]:

@@ -7,8 +7,8 @@ from typing import Self
 #: mutmut's exit codes: 1 and 3 are pytest's, the others mean that CPU time or time ran out.
 KILLED = (1, 3)
 TIMED_OUT = (-24, 24, 36, 152, 255)
-#: The tests of a trial, in mutmut's environment: the likeliest few, those that take little time, all.
-TESTS, FEW, QUICK, ALL = "MUTATION_TESTS", "few", "quick", "all"
+#: The tests of a trial, in mutmut's environment: of those that run the changed statement the likeliest few, or all.
+TESTS, FEW, ALL = "MUTATION_TESTS", "few", "all"
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 - Hypothesis does not shrink failing examples, the slowest part by far, and tries the same examples for
   each mutant.
 - The first failing test ends a mutant's trial. So the tests that ended recent trials come first, then the quick ones.
-  In a first trial only the likeliest few run, because to collect the thousands that reach most functions takes longer
-  than to run these. More run in separate trials, on the survivors: `TESTS` in the environment.
+  In a first trial only the likeliest few run, in a second one, on the survivors, all: `TESTS` in the environment.
+- Of the thousands that reach most functions only those run that run the changed statement (`lines.py`).
 - Test ids are plain ASCII. mutmut collects repeatedly in one process, pytest escapes other characters in ids
   again each time and then finds no such test, and mutmut counts that as a killed mutant.
 - A function with mutants runs directly during a trial, not through mutmut's trampoline, which looks up at each call
@@ -16,7 +16,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cache, update_wrapper
 from inspect import isgeneratorfunction
 from math import inf
@@ -29,7 +29,8 @@ import pytest
 from hypothesis import HealthCheck, Phase, settings
 from mutmut.mutation import trampoline
 
-from tests.mutation.mutants import ALL, QUICK, TESTS
+from tests.mutation.lines import tests_of
+from tests.mutation.mutants import FEW, TESTS
 
 settings.register_profile(
     "mutation",
@@ -144,17 +145,27 @@ def pytest_configure(config: pytest.Config) -> None:
             known.cache_clear()
             known()
         return
+    if running := _that_run(_on_trial()):
+        config.args[:] = [name for name in config.args if name in running] or config.args
+    if os.environ[TESTS] == FEW:
+        config.args[:] = _likeliest(config.args)
+
+
+def _likeliest(names: Sequence[str]) -> list[str]:
     ago, reach, seconds = _ago(), _reach(), _seconds()
-    if os.environ[TESTS] == ALL:  # it has lived through the quick ones
-        config.args[:] = [name for name in config.args if seconds.get(name, inf) > QUICK_S] or config.args
-        return
-    recent = sorted((name for name in config.args if name in ago), key=ago.__getitem__)[:RECENT]
-    quick = [name for name in config.args if seconds.get(name, 0.0) <= QUICK_S] or config.args
-    if os.environ[TESTS] == QUICK:
-        config.args[:] = quick
-        return
+    recent = sorted((name for name in names if name in ago), key=ago.__getitem__)[:RECENT]
+    quick = [name for name in names if seconds.get(name, 0.0) <= QUICK_S] or names
     closest = sorted(quick, key=lambda name: (reach.get(name, 0), seconds.get(name, 0.0)))[:CLOSEST]
-    config.args[:] = dict.fromkeys([*recent, *closest])
+    return list(dict.fromkeys([*recent, *closest]))
+
+
+def _that_run(mutant: str) -> Collection[str]:
+    """The tests that run its statement; empty if that is not known."""
+    module, _, name = mutant.rpartition(".")
+    for function, mutants in STANDING:
+        if function.__module__ == module and name in mutants:
+            return tests_of(function, mutants["_mutmut_orig"], mutants[name])
+    return ()
 
 
 def pytest_sessionstart() -> None:
