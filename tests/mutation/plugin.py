@@ -146,7 +146,10 @@ def pytest_configure(config: pytest.Config) -> None:
             known()
         return
     if running := _that_run(_on_trial()):
-        config.args[:] = [name for name in config.args if name in running] or config.args
+        elsewhere = {file for file, modules in ELSEWHERE.items() if _module(_on_trial()) in modules}
+        config.args[:] = [
+            name for name in config.args if name in running or name.partition("::")[0] in elsewhere
+        ] or config.args
     if os.environ[TESTS] == FEW:
         config.args[:] = _likeliest(config.args)
 
@@ -166,6 +169,10 @@ def _that_run(mutant: str) -> Collection[str]:
         if function.__module__ == module and name in mutants:
             return tests_of(function, mutants["_mutmut_orig"], mutants[name])
     return ()
+
+
+def _module(mutant: str) -> str:
+    return f"{mutant.rpartition('.')[0].replace('.', '/')}.py"
 
 
 def pytest_sessionstart() -> None:
