@@ -58,6 +58,7 @@ class Health:
     capacity: Estimate | None  #: Ah
     rated_ah: float | None  #: by the policy of the newest charge
     resistance: Resistance | None
+    usable: tuple[int, int]  #: charges of the last year that tell a capacity, and a resistance
     bmu_soh_pct: float | None
     balance: float | None  #: Ah by the BMU, as a share of those by the charger
     rest: Rest | None
@@ -100,7 +101,6 @@ def health(battery: str, records: Iterable[Record]) -> Health:
         for one, years in window
         if (stretch := one.measured.stretch) is not None and is_usable(stretch) and not _doubted(one.record)
     ]
-    stretches = stretches[-WINDOW:]
     steps = [Steps(found, years) for one, years in window if (found := resisting.usable(one.measured.steps))]
     return Health(
         METHOD,
@@ -108,11 +108,12 @@ def health(battery: str, records: Iterable[Record]) -> Health:
         min((str(one.record["battery"].get("source")) for one in charges), key=_rank, default=SOURCES[0]),
         len(charges),
         newest.end if newest is not None else None,
-        capacity(stretches),
+        capacity(stretches[-WINDOW:]),
         _known(newest.record["policy"].get("capacity_ah")) if newest is not None else None,
         resisting.resistance(steps[-WINDOW:]),
+        (len(stretches), len(steps)),
         next((soh for one in reversed(charges) if (soh := _value(one, "soh_pct", "end")) is not None), None),
-        balance([one.stretch for one in stretches]),
+        balance([one.stretch for one in stretches[-WINDOW:]]),
         next((rest for one in reversed(charges) if (rest := _rest(one)) is not None), None),
         sum(one.measured.high_s for one in charges),
         sum(one.measured.hot_s for one in charges),

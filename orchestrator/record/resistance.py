@@ -15,10 +15,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from orchestrator.record.capacity import LEAST, Estimate, around
+from orchestrator.record.capacity import Estimate, around
 from orchestrator.record.change import Change
 from orchestrator.record.fit import Row, fitted, within
 
+#: Fewer charges cannot tell a value, a steepness and a scatter.
+LEAST = 4
 #: Beyond these a resistance is another one: nearly empty, nearly full, frost, heat.
 SOC_PCT, PACK_C = (20.0, 90.0), (5.0, 45.0)
 #: 25 °C and absolute zero.

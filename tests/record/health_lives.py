@@ -1,6 +1,6 @@
 """Lives of batteries whose ageing is known, against the health that the record makes of their charges.
 
-    python -m tests.record.health_lives 1000
+    python -m tests.record.health_lives 1000        1000 2: the same with devices twice as far off as is assumed
 
 A life is a direct model of charges; what a BMU and a charger would report goes through the product's own fold into its
 own records, in the form in which the service writes them (`test_health.py` holds both against a charge of the bench).
@@ -59,7 +59,7 @@ class Ageing:
 class Life:
     """One battery, its BMU and its charger."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, worse: float = 1.0) -> None:
         dice = self.dice = Random(seed)
         self.years = dice.uniform(0.1, 5.0)
         self.rated_ah = dice.choice((10.0, 20.0, 20.0, 40.0))
@@ -72,10 +72,10 @@ class Life:
         self.activation_k = dice.uniform(1500.0, 3500.0)
         self.slow_share, self.slow_s = dice.uniform(0.1, 0.5), dice.uniform(30.0, 120.0)
         # the devices
-        self.charger_gain, self.bmu_gain = (1 + dice.gauss(0.0, 0.005) for _ in range(2))
+        self.charger_gain, self.bmu_gain = (1 + worse * dice.gauss(0.0, 0.005) for _ in range(2))
         self.charger_zero_a, self.bmu_zero_a = (dice.uniform(-0.02, 0.02) for _ in range(2))
-        self.volts_gain, self.off_k = 1 + dice.gauss(0.0, 0.0025), dice.gauss(0.0, 0.5)
-        self.soc_scale, self.drift_pct = dice.gauss(0.0, 0.005), dice.uniform(0.3, 1.5)
+        self.volts_gain, self.off_k = 1 + worse * dice.gauss(0.0, 0.0025), worse * dice.gauss(0.0, 0.5)
+        self.soc_scale, self.drift_pct = worse * dice.gauss(0.0, 0.005), dice.uniform(0.3, 1.5)
         self.cuts_off = dice.random() < 0.5
         self.stale_soh = dice.random() < 0.5  # a BMU that never learns
         # how it is used
@@ -259,20 +259,21 @@ class Verdict:
         return self.estimate.value / self.true - 1
 
 
-def live(seed: int) -> tuple[Life, Health, Verdict, Verdict]:
+def live(seed: int, most: int = MOST, worse: float = 1.0) -> tuple[Life, Health, Verdict, Verdict]:
     """One life: the health found, capacity and resistance against the truth."""
-    life = Life(seed)
+    life = Life(seed, worse)
+    life.count = min(life.count, most)
     found = health(BATTERY, life.charges())
     ohm = found.resistance.mohm if found.resistance is not None else None
     return life, found, Verdict(life.capacity_ah(life.years), found.capacity), Verdict(1000 * life.ohm(life.years), ohm)
 
 
-def main(count: int) -> int:
+def main(count: int, worse: float) -> int:
     """Report the coverage over this many lives; 1 if one is not 95 % ± 2."""
     verdicts: dict[str, list[Verdict]] = {"capacity": [], "resistance": []}
     warned = Counter[tuple[bool, bool]]()
     for seed in range(count):
-        life, found, *both = live(seed)
+        life, found, *both = live(seed, worse=worse)
         for name, verdict in zip(verdicts, both, strict=True):
             verdicts[name].append(verdict)
         if found.soh_pct is not None:
@@ -294,4 +295,5 @@ def main(count: int) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 100))
+    arguments = [float(one) for one in sys.argv[1:]]
+    sys.exit(main(int(arguments[0]) if arguments else 100, arguments[1] if len(arguments) > 1 else 1.0))
