@@ -4,9 +4,8 @@ Every change counts that is large and quick, whoever made it: a begin, an end, a
 are of one reading of the BMU, so the leads from the charger have no part in it.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from orchestrator.record.stamp import figure
 from orchestrator.record.stretch import Point
@@ -86,21 +85,11 @@ def _kept(changes: Sequence[Change]) -> tuple[Change, ...]:
     return tuple(one for one in changes if one is not smallest)
 
 
-def as_fields(changes: Iterable[Change]) -> list[dict[str, float]]:
-    """As they stand in a record."""
-    return [
-        {
-            "before_a": one.before_a,
-            "after_a": one.after_a,
-            "rise_v": round(one.rise_v, 4),
-            "soc_pct": one.soc_pct,
-            "temperature_c": one.temperature_c,
-        }
-        for one in changes
-    ]
+def as_fields(changes: Iterable[Change]) -> list[list[float]]:
+    """As they stand in a record: their figures in the order of `Change`; every checkpoint repeats them."""
+    return [[one.before_a, one.after_a, round(one.rise_v, 4), one.soc_pct, one.temperature_c] for one in changes]
 
 
-def from_fields(values: Iterable[Mapping[str, Any]]) -> tuple[Change, ...]:
-    """The inverse; raises LookupError, TypeError or ValueError for anything else."""
-    names = ("before_a", "after_a", "rise_v", "soc_pct", "temperature_c")
-    return tuple(Change(*(figure(one[name]) for name in names)) for one in values)
+def from_fields(values: Iterable[Iterable[object]]) -> tuple[Change, ...]:
+    """The inverse; raises TypeError or ValueError for anything else."""
+    return tuple(Change(*map(figure, one)) for one in values)

@@ -97,14 +97,7 @@ def _end_v(charge: Charge) -> float | None:
 def resumed(charge: Charge, look: Look, session: Session) -> Charge:
     """The charge of an earlier run of the service, after the first decision of this one."""
     pauses = pause.died(charge.pauses, charge.last, _died(charge))
-    then = replace(
-        charge,
-        pauses=pauses,
-        measured=measuring.broken(charge.measured),
-        started_s=session.started_s,
-        written=look.stamp,
-        due=True,
-    )
+    then = replace(charge, pauses=pauses, started_s=session.started_s, written=look.stamp, due=True)
     return follow(then, look, resumed=True)
 
 

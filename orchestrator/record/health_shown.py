@@ -71,8 +71,8 @@ def _resistance(health: Health) -> Cause:
     if found is None:
         (low_pct, high_pct), (low_c, high_c) = SOC_PCT, PACK_C
         return Cause.of(
-            "health_resistance_none", least=LEAST_STEPS, least_a=LEAST_A, low_pct=low_pct, high_pct=high_pct, lowest_c=low_c,
-            highest_c=high_c, charges=health.usable[1],
+            "health_resistance_none", least=LEAST_STEPS, least_a=LEAST_A, low_pct=low_pct, high_pct=high_pct,
+            lowest_c=low_c, highest_c=high_c, charges=health.usable[1],
         )  # fmt: skip
     mohm = found.mohm
     return Cause.of(

@@ -4,7 +4,7 @@ The record has the measurements and not the figures: with another method they ca
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from orchestrator.record import change as changing
@@ -24,7 +24,10 @@ NAME = "measured"
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Of one charge. The moments are not in its record: a run of the service that goes on with it begins anew."""
+    """Of one charge.
+
+    Moments are not in its record: a run of the service that goes on with it measures nothing across the gap.
+    """
 
     stretches: Stretches = Stretches()
     changes: Changes = Changes()
@@ -70,12 +73,6 @@ def follow(measured: Measured, now_s: float, point: Point, end_v: float | None) 
         measured.high_s + gap_s * high,
         now_s,
     )
-
-
-def broken(measured: Measured) -> Measured:
-    """The same after a time in which nobody looked."""
-    stretches, changes = stretching.broken(measured.stretches), changing.broken(measured.changes)
-    return replace(measured, stretches=stretches, changes=changes, t_s=None)
 
 
 def as_fields(measured: Measured) -> dict[str, object]:

@@ -15,7 +15,8 @@ from orchestrator.record.lines import restored
 from orchestrator.record.measured import Measured
 from orchestrator.record.stretch import Point, Stretch, Stretches
 from orchestrator.sim.pack import Pack
-from tests.record.health_lives import Life
+from tests.record.aged_battery import Life
+from tests.record.health_lives import charges_of
 from tests.record.kept import Kept
 
 
@@ -57,6 +58,12 @@ def test_the_longest_stretch_between_jumps_counts(between: tuple[float | None, f
     assert (found.from_pct, found.to_pct) == (32, 40)
 
 
+def test_a_soc_that_has_fallen_does_not_go_on_from_where_it_was() -> None:
+    found = stretch(*((pct, pct / 10) for pct in (20.0, 21.0, 22.0, 23.0, 21.0, 22.0, 23.0, 24.0, 25.0)))
+    assert found is not None
+    assert (found.from_pct, found.to_pct) == (22, 25)
+
+
 def test_what_a_bmu_says_at_the_top_does_not_count() -> None:
     found = stretch((97, 0.0), (98, 0.2), (99, 0.4), (100, 5.0))
     assert found is not None
@@ -93,9 +100,10 @@ def test_a_change_is_between_two_steady_currents() -> None:
         [(0.5 * n, 14 - 0.1 * n, 50) for n in range(60)],
         [(0, 0, 50), (0.5, 0, 50), (7, 14, 51), (7.5, 14, 51)],
         [(0, 0, 50), (0.5, 0, 50), *((1 + 0.5 * n, n, 50) for n in range(14)), (8, 14, 51), (8.5, 14, 51)],
-        [(0, 0, 50), (0, 14, 50.7), (0, 14, 50.7)],
+        [(0, 0, 50), (0.5, 0, 50), (1, 14, 50.7), (1, 14, 50.7)],
+        [(0, 0, 50), (0.5, 0, 50), (3.5, 14, 50.7), (4, 14, 50.7)],
     ],
-    ids=["small", "slow", "a gap", "too long on its way", "one reading thrice"],
+    ids=["small", "slow", "a gap", "too long on its way", "one reading twice", "not seen meanwhile"],
 )
 def test_what_is_no_change(readings: list[tuple[float, float, float]]) -> None:
     assert changes(*readings).all == ()
@@ -162,15 +170,33 @@ def test_the_service_records_what_a_charge_shows(tmp_path: Path, monkeypatch: py
     assert end["policy"]["capacity_ah"] == load_policy("li-ion-48v").pack.capacity_ah
     assert end["policy"]["end_v"] == pytest.approx(54.6)
     # what the simulated lives are made of has the same form
-    (other,) = (record for number, record in enumerate(Life(1).charges()) if number == 0)
+    (other,) = (record for number, record in enumerate(charges_of(Life(1))) if number == 0)
     assert other.keys() == end.keys()
     assert other["measured"].keys() == end["measured"].keys()
     assert other["measured"]["stretch"].keys() == end["measured"]["stretch"].keys()
-    assert other["measured"]["steps"][0].keys() == end["measured"]["steps"][0].keys()
+    assert len(other["measured"]["steps"][0]) == len(end["measured"]["steps"][0])
     assert {*other["policy"]} == {*end["policy"]}
-    # what is restored from a record is as it was, and a restart costs it nothing
+    # what is restored from a record is as it was
     assert measuring.as_fields(restored(end, end).measured) == {"measured": end["measured"]}
-    assert measuring.as_fields(measuring.broken(found)) == {"measured": end["measured"]}
+
+
+def test_nothing_is_measured_across_a_restart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    charging = Charging(tmp_path)
+    monkeypatch.setattr("orchestrator.service.bay.time", charging.kept.wall)
+    charging.until(45.0)
+    charging.kept.recorder.turn()
+    charging.kept.again(charging.kept.persisted(), 1.0)
+    while charging.step() is not State.HELD:
+        pass
+    charging.kept.bench.ask(Request.START)
+    charging.until(58.0)
+    charging.kept.bench.ask(Request.STOP)
+    for _ in range(20):
+        charging.step()
+    *_, end = charging.kept.records()
+    assert end["type"] == "end"
+    assert end["measured"]["stretch"]["from_pct"] >= 45 or end["measured"]["stretch"]["to_pct"] <= 46
+    assert end["measured"]["stretch"]["charger_ah"] < 0.6 * 0.22
 
 
 def test_a_record_of_an_earlier_version_has_nothing_measured_and_goes_on(tmp_path: Path) -> None:
