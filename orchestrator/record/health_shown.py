@@ -9,14 +9,13 @@ from orchestrator.record.health import SOURCES, Health
 from orchestrator.record.measured import HIGH_SHARE, HOT_C
 from orchestrator.record.resistance import LEAST as LEAST_STEPS
 from orchestrator.record.resistance import PACK_C, SOC_PCT
-from orchestrator.record.shown import SOURCES as SAID
 from orchestrator.record.stamp import as_fields as stamp_fields
 from orchestrator.record.table import lasted
 from orchestrator.text.catalogue import say
 
 
 def health_lines(health: Health, language: str) -> list[str]:
-    """One line for each thing that can be said; unfolded."""
+    """One line for each thing that can be said, unfolded; which battery it is, the reader has seen before."""
     return [say(cause, language) for cause in _said(health)]
 
 
@@ -32,7 +31,6 @@ def _said(health: Health) -> Iterator[Cause]:
     if health.newest is None:
         yield Cause.of("health_none", battery=health.battery)
         return
-    yield Cause.of(SAID.get(health.source, SAID[SOURCES[0]]), battery=health.battery)
     yield Cause.of("health_method", method=health.method, charges=health.charges, end_at=health.newest.local())
     yield from filter(None, (warning(health), _mixed(health)))
     yield _capacity(health)

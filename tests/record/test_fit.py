@@ -9,7 +9,7 @@ from orchestrator.record.capacity import LEAST, Aged, balance, capacity
 from orchestrator.record.change import Change
 from orchestrator.record.fit import Fit, Row, fitted, half_width, inverted, t95, within
 from orchestrator.record.resistance import LEAST as LEAST_STEPS
-from orchestrator.record.resistance import Steps, resistance
+from orchestrator.record.resistance import Steps, resistance, usable
 from orchestrator.record.stretch import Stretch
 
 
@@ -113,6 +113,17 @@ def steps(celsius: float, ohm: float = 0.05, years: float = 0.0) -> Steps:
     warm = 1 / (celsius + 273.15) - 1 / 298.15
     rise_v = 14 * ohm * math.exp(3200 * warm)
     return Steps((Change(0.0, 14.0, rise_v, 50.0, celsius), Change(14.0, 0.0, -rise_v, 70.0, celsius)), years)
+
+
+@pytest.mark.parametrize(("soc_pct", "celsius", "counts"), [
+    (20.0, 5.0, True), (90.0, 45.0, True), (19.0, 20.0, False), (91.0, 20.0, False), (50.0, 4.9, False),
+    (50.0, 45.1, False),
+])  # fmt: skip
+def test_nearly_empty_nearly_full_frost_and_heat_tell_no_resistance(
+    soc_pct: float, celsius: float, counts: bool
+) -> None:
+    change = Change(0.0, 14.0, 0.7, soc_pct, celsius)
+    assert usable([change]) == ((change,) if counts else ())
 
 
 def test_a_resistance_is_brought_to_25_degrees() -> None:

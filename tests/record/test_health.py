@@ -186,9 +186,9 @@ def test_precharges_and_the_voltage_at_rest_are_counted() -> None:
 @pytest.mark.parametrize(
     ("language", "words"),
     [
-        ("en", ["battery B-0042, typed by an operator", "capacity: ", "of the rated 40 Ah", "SOH by its BMU: ",
+        ("en", ["health by method 1, from 12 charges", "capacity: ", "of the rated 40 Ah", "SOH by its BMU: ",
                 "mΩ at 25 °C", "coulombic balance: ", "deep discharges: 0 of 12", "faults in its charges: none"]),
-        ("ko", ["배터리 B-0042", "용량: ", "정격 40 Ah의", "BMU 기준 SOH: ", "25 °C에서", "전하량 비교: ",
+        ("ko", ["평가 방식 1, 충전 12회 기준", "용량: ", "정격 40 Ah의", "BMU 기준 SOH: ", "25 °C에서", "전하량 비교: ",
                 "과방전: 충전 12회 중 0회", "장애: 없음"]),
     ],
 )  # fmt: skip
@@ -209,5 +209,6 @@ def test_programs_read_the_interval_and_the_method() -> None:
     fields = json.loads(json.dumps(health_shown.as_fields(found)))
     assert fields["method"] == METHOD
     assert fields["capacity_ah"]["low"] < fields["capacity_ah"]["value"] < fields["capacity_ah"]["high"]
+    assert fields["soh_pct"]["low"] == pytest.approx(100 * fields["capacity_ah"]["low"] / fields["rated_ah"], abs=0.01)
     assert fields["resistance_mohm"]["charges"] == 12
     assert fields["battery"] == {"id": BATTERY, "source": "typed"}

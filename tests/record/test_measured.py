@@ -6,13 +6,15 @@ from pathlib import Path
 import pytest
 
 from orchestrator.config.load import load_policy
-from orchestrator.model import Request, State
+from orchestrator.model import BatteryReading, Cause, Decision, Measurement, Request, Snapshot, State
 from orchestrator.record import change as changing
 from orchestrator.record import measured as measuring
 from orchestrator.record import stretch as stretching
 from orchestrator.record.change import MOST, Changes
 from orchestrator.record.lines import restored
+from orchestrator.record.look import Look
 from orchestrator.record.measured import Measured
+from orchestrator.record.stamp import Stamp
 from orchestrator.record.stretch import Point, Stretch, Stretches
 from orchestrator.sim.pack import Pack
 from tests.record.aged_battery import Life
@@ -117,6 +119,14 @@ def test_of_many_changes_the_largest_stay() -> None:
     found = changes(*readings).all
     assert len(found) == MOST
     assert min(abs(one.rise_a) for one in found) == 10.0  # the smallest ten were 9.0 … 9.8
+
+
+def test_a_reading_is_as_old_as_it_is() -> None:
+    fresh, old = Measurement(50.0, 99.5), Measurement(20.0, 90.0)
+    reading = BatteryReading(voltage_v=fresh, current_a=fresh, temperature_c=old)
+    decision = Decision(State.CHARGING, Cause("x"))
+    look = Look(Stamp(1.8e9, 0, 100.0, "boot"), Snapshot(battery=reading), decision, lambda cause: cause)
+    assert measuring.seen(look, 1.0, 2.0) == Point(99.5, None, 50.0, 50.0, None, 1.0, 2.0)
 
 
 def test_time_at_high_voltage_and_temperature_is_counted_up_to_a_gap() -> None:
