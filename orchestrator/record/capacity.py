@@ -21,6 +21,8 @@ from orchestrator.record.stretch import Stretch
 
 #: A shorter stretch, or one at other temperatures, says too little.
 LEAST_RISE_PCT, LOWEST_C, HIGHEST_C = 30.0, 15.0, 35.0
+#: Less has not flowed.
+LEAST_AH = 0.001
 #: Fewer charges give no scatter to go by.
 LEAST = 3
 #: An error of the SOC's rise by which the charges are weighted; how large it really is, their scatter tells.
@@ -58,11 +60,11 @@ class Aged:
 
 def is_usable(stretch: Stretch | None) -> bool:
     """Whether a stretch tells a capacity."""
-    if stretch is None or stretch.rise_pct < LEAST_RISE_PCT or stretch.charger_ah <= 0:
+    if stretch is None or stretch.rise_pct < LEAST_RISE_PCT or stretch.charger_ah < LEAST_AH:
         return False
     if stretch.lowest_c < LOWEST_C or stretch.highest_c > HIGHEST_C:
         return False
-    return stretch.bmu_ah <= 0 or abs(_apart(stretch)) <= APART
+    return not _is_counted(stretch) or abs(_apart(stretch)) <= APART
 
 
 def capacity(found: Sequence[Aged]) -> Estimate | None:
@@ -90,12 +92,17 @@ def around(fit: Fit, common: float, charges: int, unit: float = 1.0) -> Estimate
 
 def balance(found: Sequence[Stretch]) -> float | None:
     """What the BMU counted, as a share of what the charger delivered; None if it counts nothing."""
-    both = [one for one in found if one.bmu_ah > 0]
+    both = [one for one in found if _is_counted(one)]
     return sum(one.bmu_ah for one in both) / sum(one.charger_ah for one in both) if both else None
 
 
+def _is_counted(stretch: Stretch) -> bool:
+    """Whether the BMU has a current at all."""
+    return stretch.bmu_ah >= LEAST_AH
+
+
 def _ah(stretch: Stretch) -> float:
-    return math.sqrt(stretch.charger_ah * stretch.bmu_ah) if stretch.bmu_ah > 0 else stretch.charger_ah
+    return math.sqrt(stretch.charger_ah * stretch.bmu_ah) if _is_counted(stretch) else stretch.charger_ah
 
 
 def _apart(stretch: Stretch) -> float:

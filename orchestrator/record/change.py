@@ -7,8 +7,7 @@ are of one reading of the BMU, so the leads from the charger have no part in it.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from orchestrator.record.stamp import figure
-from orchestrator.record.stretch import Point
+from orchestrator.record.stretch import Point, measure
 
 #: Two readings in a row that differ by no more are of a steady current.
 STEADY_A, STEADY_SHARE = 0.1, 0.01
@@ -92,4 +91,4 @@ def as_fields(changes: Iterable[Change]) -> list[list[float]]:
 
 def from_fields(values: Iterable[Iterable[object]]) -> tuple[Change, ...]:
     """The inverse; raises TypeError or ValueError for anything else."""
-    return tuple(Change(*map(figure, one)) for one in values)
+    return tuple(Change(*map(measure, one)) for one in values)

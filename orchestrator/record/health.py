@@ -14,11 +14,12 @@ from typing import Any
 
 from orchestrator.record import measured as measuring
 from orchestrator.record import resistance as resisting
-from orchestrator.record.capacity import Aged, Estimate, balance, capacity, is_usable
+from orchestrator.record.capacity import LEAST_AH, Aged, Estimate, balance, capacity, is_usable
 from orchestrator.record.lines import END, Record
 from orchestrator.record.measured import Measured
 from orchestrator.record.resistance import Resistance, Steps
 from orchestrator.record.stamp import Stamp, figure, from_fields
+from orchestrator.record.stretch import MOST
 
 #: The version of the method: of this file, `capacity.py`, `resistance.py`, `fit.py` and what `measured.py` measures.
 METHOD = 1
@@ -109,7 +110,7 @@ def health(battery: str, records: Iterable[Record]) -> Health:
         len(charges),
         newest.end if newest is not None else None,
         capacity(stretches[-WINDOW:]),
-        _known(newest.record["policy"].get("capacity_ah")) if newest is not None else None,
+        _rated(newest),
         resisting.resistance(steps[-WINDOW:]),
         (len(stretches), len(steps)),
         next((soh for one in reversed(charges) if (soh := _value(one, "soh_pct", "end")) is not None), None),
@@ -137,7 +138,7 @@ def _charge(record: Record) -> _Charge:
         if not isinstance(record[name], kind):
             raise ValueError(f"{name} of charge {record['id']!s:.40} is damaged")
     for fault in record["faults"]:
-        if not fault.keys() >= {"id", "effect"} or figure(fault["times"]) < 1:
+        if not isinstance(fault["id"], str) or not isinstance(fault["effect"], str) or figure(fault["times"]) < 1:
             raise ValueError(f"a fault of charge {record['id']!s:.40} is damaged")
     for rule in record["rules"]:
         if not isinstance(rule["id"], str):
@@ -163,6 +164,11 @@ def _known(value: Any) -> float | None:  # noqa: ANN401 - whatever the record ha
         return None if value is None else figure(value)
     except ValueError:
         return None
+
+
+def _rated(newest: _Charge | None) -> float | None:
+    known = _known(newest.record["policy"].get("capacity_ah")) if newest is not None else None
+    return known if known is not None and LEAST_AH <= known <= MOST else None
 
 
 def _rest(charge: _Charge) -> Rest | None:

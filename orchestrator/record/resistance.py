@@ -16,13 +16,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from orchestrator.record.capacity import Estimate, around
-from orchestrator.record.change import Change
+from orchestrator.record.change import LEAST_A, Change
 from orchestrator.record.fit import Row, fitted, within
 
 #: Fewer charges cannot tell a value, a steepness and a scatter.
 LEAST = 4
 #: Beyond these a resistance is another one: nearly empty, nearly full, frost, heat.
 SOC_PCT, PACK_C = (20.0, 90.0), (5.0, 45.0)
+#: No pack has less.
+LEAST_OHM = 1e-6
 #: 25 °C and absolute zero.
 REFERENCE_C, ZERO_C = 25.0, -273.15
 #: What is known beforehand of growing (share a year) and of the law's steepness (K), and their deviations.
@@ -70,12 +72,16 @@ class Steps:
 def usable(changes: Sequence[Change]) -> tuple[Change, ...]:
     """Those that tell a resistance."""
     (low_pct, high_pct), (low_c, high_c) = SOC_PCT, PACK_C
-    return tuple(one for one in changes if low_pct <= one.soc_pct <= high_pct and low_c <= one.temperature_c <= high_c)
+    return tuple(
+        one
+        for one in changes
+        if low_pct <= one.soc_pct <= high_pct and low_c <= one.temperature_c <= high_c and abs(one.rise_a) >= LEAST_A
+    )
 
 
 def resistance(found: Sequence[Steps]) -> Resistance | None:
     """The resistance at the newest of these charges; None if too few of them have a usable change."""
-    told = [one for one in found if one.changes and one.ohm > 0]
+    told = [one for one in found if one.changes and one.ohm > LEAST_OHM]
     if len(told) < LEAST:
         return None
     rows = [Row(math.log(one.ohm), _expected(one), (-one.years, one.colder)) for one in told]

@@ -14,6 +14,8 @@ from orchestrator.record.stamp import figure
 JUMP_PCT, WAVER_PCT = 2.0, 1.0
 #: Above this many BMUs wait for the end of the charge before they say 100 %.
 TOP_PCT = 99.0
+#: No figure of a battery is larger, in V, A, Ah or °C: one that is was damaged.
+MOST = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,5 +114,15 @@ def from_fields(value: Mapping[str, Any] | None) -> Stretch | None:
     if value is None:
         return None
     names = ("from_pct", "to_pct", "charger_ah", "bmu_ah", "lowest_c", "highest_c")
-    from_pct, to_pct, charger_ah, bmu_ah, low_c, high_c = (figure(value[name]) for name in names)
+    from_pct, to_pct, charger_ah, bmu_ah, low_c, high_c = (measure(value[name]) for name in names)
+    if not 0 <= from_pct <= to_pct <= 100:
+        raise ValueError(f"a stretch from {from_pct:g} to {to_pct:g} % SOC is damaged")
     return Stretch(from_pct, to_pct, charger_ah, bmu_ah, low_c, high_c)
+
+
+def measure(value: object) -> float:
+    """A figure that can have been measured; ValueError for anything else."""
+    found = figure(value)
+    if abs(found) > MOST:
+        raise ValueError(f"{found:g} cannot have been measured")
+    return found

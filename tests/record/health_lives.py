@@ -7,11 +7,13 @@ form in which the service writes them: `test_measured.py` holds both against a c
 those of the pack at the end of its last charge. What is drawn, and from where, stands in `aged_battery.py`.
 """
 
+import json
 import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import Any
 
 from orchestrator.record import lines, spread
 from orchestrator.record.capacity import Estimate
@@ -61,6 +63,13 @@ def recorded(
     whole = Charge(id_, head, end.back(lasted_s), end, end, 0.0, None, 1, trouble=trouble, measured=found)
     spreads = (None, (soh_pct,) * 4, *spread.NONE[2:])
     return lines.end(replace(whole, spreads=spreads, result={"id": "full", "params": {}}))
+
+
+def records(seed: int = 8, count: int = 12) -> list[dict[str, Any]]:
+    """Charges of one life in a hall of 25 °C, as JSON has them."""
+    life = Life(seed)
+    life.count, life.hall_c, life.season_k, life.deepest_pct = count, 25.0, 0.0, 10.0
+    return [json.loads(json.dumps(record)) for record in charges_of(life)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,7 @@ from orchestrator.record.stretch import Point
 from orchestrator.record.ulid import CHANCE, after
 from orchestrator.sim.charger import SimulatedCharger
 from orchestrator.sim.pack import Pack
-from tests.record.aged_battery import Life
-from tests.record.health_lives import BATTERY, END_S, charges_of, live, recorded
+from tests.record.health_lives import BATTERY, END_S, live, recorded, records
 
 #: So many short lives, and how many of their intervals hold the true value at least: fewer by chance once in 300 times.
 LIVES, CHARGES, LEAST_INSIDE = 40, 12, 0.84
@@ -72,13 +71,6 @@ def test_the_emulated_pack_that_has_aged_is_known_by_its_charges() -> None:
 
 
 # --- from the records -------------------------------------------------------------------------------------------------
-
-
-def records(seed: int = 8, count: int = 12) -> list[dict[str, Any]]:
-    """Charges of a simulated battery, as JSON has them."""
-    life = Life(seed)
-    life.count, life.hall_c, life.season_k, life.deepest_pct = count, 25.0, 0.0, 10.0
-    return [json.loads(json.dumps(record)) for record in charges_of(life)]
 
 
 def changed(charges: list[dict[str, Any]], name: str, value: object) -> Iterator[dict[str, Any]]:
@@ -186,9 +178,9 @@ def test_precharges_and_the_voltage_at_rest_are_counted() -> None:
 @pytest.mark.parametrize(
     ("language", "words"),
     [
-        ("en", ["health by method 1, from 12 charges", "capacity: ", "of the rated 40 Ah", "SOH by its BMU: ",
+        ("en", ["health by method 1; charges: 12", "capacity: ", "of the rated 40 Ah", "SOH by its BMU: ",
                 "mΩ at 25 °C", "coulombic balance: ", "deep discharges: 0 of 12", "faults in its charges: none"]),
-        ("ko", ["평가 방식 1, 충전 12회 기준", "용량: ", "정격 40 Ah의", "BMU 기준 SOH: ", "25 °C에서", "전하량 비교: ",
+        ("ko", ["평가 방식 1; 충전 12회", "용량: ", "정격 40 Ah의", "BMU 기준 SOH: ", "25 °C에서", "전하량 비교: ",
                 "과방전: 충전 12회 중 0회", "장애: 없음"]),
     ],
 )  # fmt: skip

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 TEXTS: Mapping[str, str] = {
     "health_none": "battery {battery}: no charge of it on record has ended",
-    "health_method": "health by method {method}, from {charges} charges; the newest ended on {end_at}",
+    "health_method": "health by method {method}; charges: {charges}, the newest ended on {end_at}",
     "health_mixed": "other batteries may have been there under this id: give each its own with orchestrator identify",
     "health_capacity": "capacity: {ah:.2f} Ah (95 %: {low:.2f} … {high:.2f} Ah), from {charges} charges",
     "health_capacity_none": "capacity: not known yet: it takes {least} charges within a year that raise the SOC by "
@@ -21,7 +21,7 @@ TEXTS: Mapping[str, str] = {
     "health_balance": "coulombic balance: its BMU counts {pct:.1f} % of what the charger delivers",
     "health_rest": "rest voltage: {pack_v:.2f} V at SOC {soc_pct:.0f} % before the charge of {begin_at}",
     "health_stress": "in charges: {high} at or above {share_pct:.0f} % of the end voltage, {hot} at or above {hot_c:g} °C",
-    "health_deep": "deep discharges: {deep} of {charges} charges began with a precharge",
+    "health_deep": "deep discharges: {deep} of {charges} (charges that began with a precharge)",
     "health_faults": "faults in its charges: {faults}",
     "health_no_faults": "faults in its charges: none",
 }

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 TEXTS: Mapping[str, str] = {
     "health_none": "배터리 {battery}: 종료된 충전 기록이 없습니다",
-    "health_method": "건강 상태: 평가 방식 {method}, 충전 {charges}회 기준; 마지막 충전 종료 {end_at}",
+    "health_method": "건강 상태: 평가 방식 {method}; 충전 {charges}회, 마지막 충전 종료 {end_at}",
     "health_mixed": "이 ID로 다른 배터리가 충전되었을 수 있습니다: 배터리마다 orchestrator identify로 ID를 지정하십시오",
     "health_capacity": "용량: {ah:.2f} Ah(95 % 구간 {low:.2f} … {high:.2f} Ah), 충전 {charges}회 기준",
     "health_capacity_none": "용량: 아직 알 수 없습니다: {lowest_c:g} … {highest_c:g} °C에서 SOC가 급변 없이 {rise_pct:g} % 이상 "
