@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 from orchestrator.model import Cause, Session
 from orchestrator.model.cause import plain
 from orchestrator.record import amounts as amount
+from orchestrator.record import measured as measuring
 from orchestrator.record import met as trouble
 from orchestrator.record import pauses as pause
 from orchestrator.record import spread
 from orchestrator.record.amounts import Amounts, Counted
 from orchestrator.record.look import Look
+from orchestrator.record.measured import Measured
 from orchestrator.record.met import Trouble
 from orchestrator.record.pauses import Pauses
 from orchestrator.record.spread import Spreads
@@ -48,6 +50,7 @@ class Charge:
     spreads: Spreads = spread.NONE
     pauses: Pauses = Pauses()
     trouble: Trouble = Trouble()
+    measured: Measured = Measured()
     closed: bool = False  #: whether the contactor was to be closed
     due: bool = False  #: something to be recorded at once
     result: Mapping[str, object] | None = None  #: why it ended; None while it has not
@@ -66,19 +69,29 @@ def follow(charge: Charge, look: Look, *, resumed: bool = False) -> Charge:
     session, before = look.session, charge.pauses
     ends = session is not None and session.result is not None
     pauses = pause.ended(before, look.stamp) if ends else pause.follow(before, look)
+    amounts = amount.follow(charge.amounts, look, resumed=resumed)
+    point = measuring.seen(look, amounts.ah, amounts.bmu_ah)
     now = replace(
         charge,
         last=look.stamp,
-        amounts=amount.follow(charge.amounts, look, resumed=resumed),
+        amounts=amounts,
         spreads=spread.follow(charge.spreads, look.values()),
         pauses=pauses,
         trouble=trouble.follow(charge.trouble, look),
+        measured=measuring.follow(charge.measured, look.now_s, point, _end_v(charge)),
         closed=look.decision.closed,
         due=charge.due or pauses.lasts is not before.lasts,
     )
     if session is None or session.result is None:
         return now
     return replace(now, result=look.plainly(session.result))
+
+
+def _end_v(charge: Charge) -> float | None:
+    """The pack's end voltage, by the policy; None in a record of an earlier version."""
+    policy = charge.head.get("policy")
+    found = policy.get("end_v") if isinstance(policy, Mapping) else None
+    return float(found) if isinstance(found, int | float) else None
 
 
 def resumed(charge: Charge, look: Look, session: Session) -> Charge:

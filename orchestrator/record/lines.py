@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from orchestrator.record import amounts, met, pauses, spread
+from orchestrator.record import amounts, measured, met, pauses, spread
 from orchestrator.record import stamp as stamps
 from orchestrator.record.charge import Charge
 from orchestrator.record.ulid import is_ulid
@@ -60,6 +60,7 @@ def _counted(charge: Charge) -> Record:
         "values": spread.as_fields(charge.spreads),
         **pauses.as_fields(charge.pauses),
         **met.as_fields(charge.trouble),
+        **measured.as_fields(charge.measured),
         "contactor_closed": charge.closed if contactor else None,
     }
 
@@ -84,6 +85,7 @@ def restored(first: Record, newest: Record) -> Charge:
             spread.from_fields(newest["values"]),
             pauses.from_fields(newest),
             met.from_fields(newest),
+            measured.from_fields(newest),
             newest["contactor_closed"] is True,
         )
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from time import localtime
 
 from orchestrator import __version__
+from orchestrator.config.amperes import end_v
 from orchestrator.config.station import BayConfig
 from orchestrator.model import Decision, Request, Session, Snapshot
 from orchestrator.model.identity import Identity, Source
@@ -125,7 +126,12 @@ class BayRecord:
             "bay": self._place.bay,
             "port": self._place.port,
             "battery": _fields(identity),
-            "policy": {"name": policy.policy, "sha256": policy.source.digest},
+            "policy": {
+                "name": policy.policy,
+                "sha256": policy.source.digest,
+                "capacity_ah": policy.pack.capacity_ah,
+                "end_v": end_v(policy.pack),
+            },
             "software": __version__,
             "by": self._by,
             "contactor_fitted": bay.contactor is not None,

@@ -24,6 +24,7 @@ from orchestrator.text.en.advice import ADVICE as EN_ADVICE
 from orchestrator.text.en.bays import TEXTS as EN_BAYS
 from orchestrator.text.en.codes import CODES as EN_CODES
 from orchestrator.text.en.faults import TEXTS as EN_FAULTS
+from orchestrator.text.en.health import TEXTS as EN_HEALTH
 from orchestrator.text.en.limits import TEXTS as EN_LIMITS
 from orchestrator.text.en.links import TEXTS as EN_LINKS
 from orchestrator.text.en.pages import TEXTS as EN_PAGES
@@ -34,6 +35,7 @@ from orchestrator.text.ko.advice import ADVICE as KO_ADVICE
 from orchestrator.text.ko.bays import TEXTS as KO_BAYS
 from orchestrator.text.ko.codes import CODES as KO_CODES
 from orchestrator.text.ko.faults import TEXTS as KO_FAULTS
+from orchestrator.text.ko.health import TEXTS as KO_HEALTH
 from orchestrator.text.ko.limits import TEXTS as KO_LIMITS
 from orchestrator.text.ko.links import TEXTS as KO_LINKS
 from orchestrator.text.ko.pages import TEXTS as KO_PAGES
@@ -78,13 +80,13 @@ def _language(
 
 LANGUAGES: Mapping[str, Language] = {
     "en": _language(
-        {**EN_FAULTS, **EN_BAYS, **EN_LIMITS, **EN_LINKS, **EN_SERVICE, **EN_PAGES},
+        {**EN_FAULTS, **EN_BAYS, **EN_LIMITS, **EN_LINKS, **EN_SERVICE, **EN_PAGES, **EN_HEALTH},
         EN_ADVICE,
         {**EN_WORDS, **EN_CODES},
         EN_FRAMES,
     ),
     "ko": _language(
-        {**KO_FAULTS, **KO_BAYS, **KO_LIMITS, **KO_LINKS, **KO_SERVICE, **KO_PAGES},
+        {**KO_FAULTS, **KO_BAYS, **KO_LIMITS, **KO_LINKS, **KO_SERVICE, **KO_PAGES, **KO_HEALTH},
         KO_ADVICE,
         {**KO_WORDS, **KO_CODES},
         KO_FRAMES,

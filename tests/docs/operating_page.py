@@ -101,6 +101,11 @@ LAST = """\
 ## Pause all bays but one
 `orchestrator pause --all --except bay-1`. Each bay answers in a line (`bay-2: pause accepted; stands by, verified`),
 and the exit status is 0 once all of them stand by. `start` lets them go on; each charge goes on where it was.
+
+## Which battery gets old?
+Each charge measures its battery: what it still holds and its resistance, each with an interval that says how far to
+believe it. A warning says where the BMU's own SOH does not fit. What the figures mean, and when there are none:
+[health.md](health.md).
 """
 
 
