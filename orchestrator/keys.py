@@ -60,7 +60,7 @@ class Source:
 
     file: str
     lines: Mapping[str, int] = field(default_factory=dict, hash=False)
-    digest: str = ""  #: the first digits of the file's SHA-256, as `sha256sum` shows it
+    digest: str = ""  #: the file's SHA-256, as `sha256sum` shows it; people are shown the first twelve digits
 
     def at(self, path: str) -> str:
         """`FILE:LINE` of the key at `path`, or of its nearest parent in the file."""

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 #: A file's values by path, and the lines of the keys that it has → what is probably unintended.
 Lint = Callable[[Mapping[str, object], Source], Problems]
-#: This many hexadecimal digits distinguish two versions of a file.
-DIGEST = 12
 #: The kind of file expected wherever one is named.
 OURS = "a YAML file: a station, a policy, an object map or a scenario"
 
@@ -195,7 +193,7 @@ class _Loader:
         if real not in self._trees:
             try:
                 text = read_plain(where.path, MAX_BYTES, OURS)
-                self._digests[real] = sha256(text).hexdigest()[:DIGEST]
+                self._digests[real] = sha256(text).hexdigest()
                 node, findings = parse(self._name(where), text)
             except OSError as error:
                 near = nearest_file(where.path) if isinstance(error, FileNotFoundError) else ""

@@ -57,7 +57,7 @@ def recorded(
     head = {
         "station": "a station", "bay": "bay-1", "port": "/dev/ttyX",
         "battery": {"id": BATTERY, "source": "typed", "can": "can0", "node": "0x10"},
-        "policy": {"name": "p", "sha256": "0" * 12, "capacity_ah": rated_ah, "end_v": end_v},
+        "policy": {"name": "p", "sha256": "0" * 64, "capacity_ah": rated_ah, "end_v": end_v},
         "software": "0", "by": None, "contactor_fitted": False,
     }  # fmt: skip
     whole = Charge(id_, head, end.back(lasted_s), end, end, 0.0, None, 1, trouble=trouble, measured=found)

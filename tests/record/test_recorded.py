@@ -35,7 +35,7 @@ def test_a_charge_has_a_begin_and_an_end_with_all_of_it(kept: Kept) -> None:
     assert end["bay"] == "bay-1"
     assert end["battery"] == {"id": "can0:0x10", "source": "assumed", "can": "can0", "node": "0x10"}
     assert end["policy"]["name"] == "li-ion-48v"
-    assert len(end["policy"]["sha256"]) == 12
+    assert len(end["policy"]["sha256"]) == 64
     assert end["by"] is None
     assert end["result"]["id"] == "full"
     assert end["result"]["key"] == "finish.full.soc_pct"

@@ -41,7 +41,7 @@ TEXTS: Mapping[str, str] = {
     "forecast_own": "by our own estimate: in {lasts}, at {end_at}",
     "forecast_none": "nothing sensible can be said now",
     "battery_on": "BMU 0x{node_id:02X} on {can}",
-    "policy_line": "{policy} ({file}, sha256 {sha256})",
+    "policy_line": "{policy} ({file}, sha256 {sha256:.12})",
     "policy_since": "{policy}, in force since {begun_at}",
     "no_events": "the journal has none of this bay",
     "no_journal": "not shown: {why}",

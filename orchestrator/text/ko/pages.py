@@ -41,7 +41,7 @@ TEXTS: Mapping[str, str] = {
     "forecast_own": "자체 추정 {lasts} 후, {end_at}",
     "forecast_none": "지금은 예상할 수 없습니다",
     "battery_on": "{can}의 BMU 0x{node_id:02X}",
-    "policy_line": "{policy}(파일 {file}, sha256 {sha256})",
+    "policy_line": "{policy}(파일 {file}, sha256 {sha256:.12})",
     "policy_since": "{policy}, {begun_at}부터 적용",
     "no_events": "저널에 이 베이의 기록이 없습니다",
     "no_journal": "표시하지 않았습니다: {why}",
