@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from orchestrator.columns import aligned, beside, folded, width_of
@@ -118,14 +118,17 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def as_csv(charges: Sequence[Record], language: str) -> str:
-    """RFC 4180; the last column is the reason as a sentence."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow([*COLUMNS, "why"])
+def as_csv(charges: Iterable[Record], language: str) -> Iterator[str]:
+    """RFC 4180, line by line; the last column is the reason as a sentence."""
+    yield BOM + _line([*COLUMNS, "why"])
     for charge in charges:
-        writer.writerow([*(_guarded(_found(charge, path)) for path in COLUMNS.values()), why_ended(charge, language)])
-    return BOM + text.getvalue()
+        yield _line([*(_guarded(_found(charge, path)) for path in COLUMNS.values()), why_ended(charge, language)])
+
+
+def _line(cells: Sequence[object]) -> str:
+    text = io.StringIO()
+    csv.writer(text).writerow(cells)
+    return text.getvalue()
 
 
 def _found(charge: Record, path: Sequence[str]) -> Any:  # noqa: ANN401 - whatever the record has there

@@ -93,11 +93,16 @@ def _add_identify(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     sessions = verbs.add_parser("sessions", help="list the charges on record: how much, how long, and why they ended")
-    sessions.add_argument("show", nargs="*", help="'show ID': everything about one charge; the end of its id will do")
+    sessions.add_argument(
+        "words", nargs="*", metavar="show ID|rebuild",
+        help="'show ID': everything about one charge; the end of its id will do. 'rebuild': build the index anew",
+    )  # fmt: skip
     sessions.add_argument("--bay", action="append", default=[], help="only of this bay: a name or a pattern")
     sessions.add_argument("--battery", metavar="ID", help="only of this battery")
     sessions.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
-    sessions.add_argument("--limit", type=int, metavar="N", help="at most so many, the newest ones")
+    sessions.add_argument(
+        "--limit", type=int, metavar="N", help="the newest N; 0: all (default: 50 in the table, with --since all)"
+    )
     form = sessions.add_mutually_exclusive_group()
     form.add_argument("--csv", action="store_true", help="for a spreadsheet")
     form.add_argument("--json", action="store_true", help="the records, for programs")

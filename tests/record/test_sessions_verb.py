@@ -75,6 +75,7 @@ def test_bay_battery_time_and_number_choose(journal: Path, capsys: pytest.Captur
 
     assert count() == 3
     assert count("--limit", "2") == 2
+    assert count("--limit", "0") == 3
     assert count("--bay", "bay-*") == 3
     assert count("--bay", "bay-2") == 0
     assert count("--battery", "can0:0x10") == 3
@@ -111,10 +112,10 @@ def test_an_empty_record_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.mark.parametrize(
     ("arguments", "status", "expected"),
     [
-        (("show",), 2, "expected 'sessions', or 'sessions show ID"),
-        (("list",), 2, "expected 'sessions', or 'sessions show ID"),
+        (("show",), 2, "expected 'sessions', 'sessions show ID [--json]' or"),
+        (("list",), 2, "expected 'sessions', 'sessions show ID [--json]' or"),
         (("show", "0000"), 1, "no charge on record has an id that ends with 0000"),
-        (("--limit", "0"), 2, "--limit 0: expected 1 or more"),
+        (("--limit", "-1"), 2, "--limit -1: expected the number of charges"),
         (("--since", "yesterday"), 2, "--since yesterday: expected 90min"),
     ],
 )

@@ -1,0 +1,60 @@
+"""The charges on record, asked of the index: which there are, and what the files say of each."""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+
+from orchestrator.model import Cause
+from orchestrator.record.index import opened
+from orchestrator.record.lines import Record
+from orchestrator.record.row import as_record
+from orchestrator.record.tables import records
+
+#: As many whole records are read at once.
+CHUNK = 500
+
+
+class Charges:
+    """Those in this folder now; OSError if its files cannot be read. `say` is told what is wrong with the index."""
+
+    def __init__(self, folder: Path, say: Callable[[Cause], None] = lambda _: None) -> None:
+        self._folder, self._db = folder, opened(folder, say)
+
+    def listed(
+        self,
+        bays: Sequence[str] | None = None,
+        battery: str | None = None,
+        since_s: float | None = None,
+        limit: int | None = None,
+    ) -> Iterator[Record]:
+        """What lists need of each, the newest first: of these bays, this battery, not over before `since_s`."""
+        where, values = ["1"], list[object]()
+        if bays is not None:
+            where.append(f"bay IN ({', '.join('?' * len(bays))})")
+            values += bays
+        for column, value in (("battery =", battery), ("last_unix_s >=", since_s)):
+            if value is not None:
+                where.append(f"{column} ?")
+                values.append(value)
+        asked = f"SELECT * FROM charges WHERE {' AND '.join(where)} ORDER BY id DESC LIMIT ?"  # noqa: S608 - our own words
+        for row in self._db.execute(asked, (*values, -1 if limit is None else limit)):
+            yield as_record(row)
+
+    def whole(self, ids: Sequence[str]) -> Iterator[Record]:
+        """These charges as the files have them, in this order."""
+        left = iter(ids)
+        while chunk := list(islice(left, CHUNK)):
+            yield from records(self._db, self._folder, chunk)
+
+    def named(self, end: str) -> str | None:
+        """The newest charge whose id ends so."""
+        asked = "SELECT id FROM charges WHERE substr(id, -length(?1)) = ?1 ORDER BY id DESC LIMIT 1"
+        found = self._db.execute(asked, (end,)).fetchone()
+        return None if found is None else str(found[0])
+
+    def bays(self) -> list[str]:
+        """All that have had a charge."""
+        return [bay for (bay,) in self._db.execute("SELECT DISTINCT bay FROM charges ORDER BY bay")]
+
+    def __len__(self) -> int:
+        return int(self._db.execute("SELECT count(*) FROM charges").fetchone()[0])
