@@ -22,17 +22,22 @@ class Charges:
 
     def listed(
         self,
+        *,
         bays: Sequence[str] | None = None,
         battery: str | None = None,
         since_s: float | None = None,
+        began_s: tuple[float, float] | None = None,
         limit: int | None = None,
     ) -> Iterator[Record]:
-        """What lists need of each, the newest first: of these bays, this battery, not over before `since_s`."""
+        """What lists need of each, the newest first; not those over before `since_s`, or begun outside `began_s`."""
         where, values = ["1"], list[object]()
         if bays is not None:
             where.append(f"bay IN ({', '.join('?' * len(bays))})")
             values += bays
-        for column, value in (("battery =", battery), ("last_unix_s >=", since_s)):
+        from_s, to_s = began_s or (None, None)
+        for column, value in (
+            ("battery =", battery), ("last_unix_s >=", since_s), ("begin_unix_s >=", from_s), ("begin_unix_s <", to_s),
+        ):  # fmt: skip
             if value is not None:
                 where.append(f"{column} ?")
                 values.append(value)

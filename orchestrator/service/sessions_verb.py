@@ -59,7 +59,9 @@ def _list(arguments: argparse.Namespace) -> int:
 def _meant(charges: Charges, arguments: argparse.Namespace, since: str, usual: int = 0) -> Iterator[Record]:
     bays = choose(arguments.bay, (), charges.bays()).bays if arguments.bay else None
     limit = arguments.limit if arguments.limit is not None else 0 if since else usual
-    return charges.listed(bays, arguments.battery, unix_s(since) if since else None, limit or None)
+    return charges.listed(
+        bays=bays, battery=arguments.battery, since_s=unix_s(since) if since else None, limit=limit or None
+    )
 
 
 def _say_more(charges: Charges, arguments: argparse.Namespace, since: str, shown_count: int) -> None:

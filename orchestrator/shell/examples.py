@@ -24,6 +24,10 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ("sessions show 4QZ7", "one of them: the end of its id will do"),
         ("sessions --bay bay-2 --limit 10 --csv", "the last ten of a bay, for a spreadsheet"),
     ),
+    "report": (
+        ("report", "the month of the newest charge"),
+        ("report --month 2026-11 --html november.html", "a page to be sent"),
+    ),
     "identify": (("identify bay-1 --battery B-0042", "what is written on the battery that was just connected"),),
     "start": (
         ("start bay-1", "let it charge after a stop, a pause or a reset"),

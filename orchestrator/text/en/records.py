@@ -27,6 +27,19 @@ TEXTS: Mapping[str, str] = {
     "charge_no_rule": "{lasted}, {ah:.2f} Ah: nothing but the charger",
     "charge_pauses": "Pauses:",
     "charge_faults": "Faults:",
+    # a month
+    "report_title": "Charges in {month}",
+    "report_of": "Charges that began in {month} (local time: {zones:word}), {stations:word}",
+    "report_head": "BAY|CHARGES|FULL|AH|KWH|MEAN TIME TO FULL",
+    "report_total": "all",
+    "report_ends": "How they ended:",
+    "report_ends_head": "CHARGES|CAUSE|LAST AT|BEGAN|WHY IT ENDED",
+    "report_look": "Batteries that need a look:",
+    "report_none": "no charge on record began in {month}",
+    "look_faults": "faults stopped its charges, {times} in all: {faults:word}",
+    "look_soh": "its BMU reports SOH {soh_pct:.0f} %, below {least_pct:.0f} %",
+    "look_amounts": "{ah:.1f} Ah by the charger, {bmu_ah:.1f} Ah by its BMU: check which of them measures wrong",
+    "page_not_written": "{file} cannot be written: {error}",
     # the index
     "index_damaged": "the index of the records was damaged ({error}): it is kept as {file}, and a new one was built",
     "index_not_written": "no index could be written in {folder} ({error}): each record was read instead, which takes "

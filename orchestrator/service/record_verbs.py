@@ -1,0 +1,58 @@
+"""The verbs of the record of charges: list and show them, report a month.
+
+Each imports its dependencies when it runs, so that none waits for another's libraries.
+"""
+
+import argparse
+from pathlib import Path
+
+
+def add_record_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """`sessions` and `report`."""
+    _add_sessions(verbs)
+    _add_report(verbs)
+
+
+def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    sessions = verbs.add_parser("sessions", help="list the charges on record: how much, how long, and why they ended")
+    sessions.add_argument(
+        "words", nargs="*", metavar="show ID|rebuild",
+        help="'show ID': everything about one charge; the end of its id will do. 'rebuild': build the index anew",
+    )  # fmt: skip
+    sessions.add_argument("--bay", action="append", default=[], help="only of this bay: a name or a pattern")
+    sessions.add_argument("--battery", metavar="ID", help="only of this battery")
+    sessions.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
+    sessions.add_argument(
+        "--limit", type=int, metavar="N", help="the newest N; 0: all (default: 50 in the table, with --since all)"
+    )
+    form = sessions.add_mutually_exclusive_group()
+    form.add_argument("--csv", action="store_true", help="for a spreadsheet")
+    form.add_argument("--json", action="store_true", help="the records, for programs")
+    _add_journal(sessions)
+    sessions.set_defaults(run=_sessions)
+
+
+def _add_report(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    report = verbs.add_parser("report", help="sum up a month: energy, charges, why they ended, batteries to look at")
+    report.add_argument("--month", metavar="YYYY-MM", help="which (default: that of the newest charge)")
+    report.add_argument("--html", type=Path, metavar="FILE", help="write a web page that needs no network")
+    _add_journal(report)
+    report.set_defaults(run=_report)
+
+
+def _add_journal(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--journal", metavar="DIR", help="the journal's directory (default: that of station.yaml here, else installed)"
+    )
+
+
+def _sessions(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.sessions_verb import sessions
+
+    return sessions(arguments)
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.report_verb import report_month
+
+    return report_month(arguments)
