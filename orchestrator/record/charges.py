@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 
 from orchestrator.model import Cause
 from orchestrator.record.index import opened
@@ -10,8 +11,32 @@ from orchestrator.record.lines import Record
 from orchestrator.record.row import as_record
 from orchestrator.record.tables import records
 
+#: Ids are in the order of the charges.
+_BATTERIES = """
+SELECT of, sources, charges, first.begin_unix_s + 60 * first.begin_offset_min,
+last.begin_unix_s + 60 * last.begin_offset_min, ah, wh, last.soh_pct
+FROM (
+    SELECT battery AS of, group_concat(DISTINCT battery_source) AS sources, count(*) AS charges,
+    min(id) AS first_id, max(id) AS last_id, sum(charger_ah) AS ah, sum(charger_wh) AS wh
+    FROM charges GROUP BY battery
+) JOIN charges AS first ON first.id = first_id JOIN charges AS last ON last.id = last_id
+ORDER BY last_id DESC
+"""
 #: As many whole records are read at once.
 CHUNK = 500
+
+
+class Battery(NamedTuple):
+    """What the charges of one battery come to."""
+
+    id: str
+    sources: str  #: where the id is from: names with commas between
+    charges: int
+    first_s: float  #: when its first charge began, and its last, by the station's clock
+    last_s: float
+    ah: float
+    wh: float
+    soh_pct: float | None  #: as its BMU said last
 
 
 class Charges:
@@ -56,6 +81,10 @@ class Charges:
         asked = "SELECT id FROM charges WHERE substr(id, -length(?1)) = ?1 ORDER BY id DESC LIMIT 1"
         found = self._db.execute(asked, (end,)).fetchone()
         return None if found is None else str(found[0])
+
+    def batteries(self) -> Iterator[Battery]:
+        """All that have been charged; that of the newest charge first."""
+        return (Battery(*row) for row in self._db.execute(_BATTERIES))
 
     def bays(self) -> list[str]:
         """All that have had a charge."""

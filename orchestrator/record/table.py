@@ -5,7 +5,7 @@ import io
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from orchestrator.columns import aligned, beside, folded, width_of
+from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain
 from orchestrator.record.lines import Record
@@ -94,15 +94,15 @@ def lasted(seconds: float) -> str:
     return f"{minutes} min" if minutes else f"{int(seconds)} s"
 
 
-def values(charge: Record) -> str:
-    """The measured values, in a table."""
+def value_rows(charge: Record) -> list[tuple[str, ...]]:
+    """The measured values, as a table with its head; none if nothing was known."""
     known = charge.get("values") or {}
     rows = [
         (name, *(f"{one[part]:g}" for part in ("begin", "end", "lowest", "highest")))
         for name, one in known.items()
         if one
     ]
-    return aligned([VALUES_HEAD, *rows])
+    return [VALUES_HEAD, *rows] if rows else []
 
 
 #: The columns of the CSV: name → where it is in a record.

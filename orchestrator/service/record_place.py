@@ -53,6 +53,15 @@ def readable(folder: Path) -> Iterator[None]:
         raise CauseError(Cause.of("charges_unreadable", folder=str(folder), error=str(error.strerror))) from None
 
 
+def write_page(file: Path, page: str) -> None:
+    """Write it, and say where."""
+    try:
+        file.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise CauseError(Cause.of("page_not_written", file=str(file), error=str(error.strerror))) from None
+    sys.stdout.write(f"{file}\n")
+
+
 def tell(cause: Cause) -> None:
     """Beside the answer."""
     sys.stderr.write(f"orchestrator: {say(cause, own_language())}\n")

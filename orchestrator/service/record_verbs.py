@@ -1,4 +1,4 @@
-"""The verbs of the record of charges: list and show them, report a month.
+"""The verbs of the record of charges: list and show them, the life of a battery, a month.
 
 Each imports its dependencies when it runs, so that none waits for another's libraries.
 """
@@ -8,8 +8,9 @@ from pathlib import Path
 
 
 def add_record_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """`sessions` and `report`."""
+    """`sessions`, `battery` and `report`."""
     _add_sessions(verbs)
+    _add_battery(verbs)
     _add_report(verbs)
 
 
@@ -19,6 +20,7 @@ def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         "words", nargs="*", metavar="show ID|rebuild",
         help="'show ID': everything about one charge; the end of its id will do. 'rebuild': build the index anew",
     )  # fmt: skip
+    sessions.add_argument("--html", type=Path, metavar="FILE", help="of 'show': write a web page that needs no network")
     sessions.add_argument("--bay", action="append", default=[], help="only of this bay: a name or a pattern")
     sessions.add_argument("--battery", metavar="ID", help="only of this battery")
     sessions.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
@@ -30,6 +32,15 @@ def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     form.add_argument("--json", action="store_true", help="the records, for programs")
     _add_journal(sessions)
     sessions.set_defaults(run=_sessions)
+
+
+def _add_battery(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    battery = verbs.add_parser("battery", help="list the batteries that were charged, or show the life of one")
+    battery.add_argument("battery", nargs="?", metavar="ID", help="the life of this one")
+    battery.add_argument("--limit", type=int, metavar="N", help="its newest N charges; 0: all (default: 50)")
+    battery.add_argument("--json", action="store_true", help="for programs")
+    _add_journal(battery)
+    battery.set_defaults(run=_battery)
 
 
 def _add_report(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -50,6 +61,12 @@ def _sessions(arguments: argparse.Namespace) -> int:
     from orchestrator.service.sessions_verb import sessions
 
     return sessions(arguments)
+
+
+def _battery(arguments: argparse.Namespace) -> int:
+    from orchestrator.service.battery_verb import battery
+
+    return battery(arguments)
 
 
 def _report(arguments: argparse.Namespace) -> int:

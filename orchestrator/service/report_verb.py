@@ -1,16 +1,15 @@
 """`orchestrator report`: a month of charges."""
 
 import argparse
-from pathlib import Path
 
 from orchestrator.columns import own_width
-from orchestrator.errors import CauseError, UsageError
+from orchestrator.errors import UsageError
 from orchestrator.model import Cause
 from orchestrator.record.charges import Charges
 from orchestrator.record.report import MONTH, is_of, report, span_s
 from orchestrator.record.sections import as_page, as_text
 from orchestrator.record.table import began
-from orchestrator.service.record_place import charges_of, journal_of
+from orchestrator.service.record_place import charges_of, journal_of, write_page
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
 
@@ -37,12 +36,3 @@ def report_month(arguments: argparse.Namespace) -> int:
 def _newest(charges: Charges) -> str | None:
     """The month in which the newest charge began."""
     return next((month for charge in charges.listed(limit=1) if (month := began(charge)[:7])), None)
-
-
-def write_page(file: Path, page: str) -> None:
-    """Write it, and say where."""
-    try:
-        file.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise CauseError(Cause.of("page_not_written", file=str(file), error=str(error.strerror))) from None
-    print(file)

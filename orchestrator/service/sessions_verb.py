@@ -3,16 +3,16 @@
 import argparse
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from orchestrator.columns import json_text, own_width
 from orchestrator.errors import CauseError, UsageError
 from orchestrator.model import Cause
 from orchestrator.record.charges import Charges
 from orchestrator.record.lines import Record
-from orchestrator.record.shown import shown
 from orchestrator.record.table import as_csv, table
 from orchestrator.record.utc import unix_s
+from orchestrator.service.charge_verb import show
 from orchestrator.service.chosen import choose
 from orchestrator.service.record_place import charges_of, journal_of
 from orchestrator.service.timespan import moment
@@ -29,11 +29,12 @@ def sessions(arguments: argparse.Namespace) -> int:
         case []:
             return _list(arguments)
         case ["show", end] if not arguments.csv:
-            return _show(arguments, end)
+            return show(arguments, end)
         case ["rebuild"]:
             return _rebuild(arguments)
     raise UsageError(
-        f"sessions {' '.join(arguments.words)}: expected 'sessions', 'sessions show ID [--json]' or 'sessions rebuild'"
+        f"sessions {' '.join(arguments.words)}: expected 'sessions', 'sessions show ID [--json | --html FILE]' or "
+        "'sessions rebuild'"
     )
 
 
@@ -77,23 +78,6 @@ def _print_json(records: Iterator[Record]) -> None:
         sys.stdout.write(f"{separator}{json_text(record)}")
         separator = ",\n "
     print("[]" if separator == "[" else "]")
-
-
-def _show(arguments: argparse.Namespace, end: str) -> int:
-    """One charge; the end of its id will do."""
-    with charges_of(journal_of("sessions", arguments.journal)) as charges:
-        charge = named(charges, end)
-    print(json_text(charge) if arguments.json else shown(charge, own_language(), own_width()))
-    return 0
-
-
-def named(charges: Charges, end: str) -> Record:
-    """The whole record of the newest charge whose id ends so."""
-    id_ = charges.named(end.upper()) if end else None
-    found: Sequence[Record] = list(charges.whole([id_])) if id_ is not None else []
-    if not found:
-        raise CauseError(Cause.of("charge_unknown", id=f"{end:.40}"))
-    return found[0]
 
 
 def _rebuild(arguments: argparse.Namespace) -> int:

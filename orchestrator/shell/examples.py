@@ -24,6 +24,10 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ("sessions show 4QZ7", "one of them: the end of its id will do"),
         ("sessions --bay bay-2 --limit 10 --csv", "the last ten of a bay, for a spreadsheet"),
     ),
+    "battery": (
+        ("battery", "each battery that was charged, and where its id is from"),
+        ("battery B-0042", "its life: charges, amounts, faults"),
+    ),
     "report": (
         ("report", "the month of the newest charge"),
         ("report --month 2026-11 --html november.html", "a page to be sent"),

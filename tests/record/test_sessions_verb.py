@@ -112,8 +112,8 @@ def test_an_empty_record_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.mark.parametrize(
     ("arguments", "status", "expected"),
     [
-        (("show",), 2, "expected 'sessions', 'sessions show ID [--json]' or"),
-        (("list",), 2, "expected 'sessions', 'sessions show ID [--json]' or"),
+        (("show",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]' or"),
+        (("list",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]' or"),
         (("show", "0000"), 1, "no charge on record has an id that ends with 0000"),
         (("--limit", "-1"), 2, "--limit -1: expected the number of charges"),
         (("--since", "yesterday"), 2, "--since yesterday: expected 90min"),
