@@ -4,23 +4,29 @@ Each imports its dependencies when it runs, so that none waits for another's lib
 """
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 
+#: Journal, other policy, bay, from when, to when → exit status.
+Replay = Callable[[Path, str | None, str, str, str], int]
 
-def add_record_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+
+def add_record_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]", replay: Replay) -> None:
     """`sessions`, `battery` and `report`."""
-    _add_sessions(verbs)
+    _add_sessions(verbs, replay)
     _add_battery(verbs)
     _add_report(verbs)
 
 
-def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]", replay: Replay) -> None:
     sessions = verbs.add_parser("sessions", help="list the charges on record: how much, how long, and why they ended")
     sessions.add_argument(
-        "words", nargs="*", metavar="show ID|rebuild",
-        help="'show ID': everything about one charge; the end of its id will do. 'rebuild': build the index anew",
+        "words", nargs="*", metavar="show ID|replay ID|rebuild",
+        help="'show ID': everything about one charge; the end of its id will do. 'replay ID': decide it again from the "
+        "journal. 'rebuild': build the index anew",
     )  # fmt: skip
     sessions.add_argument("--html", type=Path, metavar="FILE", help="of 'show': write a web page that needs no network")
+    sessions.add_argument("--policy", metavar="FILE", help="of 'replay': show what this policy would have decided")
     sessions.add_argument("--bay", action="append", default=[], help="only of this bay: a name or a pattern")
     sessions.add_argument("--battery", metavar="ID", help="only of this battery")
     sessions.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
@@ -31,7 +37,7 @@ def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     form.add_argument("--csv", action="store_true", help="for a spreadsheet")
     form.add_argument("--json", action="store_true", help="the records, for programs")
     _add_journal(sessions)
-    sessions.set_defaults(run=_sessions)
+    sessions.set_defaults(run=_sessions, replay=replay)
 
 
 def _add_battery(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

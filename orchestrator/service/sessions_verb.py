@@ -12,7 +12,7 @@ from orchestrator.record.charges import Charges
 from orchestrator.record.lines import Record
 from orchestrator.record.table import as_csv, table
 from orchestrator.record.utc import unix_s
-from orchestrator.service.charge_verb import show
+from orchestrator.service.charge_verb import charge_named, show, stretch
 from orchestrator.service.chosen import choose
 from orchestrator.service.record_place import charges_of, journal_of
 from orchestrator.service.timespan import moment
@@ -30,11 +30,13 @@ def sessions(arguments: argparse.Namespace) -> int:
             return _list(arguments)
         case ["show", end] if not arguments.csv:
             return show(arguments, end)
+        case ["replay", end]:
+            return _replay(arguments, end)
         case ["rebuild"]:
             return _rebuild(arguments)
     raise UsageError(
-        f"sessions {' '.join(arguments.words)}: expected 'sessions', 'sessions show ID [--json | --html FILE]' or "
-        "'sessions rebuild'"
+        f"sessions {' '.join(arguments.words)}: expected 'sessions', 'sessions show ID [--json | --html FILE]', "
+        "'sessions replay ID [--policy FILE]' or 'sessions rebuild'"
     )
 
 
@@ -78,6 +80,13 @@ def _print_json(records: Iterator[Record]) -> None:
         sys.stdout.write(f"{separator}{json_text(record)}")
         separator = ",\n "
     print("[]" if separator == "[" else "]")
+
+
+def _replay(arguments: argparse.Namespace, end: str) -> int:
+    """Decide one charge again; 1 if a decision is not as recorded."""
+    journal = journal_of("sessions", arguments.journal)
+    charge = charge_named(journal, end)
+    return int(arguments.replay(journal, arguments.policy, charge["bay"], *stretch(charge)))
 
 
 def _rebuild(arguments: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.errors import UsageError
-from orchestrator.service.record_verbs import add_record_verbs
+from orchestrator.service.record_verbs import Replay, add_record_verbs
 
 REQUESTS = {
     "start": "let a bay charge (again) after a stop, a pause or a reset",
@@ -21,8 +21,8 @@ REQUESTS = {
 NAMES = "names, or patterns such as 'bay-0*'"
 
 
-def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """`run`, `status`, `history`, the record of charges, and the requests."""
+def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]", replay: Replay) -> None:
+    """`run`, `status`, `history`, the record of charges, and the requests; `replay` decides a stretch of time again."""
     run = verbs.add_parser("run", help="run the service for a station until told to end")
     run.add_argument("station", nargs="?", help="the station file (default: station.yaml)")
     run.set_defaults(run=_run)
@@ -39,7 +39,7 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
     _add_socket(status)
     status.set_defaults(run=_status)
     _add_history(verbs)
-    add_record_verbs(verbs)
+    add_record_verbs(verbs, replay)
     for verb, about in REQUESTS.items():
         request = verbs.add_parser(verb, help=about)
         request.add_argument("bay", nargs="*", help=f"the bays: {NAMES}")

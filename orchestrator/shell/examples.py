@@ -22,6 +22,8 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
     "sessions": (
         ("sessions --since 7d", "the charges of a week"),
         ("sessions show 4QZ7", "one of them: the end of its id will do"),
+        ("sessions show 4QZ7 --html charge.html", "the same with its curve, as a web page"),
+        ("sessions replay 4QZ7 --policy my-policy.yaml", "what another policy would have decided in it"),
         ("sessions --bay bay-2 --limit 10 --csv", "the last ten of a bay, for a spreadsheet"),
     ),
     "battery": (

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -112,8 +113,8 @@ def test_an_empty_record_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.mark.parametrize(
     ("arguments", "status", "expected"),
     [
-        (("show",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]' or"),
-        (("list",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]' or"),
+        (("show",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]', 'sessions replay ID"),
+        (("list",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]', 'sessions replay ID"),
         (("show", "0000"), 1, "no charge on record has an id that ends with 0000"),
         (("--limit", "-1"), 2, "--limit -1: expected the number of charges"),
         (("--since", "yesterday"), 2, "--since yesterday: expected 90min"),
@@ -127,3 +128,30 @@ def test_wrong_use_says_what_is_expected(
 
 def test_a_journal_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "there is no such directory" in said(capsys, "--journal", str(tmp_path / "no"), status=2)
+
+
+def test_one_charge_is_decided_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LC_ALL", "C.UTF-8")
+    kept = Kept(tmp_path)
+    monkeypatch.setattr("orchestrator.service.bay.time", kept.wall)
+    for _ in range(2):
+        kept.bench.battery.values["soc_pct"] = 50.0
+        kept.bench.charging()
+        kept.bench.battery.values["soc_pct"] = 100.0
+        kept.bench.until(State.FULL)
+        kept.recorder.turn()
+    kept.bench.journal._write()
+    place = str(tmp_path)
+    _, first = (one["id"] for one in json.loads(said(capsys, "--json", "--journal", place)))
+    again = re.search(
+        r"^bay-1: (\d+) decisions in .* all as recorded", said(capsys, "replay", first, "--journal", place)
+    )
+    assert main(["replay", place]) == 0
+    all_ = re.search(r"^bay-1: (\d+) decisions", capsys.readouterr().out)
+    assert again is not None
+    assert all_ is not None
+    assert 10 < int(again[1]) < int(all_[1]) * 0.7
+    other = said(capsys, "replay", first, "--policy", "long-life-48v", "--journal", place)
+    assert re.search(r"^bay-1: \d+ decisions, \d+ differences? \(.* → long-life-48v\)", other, re.MULTILINE)
