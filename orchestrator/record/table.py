@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -18,6 +19,8 @@ LEAST_WHY = 24
 DASH = "–"
 #: A spreadsheet in Korean takes UTF-8 for what it is only behind this.
 BOM = "\ufeff"
+#: What a spreadsheet takes for a formula, and for a number or a date.
+FORMULA, LIKE_NUMBER = ("=", "+", "-", "@", "\t", "\r"), re.compile(r"[\s.,:/]*\d[\d\s.,:/%eE+-]*")
 VALUES_HEAD = ("", "BEGIN", "END", "LOWEST", "HIGHEST")
 
 
@@ -139,5 +142,7 @@ def _found(charge: Record, path: Sequence[str]) -> Any:  # noqa: ANN401 - whatev
 
 
 def _guarded(value: object) -> object:
-    """A name from a file is no formula."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+    """A name from a file is no formula, no number and no date: 0042 stays that, and 1E5, and 1-2."""
+    if not isinstance(value, str):
+        return value
+    return f"'{value}" if value.startswith(FORMULA) or LIKE_NUMBER.fullmatch(value) else value
