@@ -12,7 +12,6 @@ from orchestrator.record.charges import Charges
 from orchestrator.record.lines import Record
 from orchestrator.record.table import as_csv, table
 from orchestrator.record.utc import unix_s
-from orchestrator.service.charge_verb import charge_named, show, stretch
 from orchestrator.service.chosen import choose
 from orchestrator.service.record_place import charges_of, journal_of
 from orchestrator.service.timespan import moment
@@ -29,6 +28,8 @@ def sessions(arguments: argparse.Namespace) -> int:
         case []:
             return _list(arguments)
         case ["show", end] if not arguments.csv:
+            from orchestrator.service.charge_verb import show  # a list does not wait for what it needs
+
             return show(arguments, end)
         case ["replay", end]:
             return _replay(arguments, end)
@@ -84,6 +85,8 @@ def _print_json(records: Iterator[Record]) -> None:
 
 def _replay(arguments: argparse.Namespace, end: str) -> int:
     """Decide one charge again; 1 if a decision is not as recorded."""
+    from orchestrator.service.charge_verb import charge_named, stretch
+
     journal = journal_of("sessions", arguments.journal)
     charge = charge_named(journal, end)
     return int(arguments.replay(journal, arguments.policy, charge["bay"], *stretch(charge)))

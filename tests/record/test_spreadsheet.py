@@ -17,7 +17,7 @@ TABLE, TEXT, OFFICE = (f"{{urn:oasis:names:tc:opendocument:xmlns:{name}:1.0}}" f
 #: Ids of batteries that a spreadsheet might take for something else.
 NAMES = ("B-0042", "0042", "1E5", "1-2", "=1+1", 'B "x", y', "배터리")
 SECONDS = 100.0
-#: Comma, double quote, UTF-8, as its dialog proposes for a file with a byte order mark. Without a dialog it does not look.
+#: Comma, double quote, UTF-8: its dialog proposes that because of the byte order mark. Without a dialog nothing looks.
 FILTER = "--infilter=CSV:44,34,76"
 
 
