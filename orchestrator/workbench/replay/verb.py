@@ -36,11 +36,11 @@ def replay(
     `since`, `until`: only decisions between these times (RFC 3339, UTC). `jobs`: as many processes share the bays.
     Raises ConfigError if journals or policy cannot be read, OrchestratorError if nothing is recorded.
     """
-    paths, other = tuple(journals), load_policy(policy) if policy else None
+    paths, other, span = tuple(journals), load_policy(policy) if policy else None, Span(since, until)
     recorded = bays_in(paths)
     chosen = sorted(set(bays) or recorded)
     shares = [share for number in range(jobs) if (share := chosen[number::jobs])]
-    results = _all_shares(paths, other, shares, Span(since, until))
+    results = _all_shares(paths, other, shares, span)
     broken = sorted({finding for result in results for finding in result.broken})
     if broken:
         lines = "1 line cannot be read and is" if len(broken) == 1 else f"{len(broken)} lines cannot be read and are"
@@ -52,10 +52,8 @@ def replay(
     found = {outcome.bay: outcome for result in results for outcome in result.outcomes}
     missing = [name for name in chosen if name not in found]
     if (missing and bays) or not found:
-        since_then = f" since {since}" if since else ""
-        since_then += f" until {until}" if until else ""
         raise OrchestratorError(
-            f"nothing is recorded of {', '.join(missing) or 'any bay'}{since_then} "
+            f"nothing is recorded of {', '.join(missing) or 'any bay'}{span} "
             f"(recorded: {', '.join(sorted(recorded)) or 'none'}): "
             "snapshots need journal.snapshots in the station file"
         )
@@ -77,6 +75,9 @@ class Span:
 
     since: str
     until: str
+
+    def __str__(self) -> str:
+        return "".join(f" {word} {time}" for word, time in (("since", self.since), ("until", self.until)) if time)
 
 
 @dataclass(frozen=True, slots=True)
