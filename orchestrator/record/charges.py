@@ -23,7 +23,7 @@ FROM (
 ORDER BY last_id DESC
 """
 #: As many whole records are read at once.
-CHUNK = 500
+CHUNK = 1000
 
 
 class Battery(NamedTuple):

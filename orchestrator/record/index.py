@@ -104,18 +104,22 @@ def _refresh(folder: Path, say: Say) -> None:
             if changed(db, folder):
                 _update(db, folder)
             return
-    except AnotherFileError:
+    except (AnotherFileError, UselessError):
         pass
-    except (sqlite3.DatabaseError, UselessError) as error:
-        if _is_damage(error) and path.exists():
+    except sqlite3.DatabaseError as error:
+        if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
+            raise BusyError from None  # a list is being read
+        if _is_damage(error):
             path.replace(folder / DAMAGED)
             say(Cause.of("index_damaged", file=str(folder / DAMAGED), error=str(error)))
+        elif path.exists():
+            raise
     _rebuild(folder)
 
 
-def _is_damage(error: Exception) -> bool:
-    """Whether the index itself is the trouble, and not the disk or another process."""
-    return isinstance(error, sqlite3.DatabaseError) and not isinstance(error, sqlite3.OperationalError)
+def _is_damage(error: sqlite3.DatabaseError) -> bool:
+    """Whether the index itself is the trouble, and not the disk; a table that is missing is damage, too."""
+    return not isinstance(error, sqlite3.OperationalError) or error.sqlite_errorcode == sqlite3.SQLITE_ERROR
 
 
 def _rebuild(folder: Path) -> None:
@@ -188,6 +192,8 @@ def _check(db: sqlite3.Connection) -> None:
     """UselessError if it is of another version, sqlite3.DatabaseError if it is damaged."""
     found = db.execute("PRAGMA quick_check(1)").fetchone()[0]
     if found != "ok":
-        raise sqlite3.DatabaseError(found)
+        error = sqlite3.DatabaseError(found)
+        error.sqlite_errorcode = sqlite3.SQLITE_CORRUPT
+        raise error
     if db.execute("PRAGMA user_version").fetchone()[0] != VERSION:
         raise UselessError

@@ -45,8 +45,8 @@ def changed(db: Connection, folder: Path) -> bool:
     """Whether the files have anything that the tables lack. AnotherFileError if the tables have what no file has."""
     known, present = _known(db), files(path.name for path in folder.iterdir())
     for name, read in known.items():
-        gone = name not in present
-        if gone and not (f"{name}.gz" in present and is_same(read, folder / f"{name}.gz")):
+        gone, packed = name not in present, f"{name}.gz"
+        if gone and (packed not in present or packed in known or not is_same(read, folder / packed)):
             raise AnotherFileError
         if not gone and not is_continued(folder / name, read):
             raise AnotherFileError

@@ -117,6 +117,18 @@ def test_a_month_that_is_packed_is_not_read_again(folder: Folder, monkeypatch: p
     assert folder.dump() == folder.rebuilt()
 
 
+def test_a_month_that_is_seen_while_it_is_packed_is_there_once(folder: Folder) -> None:
+    folder.add(NOVEMBER, begin(1), end(1, 1, ah=1.0))
+    folder.charges()
+    data = (folder.path / NOVEMBER).read_bytes()
+    folder.pack(NOVEMBER)
+    (folder.path / NOVEMBER).write_bytes(data)
+    assert folder.listed() == [(id_of(1), "end", 1.0)]
+    (folder.path / NOVEMBER).unlink()
+    assert folder.listed() == [(id_of(1), "end", 1.0)]
+    assert folder.dump() == folder.rebuilt()
+
+
 def test_a_month_that_is_gone_takes_its_charges_with_it(folder: Folder) -> None:
     folder.add(NOVEMBER, begin(1), end(1, 1), begin(2))
     folder.add(DECEMBER, checkpoint(2, 1, ah=4.0), begin(3))
@@ -222,6 +234,30 @@ def test_while_another_one_writes_what_is_there_is_read(folder: Folder, monkeypa
         assert folder.listed() == [(id_of(1), "end", 3.0)]
         with pytest.raises(index.BusyError):
             index.rebuilt(folder.path)
+
+
+def test_a_list_that_is_still_read_keeps_nobody_from_the_newest(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(index, "PAUSE_S", 0.0)
+    monkeypatch.setattr(index, "_rebuild", lambda _: pytest.fail("it was built anew"))
+    index._built(str(folder.path / index.NAME), folder.path).close()
+    folder.add(NOVEMBER, *(end(number, 1) for number in range(300)))
+    reading = folder.charges().listed()
+    next(reading)
+    folder.add(NOVEMBER, end(300, 1))
+    assert len(folder.listed()) == 301
+    assert len(list(reading)) == 299
+    assert folder.said == []
+
+
+def test_an_index_without_its_tables_is_damaged(folder: Folder) -> None:
+    folder.add(NOVEMBER, begin(1))
+    folder.charges()
+    with sqlite3.connect(folder.path / index.NAME) as db:
+        db.execute("DROP TABLE files")
+    assert len(folder.listed()) == 1
+    assert folder.said == ["index_damaged"]
 
 
 def test_a_disk_that_is_full_costs_the_index_and_not_the_answer(
