@@ -107,8 +107,6 @@ def _refresh(folder: Path, say: Say) -> None:
     except (AnotherFileError, UselessError):
         pass
     except sqlite3.DatabaseError as error:
-        if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
-            raise BusyError from None  # a list is being read
         if _is_damage(error):
             path.replace(folder / DAMAGED)
             say(Cause.of("index_damaged", file=str(folder / DAMAGED), error=str(error)))
@@ -118,7 +116,7 @@ def _refresh(folder: Path, say: Say) -> None:
 
 
 def _is_damage(error: sqlite3.DatabaseError) -> bool:
-    """Whether the index itself is the trouble, and not the disk; a table that is missing is damage, too."""
+    """Whether the index itself is the trouble, and not the disk or a reader; a table that is missing is damage, too."""
     return not isinstance(error, sqlite3.OperationalError) or error.sqlite_errorcode == sqlite3.SQLITE_ERROR
 
 

@@ -126,7 +126,25 @@ def test_a_month_that_is_seen_while_it_is_packed_is_there_once(folder: Folder) -
     assert folder.listed() == [(id_of(1), "end", 1.0)]
     (folder.path / NOVEMBER).unlink()
     assert folder.listed() == [(id_of(1), "end", 1.0)]
+    assert folder.said == []
     assert folder.dump() == folder.rebuilt()
+
+
+@pytest.mark.parametrize("order", [(NOVEMBER, DECEMBER), (DECEMBER, NOVEMBER)])
+@pytest.mark.parametrize("record", [begin(1), end(1, 1, ah=2.0)], ids=["begin", "end"])
+def test_the_same_record_in_two_files_is_one(folder: Folder, order: Sequence[str], record: Record) -> None:
+    for name in order:
+        folder.add(name, record)
+        assert len(folder.listed()) == 1
+    assert folder.dump() == folder.rebuilt()
+
+
+def test_a_line_is_read_once_it_is_whole(folder: Folder) -> None:
+    line = encoded(end(1, 1, ah=2.0))
+    for part in (line[:200], line[200:-1], b"\n"):
+        assert folder.listed() == []
+        folder.add(NOVEMBER, part)
+    assert folder.listed() == [(id_of(1), "end", 2.0)]
 
 
 def test_a_month_that_is_gone_takes_its_charges_with_it(folder: Folder) -> None:

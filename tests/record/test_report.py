@@ -24,9 +24,9 @@ def _journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("LC_ALL", "C.UTF-8")
     (tmp_path / "sessions").mkdir()
     records = [
-        end(1, 3, 10.0), end(2, 6, 20.0, bay="bay-2", battery="B-2"), grave(end(3, 1, 1.0, HOT)),
+        end(1, 3, 10.0), end(2, 6, 20.0, bay="bay-2", battery="<B-2>"), grave(end(3, 1, 1.0, HOT)),
         begin(56), checkpoint(56, 1, 5.0),
-        end(58, 1, 7.0),
+        grave(end(58, 1, 7.0, battery="<B-3>")),
     ]  # fmt: skip
     (tmp_path / "sessions" / "2026-11.jsonl").write_bytes(b"".join(map(encoded, records)))
     return tmp_path
@@ -61,7 +61,7 @@ def test_it_says_how_charges_ended_and_which_battery_to_look_at(
         ["1", "over_temperature"],
     ]
     assert "B-1  faults stopped its charges, 2 in all: hot_trip" in page
-    assert "B-2  " not in page
+    assert "<B-2>  " not in page
 
 
 def test_it_is_a_page_that_needs_nothing_else(
@@ -75,6 +75,8 @@ def test_it_is_a_page_that_needs_nothing_else(
     assert "점검이 필요한 배터리" in page
     assert "<td>36.0</td>" in page
     assert "http" not in page
+    assert main(["report", "--month", "2026-12", "--html", str(file), "--journal", str(journal)]) == 0
+    assert "<td>&lt;B-3&gt;</td>" in file.read_text(encoding="utf-8")
 
 
 def test_it_fits_a_terminal(journal: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,10 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.columns import width_of
 from orchestrator.model import Request, State
+from orchestrator.record import index
+from orchestrator.record.lines import encoded
 from tests.record.kept import Kept
+from tests.record.made import end
 
 
 @pytest.fixture(name="journal")
@@ -155,3 +158,28 @@ def test_one_charge_is_decided_again(
     assert 10 < int(again[1]) < int(all_[1]) * 0.7
     other = said(capsys, "replay", first, "--policy", "long-life-48v", "--journal", place)
     assert re.search(r"^bay-1: \d+ decisions, \d+ differences? \(.* → long-life-48v\)", other, re.MULTILINE)
+
+
+def test_the_usual_table_is_the_newest_fifty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LC_ALL", "C.UTF-8")
+    (tmp_path / "sessions").mkdir()
+    records = b"".join(encoded(end(number, 1)) for number in range(60))
+    (tmp_path / "sessions" / "2026-11.jsonl").write_bytes(records)
+
+    def lines(*arguments: str) -> list[str]:
+        return said(capsys, "--journal", str(tmp_path), *arguments).splitlines()
+
+    assert len(lines()) == 52
+    assert lines()[-1] == "the newest 50 of 60; --limit 0 lists all"
+    assert len(lines("--limit", "0")) == len(lines("--since", "2026-11-01")) == len(lines("--csv")) == 61
+
+
+def test_the_index_is_built_anew_when_asked(
+    journal: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert said(capsys, "rebuild", "--journal", str(journal)) == "index built anew; charges: 3\n"
+    monkeypatch.setattr(index, "PAUSE_S", 0.0)
+    with index._locked(journal / "sessions"):
+        assert "another command is building the index" in said(capsys, "rebuild", "--journal", str(journal), status=1)
