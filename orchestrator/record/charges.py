@@ -89,6 +89,3 @@ class Charges:
     def bays(self) -> list[str]:
         """All that have had a charge."""
         return [bay for (bay,) in self._db.execute("SELECT DISTINCT bay FROM charges ORDER BY bay")]
-
-    def __len__(self) -> int:
-        return int(self._db.execute("SELECT count(*) FROM charges").fetchone()[0])

@@ -49,14 +49,14 @@ def opened(folder: Path, say: Say) -> sqlite3.Connection:
 
 
 def _opened(folder: Path, say: Say) -> sqlite3.Connection:
-    why = os.strerror(errno.EACCES)
+    why: object = os.strerror(errno.EACCES)
     if os.access(folder, os.W_OK):
         try:
             with _locked(folder):
                 _refresh(folder, say)
             return _connected(folder / NAME, "ro")
         except BusyError:
-            pass
+            why = Cause("index_being_built")
         except FileNotFoundError:
             raise
         except (OSError, sqlite3.Error) as error:
@@ -65,8 +65,9 @@ def _opened(folder: Path, say: Say) -> sqlite3.Connection:
         db = _connected(folder / NAME, "ro")
         _check(db)
     except (UselessError, sqlite3.Error):
+        built = _built(":memory:", folder)
         say(Cause.of("index_not_written", folder=str(folder), error=why))
-        return _built(":memory:", folder)
+        return built
     return _current(db, folder)
 
 

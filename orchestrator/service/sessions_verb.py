@@ -54,9 +54,11 @@ def _list(arguments: argparse.Namespace) -> int:
         if arguments.csv:
             sys.stdout.writelines(as_csv(_meant(charges, arguments, since), language))
             return 0
-        found = list(_meant(charges, arguments, since, USUAL))
-        print(table(found, language, own_width()) if found else say(Cause("charges_none"), language))
-        _say_more(charges, arguments, since, len(found))
+        found = list(_meant(charges, arguments, since, USUAL + 1))
+    shown = found if arguments.limit is not None or since else found[:USUAL]
+    print(table(shown, language, own_width()) if found else say(Cause("charges_none"), language))
+    if len(shown) < len(found):
+        print(say(Cause.of("charges_more", shown=USUAL), language))
     return 0
 
 
@@ -66,12 +68,6 @@ def _meant(charges: Charges, arguments: argparse.Namespace, since: str, usual: i
     return charges.listed(
         bays=bays, battery=arguments.battery, since_s=unix_s(since) if since else None, limit=limit or None
     )
-
-
-def _say_more(charges: Charges, arguments: argparse.Namespace, since: str, shown_count: int) -> None:
-    """That there are more than the usual number."""
-    if arguments.limit is None and not since and shown_count == USUAL and len(charges) > USUAL:
-        print(say(Cause.of("charges_more", shown=USUAL, charges=len(charges)), own_language()))
 
 
 def _print_json(records: Iterator[Record]) -> None:
@@ -98,18 +94,16 @@ def _rebuild(arguments: argparse.Namespace) -> int:
 
     from orchestrator.record.index import BusyError, rebuilt
     from orchestrator.record.months import FOLDER
-    from orchestrator.service.record_place import readable
 
     folder = journal_of("sessions", arguments.journal) / FOLDER
     if not folder.exists():
         print(say(Cause("charges_none"), own_language()))
         return 0
     try:
-        with readable(folder):
-            count = rebuilt(folder)
+        count = rebuilt(folder)
     except BusyError:
         raise CauseError(Cause("index_busy")) from None
-    except Error as error:
-        raise CauseError(Cause.of("charges_unreadable", folder=str(folder), error=str(error))) from None
+    except (OSError, Error) as error:
+        raise CauseError(Cause.of("index_failed", folder=str(folder), error=str(error))) from None
     print(say(Cause.of("index_rebuilt", charges=count), own_language()))
     return 0

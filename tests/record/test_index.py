@@ -252,6 +252,10 @@ def test_while_another_one_writes_what_is_there_is_read(folder: Folder, monkeypa
         assert folder.listed() == [(id_of(1), "end", 3.0)]
         with pytest.raises(index.BusyError):
             index.rebuilt(folder.path)
+        assert folder.said == []
+        (folder.path / index.NAME).unlink()
+        assert len(folder.listed()) == 1
+        assert folder.said == ["index_not_written"]
 
 
 def test_a_list_that_is_still_read_keeps_nobody_from_the_newest(

@@ -172,7 +172,8 @@ def test_the_usual_table_is_the_newest_fifty(
         return said(capsys, "--journal", str(tmp_path), *arguments).splitlines()
 
     assert len(lines()) == 52
-    assert lines()[-1] == "the newest 50 of 60; --limit 0 lists all"
+    assert lines()[-1] == "the newest 50; there are more: --limit 0 lists all"
+    assert len(lines("--limit", "50")) == 51
     assert len(lines("--limit", "0")) == len(lines("--since", "2026-11-01")) == len(lines("--csv")) == 61
 
 
@@ -183,3 +184,5 @@ def test_the_index_is_built_anew_when_asked(
     monkeypatch.setattr(index, "PAUSE_S", 0.0)
     with index._locked(journal / "sessions"):
         assert "another command is building the index" in said(capsys, "rebuild", "--journal", str(journal), status=1)
+    (journal / "sessions" / index.NEW).mkdir()
+    assert "no index can be built in" in said(capsys, "rebuild", "--journal", str(journal), status=1)

@@ -9,7 +9,7 @@ TEXTS: Mapping[str, str] = {
     # the charges on record
     "charge_open": "not ended",
     "charges_none": "no charge on record",
-    "charges_more": "the newest {shown} of {charges}; --limit 0 lists all",
+    "charges_more": "the newest {shown}; there are more: --limit 0 lists all",
     "charges_unreadable": "{folder} cannot be read: {error}",
     "charge_unknown": "no charge on record has an id that ends with {id}",
     "charge_of": "charge {id}: {bay}, {station}",
@@ -69,6 +69,8 @@ TEXTS: Mapping[str, str] = {
     "index_damaged": "the index of the records was damaged ({error}): it is kept as {file}, and a new one was built",
     "index_not_written": "no index could be written in {folder} ({error}): each record was read instead, which takes "
     "longer the more there are",
+    "index_being_built": "another command is building it",
+    "index_failed": "no index can be built in {folder}: {error}",
     "index_busy": "another command is building the index: wait until it has finished, then try again",
     "index_rebuilt": "index built anew; charges: {charges}",
 }

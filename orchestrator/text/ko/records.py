@@ -9,7 +9,7 @@ TEXTS: Mapping[str, str] = {
     # the charges on record
     "charge_open": "종료되지 않음",
     "charges_none": "충전 기록이 없습니다",
-    "charges_more": "{charges}건 중 최근 {shown}건; 모두 보려면 --limit 0",
+    "charges_more": "최근 {shown}건입니다. 모두 보려면 --limit 0",
     "charges_unreadable": "{folder}을(를) 읽을 수 없습니다: {error}",
     "charge_unknown": "ID가 {id}(으)로 끝나는 충전 기록이 없습니다",
     "charge_of": "충전 {id}: {bay}, {station}",
@@ -68,6 +68,8 @@ TEXTS: Mapping[str, str] = {
     # the index
     "index_damaged": "기록의 색인이 손상되어({error}) {file}(으)로 옮겨 두고 새로 만들었습니다",
     "index_not_written": "{folder}에 색인을 쓸 수 없어({error}) 모든 기록을 직접 읽었습니다. 기록이 많을수록 오래 걸립니다",
+    "index_being_built": "다른 명령이 만들고 있습니다",
+    "index_failed": "{folder}에 색인을 만들 수 없습니다: {error}",
     "index_busy": "다른 명령이 색인을 만들고 있습니다. 끝난 뒤에 다시 시도하십시오",
     "index_rebuilt": "색인을 새로 만들었습니다: 충전 {charges}건",
 }
