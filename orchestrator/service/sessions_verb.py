@@ -24,6 +24,9 @@ USUAL = 50
 
 def sessions(arguments: argparse.Namespace) -> int:
     """Do what the command line says: list the charges, or do something with one, or with the index."""
+    for option, verb in (("html", "show"), ("policy", "replay")):
+        if getattr(arguments, option) is not None and arguments.words[:1] != [verb]:
+            raise UsageError(f"sessions: --{option} is for 'sessions {verb} ID'")
     match arguments.words:
         case []:
             return _list(arguments)

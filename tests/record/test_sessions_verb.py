@@ -118,6 +118,8 @@ def test_an_empty_record_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[s
     [
         (("show",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]', 'sessions replay ID"),
         (("list",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]', 'sessions replay ID"),
+        (("--html", "x.html"), 2, "--html is for 'sessions show ID'"),
+        (("show", "0000", "--policy", "x"), 2, "--policy is for 'sessions replay ID'"),
         (("show", "0000"), 1, "no charge on record has an id that ends with 0000"),
         (("--limit", "-1"), 2, "--limit -1: expected the number of charges"),
         (("--since", "yesterday"), 2, "--since yesterday: expected 90min"),
