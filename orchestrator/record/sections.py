@@ -19,6 +19,7 @@ h1 { font-size: 1.3rem; } h2 { font-size: 1.05rem; margin: 1.5rem 0 .4rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 td, th { padding: .25rem 1rem .25rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #8884; }
 th { font-weight: 600; white-space: nowrap; } td { overflow-wrap: normal; min-width: 3rem; }
+td:last-child { min-width: 7rem; }
 svg { width: 100%; max-width: 46rem; height: auto; display: block; }
 """
 

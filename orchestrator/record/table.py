@@ -122,10 +122,11 @@ COLUMNS = {
 
 
 def as_csv(charges: Iterable[Record], language: str) -> Iterator[str]:
-    """RFC 4180, line by line; the last column is the reason as a sentence."""
+    """RFC 4180, line by line; causes are sentences, and the last column is why it ended."""
     yield BOM + _line([*COLUMNS, "why"])
     for charge in charges:
-        yield _line([*(_guarded(_found(charge, path)) for path in COLUMNS.values()), why_ended(charge, language)])
+        found = [*(_found(charge, path) for path in COLUMNS.values()), why_ended(charge, language)]
+        yield _line([_guarded(sentence(value, language) if isinstance(value, dict) else value) for value in found])
 
 
 def _line(cells: Sequence[object]) -> str:

@@ -67,6 +67,7 @@ def test_a_charge_is_followed_from_its_begin_to_its_end(folder: Folder) -> None:
     assert folder.listed() == [(id_of(1), "checkpoint", 0.0)]
     folder.add(NOVEMBER, checkpoint(1, 1, ah=2.0), checkpoint(1, 2, ah=4.0))
     assert folder.listed() == [(id_of(1), "checkpoint", 4.0)]
+    assert next(folder.charges().listed())["lasted_s"] == 1200.0
     folder.add(NOVEMBER, begin(2), end(1, 3, ah=5.0))
     assert folder.listed() == [(id_of(2), "checkpoint", 0.0), (id_of(1), "end", 5.0)]
     assert folder.said == []
@@ -241,6 +242,16 @@ def test_who_may_not_write_there_reads_all_the_same(folder: Folder, monkeypatch:
     assert folder.listed() == [(id_of(1), "end", 3.0)]
     assert folder.dump() == before
     assert folder.said == ["index_not_written"]
+
+
+def test_an_index_that_root_builds_is_the_services_own(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = list[tuple[str, int, int]]()
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    monkeypatch.setattr(os, "chown", lambda path, user, group: given.append((path.name, user, group)))
+    folder.add(NOVEMBER, begin(1))
+    folder.charges()
+    owner = folder.path.stat()
+    assert given == [(index.NEW, owner.st_uid, owner.st_gid)]
 
 
 def test_while_another_one_writes_what_is_there_is_read(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:

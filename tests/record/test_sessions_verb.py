@@ -95,6 +95,7 @@ def test_csv_is_what_a_spreadsheet_reads(journal: Path, capsys: pytest.CaptureFi
     *_, full = csv.DictReader(io.StringIO(text.removeprefix("\ufeff"), newline=""))
     assert (full["soc_begin_pct"], full["result"]) == ("50.0", "full")
     assert full["begin"].endswith("Z")
+    assert full["end"].endswith("Z")
     assert float(full["charger_ah"]) > 0
 
 

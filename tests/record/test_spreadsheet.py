@@ -36,7 +36,10 @@ def _sheet(tmp_path_factory: pytest.TempPathFactory) -> Sequence[dict[str, tuple
     if SOFFICE is None:
         pytest.skip("LibreOffice is not installed: apt-get install libreoffice-calc-nogui")
     path = tmp_path_factory.mktemp("sheet")
-    made = [{**end(at, 3, 12.5 + at, battery=name), "result": plain(said("끝: 1, 2"))} for at, name in enumerate(NAMES)]
+    made = [
+        {**end(at, 3, 12.5 + at, battery=name), "result": plain(said("끝: 1, 2")), "by": plain(said("=kim"))}
+        for at, name in enumerate(NAMES)
+    ]
     charges = [as_record(as_row(one)) for one in made]
     (path / "charges.csv").write_text("".join(as_csv(charges, "ko")), encoding="utf-8", newline="")
     profile = f"-env:UserInstallation={(path / 'profile').as_uri()}"
@@ -72,6 +75,7 @@ def test_names_and_sentences_are_text(sheet: Sequence[dict[str, tuple[str, str]]
     shown = [row["battery"] for row in sheet]
     assert shown == [("string", name) for name in ("B-0042", "'0042", "'1E5", "'1-2", "'=1+1", 'B "x", y', "배터리")]
     assert {row["why"] for row in sheet} == {("string", "끝: 1, 2")}
+    assert {row["by"] for row in sheet} == {("string", "'=kim")}
     assert {row["id"][0] for row in sheet} == {"string"}
 
 
