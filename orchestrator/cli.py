@@ -25,7 +25,7 @@ from orchestrator.errors import (
 from orchestrator.service.verbs import add_service_verbs
 from orchestrator.shell.commands import with_examples
 from orchestrator.shell.verbs import add_shell_verbs
-from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all
+from orchestrator.workbench.verbs import add_workbench_verbs, missing, prove_all, replay_charge
 
 if TYPE_CHECKING:
     from orchestrator.config.station import Station
@@ -76,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"orchestrator {__version__}")
     verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
-    add_service_verbs(verbs)
+    add_service_verbs(verbs, replay_charge)
     _add_estop(verbs)
     _add_tool_verbs(verbs)
     add_shell_verbs(verbs, _parser)

@@ -8,7 +8,7 @@ done, and the same one twice is one.
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from orchestrator.record import amounts, measured, met, pauses, spread
 from orchestrator.record import stamp as stamps
@@ -114,8 +114,19 @@ def decoded(line: bytes) -> Record | None:
     return record if is_ulid(record.get("id")) and isinstance(number, int) and number >= 0 else None
 
 
-def scanned(lines: Iterable[bytes]) -> Iterator[tuple[str, str, bytes]]:
-    """The kind, the charge's id and the line of each that looks like a record; it may be torn."""
+class Scanned(NamedTuple):
+    """A line that looks like a record; it may be torn."""
+
+    kind: str
+    id: str
+    n: int
+    at: int  #: where it begins, in bytes
+    text: bytes
+
+
+def scanned(lines: Iterable[bytes], at: int = 0) -> Iterator[Scanned]:
+    """Those of these lines that look like records; the first one begins at `at`."""
     for line in lines:
         if (found := _BEGINNING.match(line)) is not None:
-            yield found[1].decode(), found[2].decode(), line
+            yield Scanned(found[1].decode(), found[2].decode(), int(found[3]), at, line)
+        at += len(line)

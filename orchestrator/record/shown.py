@@ -1,13 +1,13 @@
-"""One charge as a page of text. Pure."""
+"""One charge in sections: as a page of text, or for the web. Pure."""
 
 from collections.abc import Iterator
 from typing import Any
 
-from orchestrator.columns import folded
 from orchestrator.model import Cause
 from orchestrator.record.lines import Record
+from orchestrator.record.sections import Section
 from orchestrator.record.stamp import from_fields
-from orchestrator.record.table import began, ended, lasted, length_s, sentence, values, why_ended
+from orchestrator.record.table import began, ended, lasted, length_s, sentence, value_rows, why_ended
 from orchestrator.text.catalogue import say
 
 #: How it is said where a battery's id is from.
@@ -16,20 +16,35 @@ SOURCES = {"assumed": "battery_assumed", "typed": "battery_typed", "serial_numbe
 DASH = "…"
 
 
-def shown(charge: Record, language: str, width: int) -> str:
-    """All of it, for people."""
-    lines = [folded(say(cause, language), width) for cause in _head(charge, language)]
-    parts = ["\n".join(lines), values(charge)]
-    for id_, found in (("charge_rules", _rules), ("charge_pauses", _pauses), ("charge_faults", _faults)):
-        if listed := [folded(f"  {line}", width) for line in found(charge, language)]:
-            parts.append("\n".join([say(Cause(id_), language), *listed]))
-    return "\n\n".join(parts)
+def sections(charge: Record, language: str) -> list[Section]:
+    """All of it, for people; ValueError for a record that is damaged."""
+    try:
+        return [
+            Section("", [(say(cause, language),) for cause in _head(charge, language)]),
+            Section("", value_rows(charge), has_head=True),
+            *(
+                Section(say(Cause(id_), language), [(line,) for line in found(charge, language)])
+                for id_, found in (("charge_rules", _rules), ("charge_pauses", _pauses), ("charge_faults", _faults))
+            ),
+        ]
+    except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
+        raise ValueError(f"a damaged record: {error!r}") from None
+
+
+def title(charge: Record, language: str) -> str:
+    """Which charge it is."""
+    return say(Cause.of("charge_of", id=charge["id"], bay=charge["bay"], station=charge["station"]), language)
+
+
+def battery(battery: Record) -> Cause:
+    """Which battery it was, and how that is known."""
+    return Cause.of(SOURCES.get(battery["source"], "battery_otherwise"), battery=battery["id"])
 
 
 def _head(charge: Record, language: str) -> Iterator[Cause]:
-    battery, policy, by = charge["battery"], charge["policy"], charge.get("by")
+    policy, by = charge["policy"], charge.get("by")
     yield Cause.of("charge_of", id=charge["id"], bay=charge["bay"], station=charge["station"])
-    yield Cause.of(SOURCES[battery["source"]], battery=battery["id"])
+    yield battery(charge["battery"])
     yield Cause.of("charge_time", begin_at=began(charge), end_at=ended(charge), lasted=lasted(length_s(charge)))
     yield Cause.of("charge_ended", why=why_ended(charge, language))
     yield Cause.of("charge_took", **charge["charger"], bmu_ah=charge["bmu"]["ah"], bmu_wh=charge["bmu"]["wh"])

@@ -2,10 +2,11 @@
 
 import csv
 import io
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from orchestrator.columns import aligned, beside, folded, width_of
+from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain
 from orchestrator.record.lines import Record
@@ -18,6 +19,8 @@ LEAST_WHY = 24
 DASH = "–"
 #: A spreadsheet in Korean takes UTF-8 for what it is only behind this.
 BOM = "\ufeff"
+#: What a spreadsheet takes for a formula, and for a number or a date.
+FORMULA, LIKE_NUMBER = ("=", "+", "-", "@", "\t", "\r"), re.compile(r"[\s.,:/]*\d[\d\s.,:/%eE+-]*")
 VALUES_HEAD = ("", "BEGIN", "END", "LOWEST", "HIGHEST")
 
 
@@ -94,15 +97,15 @@ def lasted(seconds: float) -> str:
     return f"{minutes} min" if minutes else f"{int(seconds)} s"
 
 
-def values(charge: Record) -> str:
-    """The measured values, in a table."""
+def value_rows(charge: Record) -> list[tuple[str, ...]]:
+    """The measured values, as a table with its head; none if nothing was known."""
     known = charge.get("values") or {}
     rows = [
         (name, *(f"{one[part]:g}" for part in ("begin", "end", "lowest", "highest")))
         for name, one in known.items()
         if one
     ]
-    return aligned([VALUES_HEAD, *rows])
+    return [VALUES_HEAD, *rows] if rows else []
 
 
 #: The columns of the CSV: name → where it is in a record.
@@ -118,14 +121,18 @@ COLUMNS = {
 }  # fmt: skip
 
 
-def as_csv(charges: Sequence[Record], language: str) -> str:
-    """RFC 4180; the last column is the reason as a sentence."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow([*COLUMNS, "why"])
+def as_csv(charges: Iterable[Record], language: str) -> Iterator[str]:
+    """RFC 4180, line by line; causes are sentences, and the last column is why it ended."""
+    yield BOM + _line([*COLUMNS, "why"])
     for charge in charges:
-        writer.writerow([*(_guarded(_found(charge, path)) for path in COLUMNS.values()), why_ended(charge, language)])
-    return BOM + text.getvalue()
+        found = [*(_found(charge, path) for path in COLUMNS.values()), why_ended(charge, language)]
+        yield _line([_guarded(sentence(value, language) if isinstance(value, dict) else value) for value in found])
+
+
+def _line(cells: Sequence[object]) -> str:
+    text = io.StringIO()
+    csv.writer(text).writerow(cells)
+    return text.getvalue()
 
 
 def _found(charge: Record, path: Sequence[str]) -> Any:  # noqa: ANN401 - whatever the record has there
@@ -136,5 +143,7 @@ def _found(charge: Record, path: Sequence[str]) -> Any:  # noqa: ANN401 - whatev
 
 
 def _guarded(value: object) -> object:
-    """A name from a file is no formula."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+    """A name from a file is no formula, no number and no date: 0042 stays that, and 1E5, and 1-2."""
+    if not isinstance(value, str):
+        return value
+    return f"'{value}" if value.startswith(FORMULA) or LIKE_NUMBER.fullmatch(value) else value

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from itertools import islice
 from pathlib import Path
 
 from orchestrator.columns import own_colour, own_width
@@ -145,3 +146,10 @@ def last_events(directory: Path, bay: str, language: str, now_s: float) -> list[
     except OrchestratorError as error:
         return [("", say(Cause.of("no_journal", why=str(error)), language))]
     return [(clock.time_of_day(one.unix_s), one.text) for one in found] or [("", say(Cause("no_events"), language))]
+
+
+def between(directory: Path, bay: str, since: str, until: str, language: str, most: int) -> Iterator[Happened]:
+    """The first events of one bay between two times, given as the journal writes them; OrchestratorError as above."""
+    asked = Asked([bay], since=since, until=until)
+    told = happened(from_part(event_files(directory), since), language, asked.may_be)
+    return islice(filter(asked.is_meant, told), most)

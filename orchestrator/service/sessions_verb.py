@@ -1,112 +1,112 @@
 """`orchestrator sessions`: what each charge took, read from the record; needs no running service."""
 
 import argparse
-import re
 import sys
 import time
 from collections.abc import Iterator
-from itertools import islice
-from pathlib import Path
 
 from orchestrator.columns import json_text, own_width
-from orchestrator.config.ports import wiring
 from orchestrator.errors import CauseError, UsageError
 from orchestrator.model import Cause
+from orchestrator.record.charges import Charges
 from orchestrator.record.lines import Record
-from orchestrator.record.months import FOLDER
-from orchestrator.record.reading import charges_in
-from orchestrator.record.shown import shown
 from orchestrator.record.table import as_csv, table
 from orchestrator.record.utc import unix_s
 from orchestrator.service.chosen import choose
-from orchestrator.service.where import HERE
+from orchestrator.service.record_place import charges_of, journal_of
+from orchestrator.service.timespan import moment
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
 
-#: The journal of the service started by deploy/orchestrator.service.
-INSTALLED = Path("/var/lib/orchestrator/journal")
-#: What `--since` counts in.
-AGO_S = {"min": 60.0, "h": 3600.0, "d": 86_400.0}
+#: So many are in the table where neither --since nor --limit says how many.
+USUAL = 50
 
 
 def sessions(arguments: argparse.Namespace) -> int:
-    """Print the charges that the command line means, the newest first."""
-    charges = _charges(arguments)
-    if arguments.limit is not None and arguments.limit < 1:
-        raise UsageError(f"sessions: --limit {arguments.limit}: expected 1 or more")
-    if arguments.show:
-        return _show(charges, arguments)
-    found = list(islice(_meant(charges, arguments), arguments.limit))
-    language = own_language()
-    if arguments.json:
-        print(json_text(found))
-    elif arguments.csv:
-        sys.stdout.write(as_csv(found, language))
-    elif found:
-        print(table(found, language, own_width()))
-    else:
-        print(say(Cause("charges_none"), language))
-    return 0
+    """Do what the command line says: list the charges, or do something with one, or with the index."""
+    for option, verb in (("html", "show"), ("policy", "replay")):
+        if getattr(arguments, option) is not None and arguments.words[:1] != [verb]:
+            raise UsageError(f"sessions: --{option} is for 'sessions {verb} ID'")
+    match arguments.words:
+        case []:
+            return _list(arguments)
+        case ["show", end] if not arguments.csv:
+            from orchestrator.service.charge_verb import show  # a list does not wait for what it needs
 
-
-def _charges(arguments: argparse.Namespace) -> Iterator[Record]:
-    folder = _journal(arguments) / FOLDER
-    try:
-        yield from charges_in(folder)
-    except FileNotFoundError:
-        return  # no charge has begun yet
-    except OSError as error:
-        raise CauseError(Cause.of("charges_unreadable", folder=str(folder), error=str(error.strerror))) from None
-
-
-def _journal(arguments: argparse.Namespace) -> Path:
-    """The journal's directory: the one named, that of the station file here, or of the installed service."""
-    if arguments.journal is not None:
-        named = Path(arguments.journal)
-        if not named.is_dir():
-            raise UsageError(f"sessions: --journal {named}: there is no such directory")
-        return named
-    try:
-        if written := wiring(HERE).journal:
-            return Path(written)
-    except OSError:
-        pass
-    if INSTALLED.exists():
-        return INSTALLED
+            return show(arguments, end)
+        case ["replay", end]:
+            return _replay(arguments, end)
+        case ["rebuild"]:
+            return _rebuild(arguments)
     raise UsageError(
-        f"sessions: no {HERE} in this folder names a journal, and there is no {INSTALLED}; name its directory with "
-        "--journal DIR"
+        f"sessions {' '.join(arguments.words)}: expected 'sessions', 'sessions show ID [--json | --html FILE]', "
+        "'sessions replay ID [--policy FILE]' or 'sessions rebuild'"
     )
 
 
-def _show(charges: Iterator[Record], arguments: argparse.Namespace) -> int:
-    """One charge; the end of its id will do."""
-    if len(arguments.show) != 2 or arguments.show[0] != "show" or arguments.csv:
-        raise UsageError(f"sessions {' '.join(arguments.show)}: expected 'sessions', or 'sessions show ID [--json]'")
-    wanted = arguments.show[1].upper()
-    found = next((charge for charge in charges if wanted and charge["id"].endswith(wanted)), None)
-    if found is None:
-        raise CauseError(Cause.of("charge_unknown", id=f"{arguments.show[1]:.40}"))
-    print(json_text(found) if arguments.json else shown(found, own_language(), own_width()))
+def _list(arguments: argparse.Namespace) -> int:
+    """Print the charges that the command line means, the newest first."""
+    if arguments.limit is not None and arguments.limit < 0:
+        raise UsageError(f"sessions: --limit {arguments.limit}: expected the number of charges, or 0 for all")
+    since = moment("--since", arguments.since or "", time.time())
+    language = own_language()
+    with charges_of(journal_of("sessions", arguments.journal)) as charges:
+        if arguments.json:
+            _print_json(charges.whole([charge["id"] for charge in _meant(charges, arguments, since)]))
+            return 0
+        if arguments.csv:
+            sys.stdout.writelines(as_csv(_meant(charges, arguments, since), language))
+            return 0
+        found = list(_meant(charges, arguments, since, USUAL + 1))
+    shown = found if arguments.limit is not None or since else found[:USUAL]
+    print(table(shown, language, own_width()) if found else say(Cause("charges_none"), language))
+    if len(shown) < len(found):
+        print(say(Cause.of("charges_more", shown=USUAL), language))
     return 0
 
 
-def _meant(charges: Iterator[Record], arguments: argparse.Namespace) -> Iterator[Record]:
-    since_s = _since_s(arguments.since) if arguments.since else None
-    for charge in charges:
-        if arguments.bay and not choose(arguments.bay, (), [str(charge.get("bay"))]).bays:
-            continue
-        if arguments.battery and charge["battery"]["id"] != arguments.battery:
-            continue
-        if since_s is None or (charge.get("end") or charge["last"])["unix_s"] >= since_s:
-            yield charge
+def _meant(charges: Charges, arguments: argparse.Namespace, since: str, usual: int = 0) -> Iterator[Record]:
+    bays = choose(arguments.bay, (), charges.bays()).bays if arguments.bay else None
+    limit = arguments.limit if arguments.limit is not None else 0 if since else usual
+    return charges.listed(
+        bays=bays, battery=arguments.battery, since_s=unix_s(since) if since else None, limit=limit or None
+    )
 
 
-def _since_s(text: str) -> float:
-    """The moment that a person named: so long ago, a date, or a local time."""
-    if (ago := re.fullmatch(r"(\d{1,6})\s*(min|h|d)", text)) is not None:
-        return time.time() - int(ago[1]) * AGO_S[ago[2]]
+def _print_json(records: Iterator[Record]) -> None:
+    """A list, one after the other: there may be many."""
+    separator = "["
+    for record in records:
+        sys.stdout.write(f"{separator}{json_text(record)}")
+        separator = ",\n "
+    print("[]" if separator == "[" else "]")
+
+
+def _replay(arguments: argparse.Namespace, end: str) -> int:
+    """Decide one charge again; 1 if a decision is not as recorded."""
+    from orchestrator.service.charge_verb import charge_named, stretch
+
+    journal = journal_of("sessions", arguments.journal)
+    charge = charge_named(journal, end)
+    return int(arguments.replay(journal, arguments.policy, charge["bay"], *stretch(charge)))
+
+
+def _rebuild(arguments: argparse.Namespace) -> int:
+    """Build the index anew."""
+    from sqlite3 import Error
+
+    from orchestrator.record.index import BusyError, rebuilt
+    from orchestrator.record.months import FOLDER
+
+    folder = journal_of("sessions", arguments.journal) / FOLDER
+    if not folder.exists():
+        print(say(Cause("charges_none"), own_language()))
+        return 0
     try:
-        return unix_s(text)
-    except (OSError, OverflowError, ValueError):
-        raise UsageError(f"--since {text}: expected 90min, 2h, 7d, 2026-11-28 or 2026-11-28T06:00") from None
+        count = rebuilt(folder)
+    except BusyError:
+        raise CauseError(Cause("index_busy")) from None
+    except (OSError, Error) as error:
+        raise CauseError(Cause.of("index_failed", folder=str(folder), error=str(error))) from None
+    print(say(Cause.of("index_rebuilt", charges=count), own_language()))
+    return 0

@@ -7,6 +7,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.errors import UsageError
+from orchestrator.service.record_verbs import Replay, add_record_verbs
 
 REQUESTS = {
     "start": "let a bay charge (again) after a stop, a pause or a reset",
@@ -20,8 +21,8 @@ REQUESTS = {
 NAMES = "names, or patterns such as 'bay-0*'"
 
 
-def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """`run`, `status`, `history`, `sessions` and the requests."""
+def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]", replay: Replay) -> None:
+    """`run`, `status`, `history`, the record of charges, and the requests; `replay` decides a stretch of time again."""
     run = verbs.add_parser("run", help="run the service for a station until told to end")
     run.add_argument("station", nargs="?", help="the station file (default: station.yaml)")
     run.set_defaults(run=_run)
@@ -38,7 +39,7 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
     _add_socket(status)
     status.set_defaults(run=_status)
     _add_history(verbs)
-    _add_sessions(verbs)
+    add_record_verbs(verbs, replay)
     for verb, about in REQUESTS.items():
         request = verbs.add_parser(verb, help=about)
         request.add_argument("bay", nargs="*", help=f"the bays: {NAMES}")
@@ -91,22 +92,6 @@ def _add_identify(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     identify.set_defaults(run=_identify)
 
 
-def _add_sessions(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    sessions = verbs.add_parser("sessions", help="list the charges on record: how much, how long, and why they ended")
-    sessions.add_argument("show", nargs="*", help="'show ID': everything about one charge; the end of its id will do")
-    sessions.add_argument("--bay", action="append", default=[], help="only of this bay: a name or a pattern")
-    sessions.add_argument("--battery", metavar="ID", help="only of this battery")
-    sessions.add_argument("--since", metavar="TIME", help="from then on: 2h, 7d (ago), 2026-11-28, 2026-11-28T06:00")
-    sessions.add_argument("--limit", type=int, metavar="N", help="at most so many, the newest ones")
-    form = sessions.add_mutually_exclusive_group()
-    form.add_argument("--csv", action="store_true", help="for a spreadsheet")
-    form.add_argument("--json", action="store_true", help="the records, for programs")
-    sessions.add_argument(
-        "--journal", metavar="DIR", help="the journal's directory (default: that of station.yaml here, else installed)"
-    )
-    sessions.set_defaults(run=_sessions)
-
-
 def _add_except(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--except", dest="excepted", nargs="+", default=[], metavar="BAY", help="not these bays: names or patterns"
@@ -147,12 +132,6 @@ def _history(arguments: argparse.Namespace) -> int:
     from orchestrator.service.history_verb import history
 
     return history(arguments)
-
-
-def _sessions(arguments: argparse.Namespace) -> int:
-    from orchestrator.service.sessions_verb import sessions
-
-    return sessions(arguments)
 
 
 def _request(arguments: argparse.Namespace) -> int:

@@ -22,7 +22,17 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
     "sessions": (
         ("sessions --since 7d", "the charges of a week"),
         ("sessions show 4QZ7", "one of them: the end of its id will do"),
+        ("sessions show 4QZ7 --html charge.html", "the same with its curve, as a web page"),
+        ("sessions replay 4QZ7 --policy my-policy.yaml", "what another policy would have decided in it"),
         ("sessions --bay bay-2 --limit 10 --csv", "the last ten of a bay, for a spreadsheet"),
+    ),
+    "battery": (
+        ("battery", "each battery that was charged, and where its id is from"),
+        ("battery B-0042", "its life: charges, amounts, faults"),
+    ),
+    "report": (
+        ("report", "the month of the newest charge"),
+        ("report --month 2026-11 --html november.html", "a page to be sent"),
     ),
     "identify": (("identify bay-1 --battery B-0042", "what is written on the battery that was just connected"),),
     "start": (

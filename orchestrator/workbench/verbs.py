@@ -133,6 +133,15 @@ def progress(head: str = "") -> Callable[[str], None]:
     return tell
 
 
+def replay_charge(journal: Path, policy: str | None, bay: str, since: str, until: str) -> int:
+    """`sessions replay`: what a journal has of one bay between these times."""
+    try:
+        from orchestrator.workbench.replay.verb import replay
+    except ImportError as error:
+        raise missing("replay", error) from None
+    return replay([journal], policy, [bay], since, until=until)
+
+
 def _replay(arguments: argparse.Namespace) -> int:
     try:
         from orchestrator.workbench.replay.verb import processes_for, replay

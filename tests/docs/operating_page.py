@@ -38,8 +38,8 @@ HEAD = """\
 
 Each command below was run on an emulated station, and its output is as it came, on a terminal of 100 columns: three
 bays, one overheated, one with a loose plug, a quarter of an hour after a power failure. Not shown: `status` and
-`history` name who stopped a bay and why, `sessions --csv` lists charges for a spreadsheet. Not there yet: which battery
-gets old, the energy of a day, a charge to another target or at a given time.
+`history` name who stopped a bay and why, `sessions --csv` lists charges for a spreadsheet, `report` sums up a month,
+`battery ID` is the life of a battery, with its health.
 `python -m tests.docs.operating_page DIRECTORY` makes this page again.
 
 """

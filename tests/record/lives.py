@@ -3,21 +3,26 @@
     python -m tests.record.lives 2000        also power cuts at every byte of every write of a charge (`cuts.py`)
 
 The record is right if no charge is in it twice, none is lost, ids are in the order of the charges, and the sum of their
-Ah is the integral of the charger's current: but for what no disk had when a run ended, which is worked out here.
+Ah is the integral of the charger's current: but for what no disk had when a run ended, which is worked out here. An
+index that was brought up to date after each run has just these charges, and is the same as a new one.
 """
 
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Mapping
 from contextlib import ExitStack
 from itertools import takewhile
 from pathlib import Path
 from random import Random
+from sqlite3 import Connection
 from typing import Any
 from unittest.mock import patch
 
 from orchestrator.core.persisted import COUNTERS_S, Persisted
 from orchestrator.model import Operation, Request
+from orchestrator.record import index
+from orchestrator.record.months import FOLDER
 from orchestrator.service import rotating
 from tests.record.cuts import cuts
 from tests.record.kept import EDGE_AH, Kept, charges_in
@@ -45,6 +50,7 @@ class Life:
         self.recorded_ah = 0.0  # true Ah at the newest record on the disk
         self.runs = 0
         self.ids: list[str] = []  # in the order in which their charges began
+        self.index: Connection | None = None  # brought up to date whenever a run has ended
 
     def run(self) -> None:
         with ExitStack() as stack:
@@ -100,6 +106,7 @@ class Life:
     # --- how it ends --------------------------------------------------------------------------------------------------
 
     def _dies(self) -> None:
+        self._follow_index()
         how = self.dice.choice(("killed", "power", "power at a write", "in order"))
         self.had[how] += 1
         if how == "power at a write":
@@ -155,6 +162,13 @@ class Life:
         rotating.append(path, data, durable=durable)
         self._wrote = True
 
+    def _follow_index(self) -> None:
+        folder = self.kept.directory / FOLDER
+        if self.index is not None:
+            self.index = index._current(self.index, folder)
+        elif folder.is_dir():
+            self.index = index._built(":memory:", folder)
+
     # --- what must hold -----------------------------------------------------------------------------------------------
 
     def judge(self) -> None:
@@ -175,6 +189,16 @@ class Life:
         for charge in charges.values():
             shares_ah = sum(rule["ah"] for rule in charge["rules"])
             assert abs(shares_ah - charge["charger"]["ah"]) < 1e-4, "the rules' Ah are not the charge's"
+        self._judge_index({id_: charge["charger"]["ah"] for id_, charge in charges.items()})
+
+    def _judge_index(self, amounts: Mapping[str, float]) -> None:
+        self._follow_index()
+        if self.index is None:
+            assert not amounts, "there is no index"
+            return
+        assert dict(self.index.execute("SELECT id, charger_ah FROM charges")) == amounts, "the index has other charges"
+        new = index._built(":memory:", self.kept.directory / FOLDER)
+        assert list(self.index.iterdump()) == list(new.iterdump()), "a new index is another one"
 
 
 def _fields(reading: object) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Request, State
-from orchestrator.record.reading import charges_in
+from orchestrator.record.charges import Charges
 from orchestrator.service.asked import Asked
 from orchestrator.service.asker import Asker
 from tests.record.kept import WALL_S, Kept
@@ -253,5 +253,5 @@ def test_a_finished_month_is_compressed_and_still_read(tmp_path: Path, monkeypat
     names = sorted(path.name for path in (tmp_path / "sessions").glob("*.jsonl*"))
     packed, plain = ["2026-11", "2026-12", "2027-01"], ["2027-03", "2027-04"]
     assert names == [*(f"{month}.jsonl.gz" for month in packed), *(f"{month}.jsonl" for month in plain)]
-    found = list(charges_in(tmp_path / "sessions"))
+    found = list(Charges(tmp_path / "sessions").listed())
     assert [one["type"] for one in found] == ["end"] * 4

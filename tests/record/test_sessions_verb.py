@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,10 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.columns import width_of
 from orchestrator.model import Request, State
+from orchestrator.record import index
+from orchestrator.record.lines import encoded
 from tests.record.kept import Kept
+from tests.record.made import end
 
 
 @pytest.fixture(name="journal")
@@ -75,6 +79,7 @@ def test_bay_battery_time_and_number_choose(journal: Path, capsys: pytest.Captur
 
     assert count() == 3
     assert count("--limit", "2") == 2
+    assert count("--limit", "0") == 3
     assert count("--bay", "bay-*") == 3
     assert count("--bay", "bay-2") == 0
     assert count("--battery", "can0:0x10") == 3
@@ -90,6 +95,7 @@ def test_csv_is_what_a_spreadsheet_reads(journal: Path, capsys: pytest.CaptureFi
     *_, full = csv.DictReader(io.StringIO(text.removeprefix("\ufeff"), newline=""))
     assert (full["soc_begin_pct"], full["result"]) == ("50.0", "full")
     assert full["begin"].endswith("Z")
+    assert full["end"].endswith("Z")
     assert float(full["charger_ah"]) > 0
 
 
@@ -111,10 +117,12 @@ def test_an_empty_record_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[s
 @pytest.mark.parametrize(
     ("arguments", "status", "expected"),
     [
-        (("show",), 2, "expected 'sessions', or 'sessions show ID"),
-        (("list",), 2, "expected 'sessions', or 'sessions show ID"),
+        (("show",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]', 'sessions replay ID"),
+        (("list",), 2, "expected 'sessions', 'sessions show ID [--json | --html FILE]', 'sessions replay ID"),
+        (("--html", "x.html"), 2, "--html is for 'sessions show ID'"),
+        (("show", "0000", "--policy", "x"), 2, "--policy is for 'sessions replay ID'"),
         (("show", "0000"), 1, "no charge on record has an id that ends with 0000"),
-        (("--limit", "0"), 2, "--limit 0: expected 1 or more"),
+        (("--limit", "-1"), 2, "--limit -1: expected the number of charges"),
         (("--since", "yesterday"), 2, "--since yesterday: expected 90min"),
     ],
 )
@@ -126,3 +134,58 @@ def test_wrong_use_says_what_is_expected(
 
 def test_a_journal_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "there is no such directory" in said(capsys, "--journal", str(tmp_path / "no"), status=2)
+
+
+def test_one_charge_is_decided_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LC_ALL", "C.UTF-8")
+    kept = Kept(tmp_path)
+    monkeypatch.setattr("orchestrator.service.bay.time", kept.wall)
+    for _ in range(2):
+        kept.bench.battery.values["soc_pct"] = 50.0
+        kept.bench.charging()
+        kept.bench.battery.values["soc_pct"] = 100.0
+        kept.bench.until(State.FULL)
+        kept.recorder.turn()
+    kept.bench.journal._write()
+    place = str(tmp_path)
+    _, first = (one["id"] for one in json.loads(said(capsys, "--json", "--journal", place)))
+    again = re.search(
+        r"^bay-1: (\d+) decisions in .* all as recorded", said(capsys, "replay", first, "--journal", place)
+    )
+    assert main(["replay", place]) == 0
+    all_ = re.search(r"^bay-1: (\d+) decisions", capsys.readouterr().out)
+    assert again is not None
+    assert all_ is not None
+    assert 10 < int(again[1]) < int(all_[1]) * 0.7
+    other = said(capsys, "replay", first, "--policy", "long-life-48v", "--journal", place)
+    assert re.search(r"^bay-1: \d+ decisions, \d+ differences? \(.* → long-life-48v\)", other, re.MULTILINE)
+
+
+def test_the_usual_table_is_the_newest_fifty(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LC_ALL", "C.UTF-8")
+    (tmp_path / "sessions").mkdir()
+    records = b"".join(encoded(end(number, 1)) for number in range(60))
+    (tmp_path / "sessions" / "2026-11.jsonl").write_bytes(records)
+
+    def lines(*arguments: str) -> list[str]:
+        return said(capsys, "--journal", str(tmp_path), *arguments).splitlines()
+
+    assert len(lines()) == 52
+    assert lines()[-1] == "the newest 50; there are more: --limit 0 lists all"
+    assert len(lines("--limit", "50")) == 51
+    assert len(lines("--limit", "0")) == len(lines("--since", "2026-11-01")) == len(lines("--csv")) == 61
+
+
+def test_the_index_is_built_anew_when_asked(
+    journal: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert said(capsys, "rebuild", "--journal", str(journal)) == "index built anew; charges: 3\n"
+    monkeypatch.setattr(index, "PAUSE_S", 0.0)
+    with index._locked(journal / "sessions"):
+        assert "another command is building the index" in said(capsys, "rebuild", "--journal", str(journal), status=1)
+    (journal / "sessions" / index.NEW).mkdir()
+    assert "no index can be built in" in said(capsys, "rebuild", "--journal", str(journal), status=1)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 TEXTS: Mapping[str, str] = {
+    "health": "Health:",
     "health_none": "battery {battery}: no charge of it on record has ended",
     "health_method": "health by method {method}; charges: {charges}, the newest ended on {end_at}",
     "health_mixed": "other batteries may have been there under this id: give each its own with orchestrator identify",

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 TEXTS: Mapping[str, str] = {
+    "health": "상태:",
     "health_none": "배터리 {battery}: 종료된 충전 기록이 없습니다",
     "health_method": "건강 상태: 평가 방식 {method}; 충전 {charges}회, 마지막 충전 종료 {end_at}",
     "health_mixed": "이 ID로 다른 배터리가 충전되었을 수 있습니다: 배터리마다 orchestrator identify로 ID를 지정하십시오",

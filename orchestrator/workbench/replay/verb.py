@@ -28,18 +28,19 @@ def replay(
     since: str = "",
     show: Show = print,
     *,
+    until: str = "",
     jobs: int = 1,
 ) -> int:
     """Replay each bay, or those named; returns 1 if, without `policy`, a decision differs from the recording.
 
-    `since`: only decisions from this time on (RFC 3339, UTC). `jobs`: as many processes share the bays. Raises
-    ConfigError if journals or policy cannot be read, OrchestratorError if nothing is recorded.
+    `since`, `until`: only decisions between these times (RFC 3339, UTC). `jobs`: as many processes share the bays.
+    Raises ConfigError if journals or policy cannot be read, OrchestratorError if nothing is recorded.
     """
-    paths, other = tuple(journals), load_policy(policy) if policy else None
+    paths, other, span = tuple(journals), load_policy(policy) if policy else None, Span(since, until)
     recorded = bays_in(paths)
     chosen = sorted(set(bays) or recorded)
     shares = [share for number in range(jobs) if (share := chosen[number::jobs])]
-    results = _all_shares(paths, other, shares, since)
+    results = _all_shares(paths, other, shares, span)
     broken = sorted({finding for result in results for finding in result.broken})
     if broken:
         lines = "1 line cannot be read and is" if len(broken) == 1 else f"{len(broken)} lines cannot be read and are"
@@ -51,9 +52,8 @@ def replay(
     found = {outcome.bay: outcome for result in results for outcome in result.outcomes}
     missing = [name for name in chosen if name not in found]
     if (missing and bays) or not found:
-        since_then = f" since {since}" if since else ""
         raise OrchestratorError(
-            f"nothing is recorded of {', '.join(missing) or 'any bay'}{since_then} "
+            f"nothing is recorded of {', '.join(missing) or 'any bay'}{span} "
             f"(recorded: {', '.join(sorted(recorded)) or 'none'}): "
             "snapshots need journal.snapshots in the station file"
         )
@@ -67,6 +67,17 @@ def processes_for(journals: Iterable[Path]) -> int:
     """One per core, unless the journal is replayed sooner than they have begun."""
     size = sum(path.stat().st_size for path in files_of(journals) if path.is_file())
     return len(os.sched_getaffinity(0)) if size > LONG else 1
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """From when to when, RFC 3339 in UTC; "" for no bound."""
+
+    since: str
+    until: str
+
+    def __str__(self) -> str:
+        return "".join(f" {word} {time}" for word, time in (("since", self.since), ("until", self.until)) if time)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,22 +97,24 @@ class Share:
     broken: list[Finding]
 
 
-def _all_shares(paths: Sequence[Path], other: Policy | None, shares: list[list[str]], since: str) -> list[Share]:
+def _all_shares(paths: Sequence[Path], other: Policy | None, shares: list[list[str]], span: Span) -> list[Share]:
     """The first share is ours, the others are for other processes."""
     if len(shares) < 2:
-        return [replay_share(paths, other, share, since) for share in shares or [[]]]
+        return [replay_share(paths, other, share, span) for share in shares or [[]]]
     with cores(len(shares) - 1) as pool:
-        others = [pool.submit(replay_share, paths, other, share, since) for share in shares[1:]]
-        return [replay_share(paths, other, shares[0], since), *(one.result() for one in others)]
+        others = [pool.submit(replay_share, paths, other, share, span) for share in shares[1:]]
+        return [replay_share(paths, other, shares[0], span), *(one.result() for one in others)]
 
 
-def replay_share(paths: Sequence[Path], other: Policy | None, bays: Collection[str], since: str) -> Share:
+def replay_share(paths: Sequence[Path], other: Policy | None, bays: Collection[str], span: Span) -> Share:
     """Replay these bays."""
-    recording, found = Recording(paths, bays, since), dict[str, _Bay]()
+    recording, found = Recording(paths, bays, span.since), dict[str, _Bay]()
     for recorded in recording:
+        if span.until and recorded.wall > span.until:
+            break
         if recorded.bay not in found:
             found[recorded.bay] = _Bay(recorded.bay, other)
-        found[recorded.bay].take(recorded, counts=recorded.wall >= since)
+        found[recorded.bay].take(recorded, counts=recorded.wall >= span.since)
     return Share([bay.outcome() for bay in found.values() if bay.count], recording.broken)
 
 
