@@ -225,7 +225,8 @@ class BayRunner:
             self._say(Cause.of("policy_in_force", bay=self.name, policy=name_of(bay)))
 
     def _keep(self, memory: Memory, now_s: float) -> None:
-        persisted = self._timer.kept(self.identified.kept(Persisted.of(memory, now_s)))
+        persisted = self.identified.kept(Persisted.of(memory, now_s))
+        persisted = self._timer.kept(persisted)
         if self._waits and not persisted.hold:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)

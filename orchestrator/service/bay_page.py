@@ -133,6 +133,8 @@ def _devices(bay: Bay, language: str) -> Iterator[Line]:
     battery, charger = (cast("Mapping[str, object]", bay[part]) for part in ("battery", "charger"))
     bmu = cast("Mapping[str, object]", bay.get("bmu") or {})
     old = cast("Sequence[str]", battery.get("old", ()))
+    if identity := cast("Mapping[str, object]", bay.get("identity") or {}):
+        yield "page_battery", "", str(identity["text"])
     shown = list(_figures(battery, BATTERY, old, language))
     if bmu:
         shown.append(say(Cause.of("battery_on", can=bmu["can"], node_id=bmu["node_id"]), language))
