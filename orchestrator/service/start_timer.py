@@ -1,8 +1,9 @@
 """The start of one bay at a time of day: noted, kept over restarts, and made when the wall clock says so.
 
 Theory of operation. The wall clock alone decides: where it is set back the start waits longer, where it is set forward
-it comes earlier. A start that is due is made by the next decision, as if its person had typed it then; what refuses it
-is kept, for the status. After `MOST_LATE_S` nobody counts on it any more, whether the service was down or the clock
+it comes earlier. A start that is due is made by the next decision, as if its person had typed it then, and again for a
+minute while it is refused: right after a restart no BMU has been heard yet. What refuses it then is kept, for the
+status. After `MOST_LATE_S` nobody counts on it any more, whether the service was down or the clock
 was set: it is missed, and not made. A stop, or another start, cancels it.
 """
 
@@ -20,6 +21,8 @@ from orchestrator.text.catalogue import fields
 
 #: A start that could not be made is still made within this.
 MOST_LATE_S = 3600.0
+#: For how long a start that is refused is tried again, and how often.
+PATIENCE_S, AGAIN_S = 60.0, 5.0
 #: What of the status is not of `next`.
 OWN = frozenset({"target_soc_pct", "pending"})
 #: For how long the status tells why one was not made.
@@ -36,6 +39,8 @@ class StartTimer:
         self._journal, self._say, self._language = journal, say, language
         self._read = False  # the persisted state is still being read
         self._timed: TimedStart | None = None
+        self._first_s: float | None = None  # when it was refused first …
+        self._again_s = 0.0  # … and when it is tried again
 
     def due(self, clock: WallClock) -> Sequence[Asked]:
         """The start, if its time has come."""
@@ -51,12 +56,12 @@ class StartTimer:
         if late_s > MOST_LATE_S:
             self._fails(timed, Cause.of("start_too_late", late_min=late_s / 60), clock)
             return ()
-        return (Asked.of(timed),)
+        return (Asked.of(timed),) if clock.now_s >= self._again_s else ()
 
     def take(self, taken: Taken) -> None:
         """Take note of what is asked of the next decision."""
         if taken.noted is not None:
-            self._timed = taken.noted
+            self._timed, self._first_s, self._again_s = taken.noted, None, 0.0
         elif taken.request is Request.STOP:
             self._timed = None
 
@@ -64,7 +69,9 @@ class StartTimer:
         """Follow the decision: `answer` is why the request was refused."""
         why = taken.refusal or answer
         if taken.timed is not None and why is not None:
-            self._fails(taken.timed, why, clock)
+            self._first_s, self._again_s = self._first_s or clock.now_s, clock.now_s + AGAIN_S
+            if clock.now_s - self._first_s >= PATIENCE_S:
+                self._fails(taken.timed, why, clock)
         elif taken.request is Request.START and why is None:
             self._timed = None
             if taken.timed is not None and taken.by is not None:

@@ -96,7 +96,7 @@ ANSWERS = (
     ),
     Answer(
         "Does it start by itself, and when?",
-        "NEXT says it. BATTERY begins with which battery it is. A start that could not be made says why in NOTES, for a day.",
+        "NEXT says it. BATTERY begins with which one it is. If the start could not be made, NOTES says why, for a day.",
         "status bay-4",
     ),
     Answer(

@@ -135,12 +135,27 @@ def test_what_refuses_it_is_told(tmp_path: Path, wall: Wall) -> None:
     asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S))
     wall.now_s = AT_S + 5
     assert bench.step(20) is State.TRIPPED
+    assert told(bench).startswith("starts at 22:00"), "for a minute it is tried again"
+    bench.now_s += 60
+    bench.step(20)
     assert told(bench).startswith(
         "the start at 22:00, asked by root for kim at 18:10, was not made: hot_trip: start is refused before a reset: "
     )
     again = after(bench, tmp_path / "2")
     again.step()
     assert told(again) == told(bench)
+
+
+def test_after_a_restart_it_waits_for_the_battery(tmp_path: Path, wall: Wall) -> None:
+    """A charge to a target needs its SOC, which nobody has heard yet."""
+    before = held(tmp_path, target_pct=60.0)
+    wall.now_s = AT_S + 60
+    bench = after(before, tmp_path / "2")
+    soc_pct = bench.battery.values.pop("soc_pct")
+    assert bench.step(20) is State.HELD
+    bench.battery.values["soc_pct"] = soc_pct
+    bench.charging()
+    assert "charges once to 60 %, asked by root for kim at 18:10" in str(bench.bay.status()["target"])
 
 
 def test_a_pause_by_somebody_else_is_spared_if_the_start_was_for_all(tmp_path: Path, wall: Wall) -> None:
@@ -151,6 +166,8 @@ def test_a_pause_by_somebody_else_is_spared_if_the_start_was_for_all(tmp_path: P
     asks(bench, Asked(Request.PAUSE, LEE))
     bench.until(State.SUSPENDED)
     wall.now_s = AT_S
+    bench.step(20)
+    bench.now_s += 60
     assert bench.step(20) is State.SUSPENDED
     assert "was not made: left alone: paused by root for lee at 18:10" in told(bench)
 
