@@ -103,7 +103,7 @@ def _joined(before: Cause | None, new: Cause) -> Cause:
 
 def held_back(known: Operator, why: Cause) -> Operator:
     """The operator's part of the memory where nobody but a person may let a charge begin, for this reason."""
-    return changed(known, hold=why)
+    return changed(over(known), hold=why)
 
 
 def _refused(memory: Memory, why: Cause) -> Heard:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from orchestrator.core import decide as decide_module
 from orchestrator.core.finish import DAY_S
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Cause, Request, State
@@ -51,6 +52,15 @@ def test_at_99_percent_it_charges_once_to_100() -> None:
     rises(world, 99.0)
     world.run(60)
     assert world.is_in(S.FULL), "once"
+    assert ask(world, 100.0) == ""
+    world.until(S.CHARGING)
+
+
+def test_a_start_that_another_service_forbids_leaves_no_target(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = resting(99.0)
+    monkeypatch.setattr(decide_module, "shared", lambda _: Cause.of("port_was_locked"))
+    assert ask(world, 100.0).startswith("a program that cannot be found out had the port")
+    assert world.memory.operator.target_pct is None
 
 
 def test_to_60_stops_at_60_and_stays_there() -> None:

@@ -101,8 +101,8 @@ ANSWERS = (
     ),
     Answer(
         "Charge it although it is at 99 %",
-        "`--to` replaces the policy's target for this one charge, and `start` says what it would do without it. Every "
-        "limit of the policy holds as ever.",
+        "`--to` replaces the policy's target for this one charge; its limits hold as ever. A plain `start` says that "
+        "there is nothing to do, and names this command.",
         "start bay-5 --to 100",
     ),
     Answer("How far does it charge, and who wants that?", "NOTES says it until the charge is over.", "status bay-5"),
