@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.cli import main
 from orchestrator.core.persisted import Persisted, PersistedFault
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause, Request, State
@@ -15,6 +16,7 @@ from orchestrator.service.asked import Asked
 from orchestrator.service.asker import Asker
 from orchestrator.service.instant import instant
 from orchestrator.service.past import Place
+from orchestrator.service.terms import START_WITH, Terms
 from orchestrator.text.catalogue import say
 from tests.service.bench import Bench, fields_of, the_bay
 
@@ -49,13 +51,13 @@ def asks(bench: Bench, asked: Asked) -> str:
     return say(asked.answer)
 
 
-def held(directory: Path, **terms: float) -> Bench:
+def held(directory: Path, target_pct: float | None = None) -> Bench:
     """A bay that kim has stopped, and shall start at 22:00."""
     bench = Bench(directory)
     bench.charging()
     asks(bench, Asked(Request.STOP, KIM))
     bench.until(State.HELD)
-    assert asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S, **terms)) == ""
+    assert asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S, target_pct=target_pct)) == ""
     return bench
 
 
@@ -183,6 +185,49 @@ def test_what_the_disk_does_not_take_is_forgotten(tmp_path: Path, wall: Wall) ->
     bench.bay._answers.look(bench.now_s)
     assert say(asked.answer).startswith("not done: ")
     assert (told(bench), bench.bay.status()["state"]) == ("", "CHARGING")
+
+
+def test_nobody_known_may_ask_too(tmp_path: Path, wall: Wall) -> None:
+    bench = Bench(tmp_path)
+    bench.until(State.CHARGING)
+    asks(bench, Asked(Request.STOP))
+    asks(bench, Asked(Request.START, start_unix_s=AT_S, target_pct=60.0))
+    assert told(bench).startswith("starts at 22:00 and charges once to 60 % (asked by ? at ")
+    wall.now_s = AT_S
+    bench.charging()
+    target = bench.bay.status()["target"]
+    assert isinstance(target, dict) and (target["soc_pct"], target["text"]) == (60.0, "charges once to 60 %")
+
+
+# --- what a request says ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("target", [0, 100.5, -1, float("nan"), True, "60", [], {}])
+def test_a_target_is_a_soc(target: object) -> None:
+    with pytest.raises(RequestError) as error:
+        Terms.of({"verb": START_WITH, "to": target}, ASKED_S)
+    assert say(error.value.cause).endswith(": it is a SOC in percent, above 0 and at most 100")
+
+
+def test_only_a_start_has_terms() -> None:
+    assert Terms.of({"verb": "stop", "to": 60, "at": "22:00"}, ASKED_S) == Terms()
+
+
+def test_an_answer_says_when_it_starts() -> None:
+    terms = Terms.of({"verb": START_WITH, "to": 60, "at": "22:00"}, ASKED_S)
+    assert terms.fields == {"target_soc_pct": 60.0, "start_at": AT_S}
+    done: list[dict[str, object] | None] = [None, {"language": "en"}]
+    results = terms.told(lambda: done.pop(0), lambda: ASKED_S, "en")
+    assert results() is None
+    answer = results()
+    assert answer is not None and isinstance(then := answer["then"], dict)
+    assert then["text"] == "it starts at 22:00, in 3 h 50 min"
+
+
+@pytest.mark.parametrize("target", ["0", "101", "nan"])
+def test_a_wrong_target_is_wrong_use(target: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["start", "bay-1", "--to", target]) == 2
+    assert f"start: --to {target}: it is a SOC in percent, above 0 and at most 100" in capsys.readouterr().err
 
 
 # --- which time is meant ----------------------------------------------------------------------------------------------
