@@ -118,8 +118,10 @@ def what_to_do(bay: Bay, language: str = "") -> str:
 
 
 def below(bay: Bay, language: str) -> Iterator[str]:
-    """Its further details: other faults, what is old, a policy that waits."""
+    """Its further details: other faults, what a person has asked for, what is old, a policy that waits."""
     yield from (f"{fault['effect']}: {fault['text']}" for fault in other_faults(bay))
+    asked = (cast("Mapping[str, object]", bay.get(name) or {}) for name in ("target", "timed_start"))
+    yield from (str(one["text"]) for one in asked if one)
     if old := "; ".join(say(one, language) for one in _old_values(bay)):
         yield labelled("old", old, language)
     if cast("Mapping[str, object]", bay.get("policy", {})).get("waiting_sha256"):

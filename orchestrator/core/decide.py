@@ -14,7 +14,7 @@ from orchestrator.core.history import stage as stages
 from orchestrator.core.machine import fire
 from orchestrator.core.memory import Memory, Sequence
 from orchestrator.core.next_transition import next_transition
-from orchestrator.core.operator import handle_request, held_back
+from orchestrator.core.operator import handle_request, held_back, over
 from orchestrator.core.parts import changed, made
 from orchestrator.core.rules import Rules
 from orchestrator.core.safestop import must_stop, stands_by
@@ -85,10 +85,12 @@ def _requested(f: Facts, snapshot: Snapshot) -> tuple[Facts, Cause | None]:
     if request is not None:
         heard = handle_request(
             f.memory, request, f.now_s, snapshot.not_persisted, f.rules.bay.name,
-            at_rest=stands_by(f), by=snapshot.asked_by,
+            at_rest=stands_by(f), by=snapshot.asked_by, target_pct=snapshot.target_pct, soc_pct=f.soc,
         )  # fmt: skip
         refusal = heard.refusal
         f = f.with_memory(changed(f.memory, operator=heard.operator, faults=heard.faults))
+    if f.memory.operator.target_pct is not None and (f.battery_removed or f.memory.battery.another):
+        f = f.with_memory(changed(f.memory, operator=over(f.memory.operator)))
     if (hold := shared(f.charger)) is not None:
         f = f.with_memory(changed(f.memory, operator=held_back(f.memory.operator, hold)))
         refusal = hold if request is Request.START else refusal
@@ -109,7 +111,11 @@ def _move(f: Facts, faults: tuple[ActiveFault, ...]) -> tuple[Facts, Cause, Sess
         return f, cause, None
     held = memory.operator.hold if memory.state is State.HELD else None  # without the advice added to it
     result = (memory.stop.stop_cause if before is State.STOPPING else held) or cause
-    return f.with_memory(changed(memory, session=None)), cause, session.ended(memory.session, result)
+    return (
+        f.with_memory(changed(memory, session=None, operator=over(memory.operator))),
+        cause,
+        session.ended(memory.session, result),
+    )
 
 
 def _is_over(f: Facts, before: State) -> bool:

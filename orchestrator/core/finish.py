@@ -8,6 +8,7 @@ the BMU's SOC if the policy trusts it. Then it may stay on charge for a while to
 from orchestrator.config.amperes import END_SHARE, end_v
 from orchestrator.config.policy import Needs
 from orchestrator.core.facts import Facts
+from orchestrator.core.memory import Operator
 from orchestrator.model import Cause
 
 #: If a charger ends a charge below this state of charge, it is wrong, or the BMU is.
@@ -24,8 +25,11 @@ DAY_S = 86400.0
 def finished(f: Facts) -> Cause | None:
     """Why the charge is over, with the policy's line; None while it is not."""
     rule, by_policy = f.rules.policy.finish, f.rules.by_policy
-    if not goes_full(f) and f.soc is not None and f.soc >= rule.target_soc_pct:
-        return by_policy("full_soc", "finish.target_soc_pct", soc_pct=f.soc, limit_pct=rule.target_soc_pct)
+    target_pct, key = target(f)
+    if target_pct < 100 and f.soc is not None and f.soc >= target_pct:
+        if (what := once(f.memory.operator)) is not None:
+            return Cause.of("once_reached", soc_pct=f.soc, target_pct=target_pct, what=what)
+        return by_policy("full_soc", key, soc_pct=f.soc, limit_pct=target_pct)
     ended = ends_hold(f) or _by_charger(f)
     if ended is not None:
         return ended
@@ -58,7 +62,7 @@ def known_full(f: Facts) -> Cause | None:
 
 def _by_soc(f: Facts) -> Cause | None:
     full_pct = f.rules.policy.finish.full.soc_pct
-    if full_pct is None or f.soc is None or f.soc < full_pct:
+    if full_pct is None or f.soc is None or f.soc < max(full_pct, f.memory.operator.target_pct or 0.0):
         return None
     return f.rules.by_policy("full_soc", "finish.full.soc_pct", soc_pct=f.soc, limit_pct=full_pct)
 
@@ -129,16 +133,38 @@ def full_due(f: Facts) -> bool:
     return days is not None and full_s is not None and f.now_s - full_s >= days * DAY_S
 
 
+def waits_a_day(f: Facts, full_s: float | None) -> float | None:
+    """When it was charged all the way; after a charge to a lower target, a full one that is due waits for a day."""
+    days = f.rules.policy.finish.full_every_days
+    if f.memory.operator.target_pct is None or days is None or full_s is None:
+        return full_s
+    return max(full_s, f.now_s - days * DAY_S + DAY_S)
+
+
 def goes_full(f: Facts) -> bool:
     """Whether this charge goes all the way."""
-    return f.rules.policy.finish.target_soc_pct >= 100 or full_due(f)
+    return target(f)[0] >= 100
 
 
 def target(f: Facts) -> tuple[float, str]:
-    """The target state of charge, and the key that sets it."""
+    """The target state of charge, and the key that sets it; no key if a person has asked for it once."""
+    asked_pct = f.memory.operator.target_pct
+    if asked_pct is not None:
+        return asked_pct, ""
     if full_due(f):
         return 100.0, "finish.full_every_days"
     return f.rules.policy.finish.target_soc_pct, "finish.target_soc_pct"
+
+
+def once(known: Operator) -> Cause | None:
+    """That one charge goes to a target whatever the policy says, and who has asked for that; None if nobody has."""
+    if known.target_pct is None:
+        return None
+    by = known.target_by
+    if by is None:
+        return Cause.of("charges_once", target_pct=known.target_pct)
+    asked = tuple(one for one in by.params if one[0] in ("who", "asked_unix_s", "because"))
+    return Cause("charges_once_by", (("target_pct", known.target_pct), *asked))
 
 
 def goes_on(f: Facts) -> Cause | None:

@@ -54,6 +54,8 @@ class Operator:
     paused: bool = event(default=False)  #: the operator paused the bay …
     paused_by: Cause | None = event(None)  #: … with this name; None: unknown
     resets: tuple[tuple[float, str], ...] = event(())  #: (when, fault id) of a person's resets in the last hour
+    target_pct: float | None = event(None, tells=ANYWHERE)  #: the SOC to charge to once; None: by the policy …
+    target_by: Cause | None = event(None)  #: … and who has asked for that; None: unknown
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from orchestrator.core.finish import finished, goes_full
 from orchestrator.core.history import battery, stage
 from orchestrator.core.history import session as sessions
 from orchestrator.core.machine import Trigger
-from orchestrator.core.operator import RESET, pause
+from orchestrator.core.operator import RESET, over, pause
 from orchestrator.core.outofcontrol import out_of_control
 from orchestrator.core.resting import absent, ending, held, offline, resting_place
 from orchestrator.core.safestop import LOST_S, gives_up, verified
@@ -68,7 +68,7 @@ def _energised(f: Facts, faults: Faults) -> Next:
             session = f.memory.session
             known = battery.charged_full(f, all_the_way=goes_full(f) or bool(session is not None and session.full))
             cause = Cause.of("full", key=full.key, place=full.place, what=full)
-            return Next(Trigger.STOP, cause, {"battery": known})
+            return Next(Trigger.STOP, cause, {"battery": known, "operator": over(f.memory.operator)})
         return Next(None, _charging(f, faults))
     return _precharging(f)
 

@@ -46,6 +46,8 @@ class Told:
     bay: str  #: the name for commands
     at_rest: bool
     by: Cause | None  #: who requests it, and why, as the cause that this becomes
+    target_pct: float | None = None  #: to which SOC a start shall charge once
+    soc_pct: float | None = None  #: the battery's SOC now
 
 
 def handle_request(
@@ -57,21 +59,29 @@ def handle_request(
     *,
     at_rest: bool = False,
     by: Cause | None = None,
+    target_pct: float | None = None,
+    soc_pct: float | None = None,
 ) -> Heard:
     """Carry out the request or refuse it.
 
     `bay` is the name for commands; `at_rest`: the charger is in standby, verified; `by` is who requests it, if known.
+    A start with a `target_pct` charges once to that SOC; `soc_pct` is the SOC now.
     A request that would allow a charge is refused while nothing can be saved (`not_persisted` says why); a stop never
     is.
     """
     if not_persisted is not None and request in (Request.START, Request.RESET):
         return _refused(memory, Cause.of("not_done", advice="not_persisted", problem=not_persisted))
-    return VERBS[request](memory, now_s, Told(bay, at_rest, by))
+    return VERBS[request](memory, now_s, Told(bay, at_rest, by, target_pct, soc_pct))
 
 
 def stopped(known: Operator, by: Cause | None = None) -> Operator:
     """The operator's part of the memory after a stop."""
-    return changed(known, hold=_joined(known.hold, by or STOPPED))
+    return changed(over(known), hold=_joined(known.hold, by or STOPPED))
+
+
+def over(known: Operator) -> Operator:
+    """The operator's part of the memory once the one charge to a target is over, or its battery gone."""
+    return known if known.target_pct is None else changed(known, target_pct=None, target_by=None)
 
 
 def is_own(hold: Cause) -> bool:
@@ -93,7 +103,7 @@ def _joined(before: Cause | None, new: Cause) -> Cause:
 
 def held_back(known: Operator, why: Cause) -> Operator:
     """The operator's part of the memory where nobody but a person may let a charge begin, for this reason."""
-    return changed(known, hold=why)
+    return changed(over(known), hold=why)
 
 
 def _refused(memory: Memory, why: Cause) -> Heard:
@@ -119,11 +129,22 @@ def _start(memory: Memory, now_s: float, told: Told) -> Heard:
         return _refused(memory, OUT_OF_CONTROL)
     if refusals := _refusals(memory, now_s, told, Request.START):
         return _refused(memory, together(refusals))
+    if told.target_pct is not None and (wrong := _not_to(told.target_pct, told.soc_pct)) is not None:
+        return _refused(memory, wrong)
     before, known = memory.faults, memory.operator
     faults, _ = latches.release(before, now_s, by_reset=False)
-    if not (known.hold or known.paused) and len(faults) == len(before) and memory.state not in AT_WORK:
+    if told.target_pct is not None:
+        known = changed(known, target_pct=told.target_pct, target_by=told.by)
+    elif not (known.hold or known.paused) and len(faults) == len(before) and memory.state not in AT_WORK:
         return _refused(memory, Cause.of("nothing_to_start", state=memory.state.value, what=memory.cause))
     return Heard(changed(known, hold=None, paused=False, paused_by=None), faults)
+
+
+def _not_to(target_pct: float, soc_pct: float | None) -> Cause | None:
+    """Why no charge to this target can begin."""
+    if soc_pct is None:
+        return Cause("target_unseen")
+    return Cause.of("target_reached", soc_pct=soc_pct, target_pct=target_pct) if soc_pct >= target_pct else None
 
 
 def _reset(memory: Memory, now_s: float, told: Told) -> Heard:

@@ -35,6 +35,17 @@ class PersistedFault:
 
 
 @dataclass(frozen=True, slots=True)
+class TimedStart:
+    """A start that a person has asked for at a time of day, by the wall clock; the core knows nothing of it."""
+
+    start_unix_s: float
+    by: Cause | None = None  #: who asked for it, and when; None: unknown
+    target_pct: float | None = None  #: of its one charge; None: by the policy
+    spares: bool = False  #: a bay that somebody else holds by then is left alone
+    outcome: Cause | None = None  #: why it was not made; None: it is to come
+
+
+@dataclass(frozen=True, slots=True)
 class Persisted:
     """The persisted state of one bay."""
 
@@ -43,6 +54,8 @@ class Persisted:
     hold: Cause | None = None  #: why a person must start; as in the core's memory
     paused: bool = False
     paused_by: Cause | None = None  #: who paused it, if known
+    target_pct: float | None = None  #: the SOC to charge to once; None: by the policy …
+    target_by: Cause | None = None  #: … and who has asked for that
     faults: Mapping[str, PersistedFault] = field(default_factory=dict)
     resets: tuple[tuple[Age, str], ...] = ()
     session: Session | None = None  #: the open charge with all its counters; `started_s` is an age
@@ -51,6 +64,7 @@ class Persisted:
     soc: tuple[Age, float] | None = None  #: the newest SOC of the battery in the bay
     serial: int | None = None  #: its serial number; None: it has none
     typed: str = ""  #: its id as an operator typed it; the core knows nothing of it
+    timed: TimedStart | None = None  #: the start at a time of day
 
     @classmethod
     def of(cls, memory: Memory, now_s: float) -> "Persisted":
@@ -74,6 +88,8 @@ class Persisted:
             hold=memory.operator.hold,
             paused=memory.operator.paused,
             paused_by=memory.operator.paused_by,
+            target_pct=memory.operator.target_pct,
+            target_by=memory.operator.target_by,
             faults=faults,
             resets=tuple((now_s - t_s, name) for t_s, name in memory.operator.resets),
             session=replace(session, started_s=now_s - session.started_s) if session is not None else None,
@@ -96,6 +112,9 @@ class Persisted:
             self.full_pct is None,
             self.serial,
             self.typed,
+            self.timed,
+            self.target_pct,
+            self.target_by,
         )
         return self.running, self.hold, self.paused, self.paused_by, faults, resets, *known
 
@@ -150,6 +169,8 @@ class Persisted:
             hold=self.hold or (together(others) if others else None),
             paused=self.paused,
             paused_by=self.paused_by,
+            target_pct=self.target_pct,
+            target_by=self.target_by,
             faults=faults,
             resets=tuple((now_s - age_s, name) for age_s, name in self.resets),
             session=replace(session, started_s=now_s - session.started_s) if session is not None else None,

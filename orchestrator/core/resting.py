@@ -5,7 +5,7 @@ from collections.abc import Callable
 from orchestrator.core.active import active_faults
 from orchestrator.core.facts import Facts
 from orchestrator.core.faults import ROW, Clear
-from orchestrator.core.finish import full_due, goes_on, target
+from orchestrator.core.finish import full_due, goes_on, once, target
 from orchestrator.core.machine import Trigger
 from orchestrator.core.memory import with_values
 from orchestrator.core.operator import is_own, pause
@@ -95,7 +95,7 @@ def _full(f: Facts, why: Cause) -> Cause:
     """Why the battery counts as full, and what begins the next charge."""
     ended = f.memory.stop.stop_cause
     known = ended if ended is not None and ended.id == "full" else Cause("full_before")
-    again = Cause("charged_again", why.params, why.key, why.place) if f.soc is not None else why
+    again = Cause("charged_again", why.params, why.key, why.place) if why.id == "soc_not_below" else why
     return Cause(known.id, (*known.params, ("past", True), ("then", again)), known.key, known.place)
 
 
@@ -140,12 +140,17 @@ def _start(f: Facts) -> Cause:
 
 def _wanted(f: Facts) -> tuple[bool, Cause]:
     """Whether the battery wants a charge, and why (not)."""
-    policy, full_pct = f.rules.policy, f.memory.battery.full_pct
+    policy, full_pct, asked_pct = f.rules.policy, f.memory.battery.full_pct, f.memory.operator.target_pct
+    interrupted = full_pct is None and f.memory.session is not None
     if f.soc is None:
         return False, Cause("soc_unknown")
-    if full_pct is None and f.memory.session is not None:  # an interrupted charge is completed
-        if unfinished := goes_on(f):
-            return True, unfinished
+    if interrupted and (unfinished := goes_on(f)):  # an interrupted charge is completed
+        return True, unfinished
+    if asked_pct is not None:
+        below = f.soc < asked_pct
+        id_ = "once_below" if below else "once_not_below"
+        return below, Cause.of(id_, soc_pct=f.soc, target_pct=asked_pct, what=once(f.memory.operator))
+    if interrupted:
         threshold, key = target(f)
     elif full_pct is None:
         key, threshold = "start.soc_below_pct", policy.start.soc_below_pct

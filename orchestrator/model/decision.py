@@ -43,6 +43,7 @@ class Snapshot:
     moves: str = ""  #: the other bay whose BMU saw the first amperes of this bay's charger, if that happened
     running_persisted: bool = True  #: the disk records that this bay's charger may be running
     asked_by: Cause | None = None  #: who made the request, when and why, as the cause that it becomes
+    target_pct: float | None = None  #: to which SOC a requested start shall charge once; None: by the policy
 
 
 class State(StrEnum):

@@ -1,36 +1,89 @@
 """An operator's request on its way: handled by one decision, answered when its effect is on disk."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import takewhile
 from threading import Event, Lock
 
 from orchestrator.core.memory import Memory
+from orchestrator.core.persisted import TimedStart
 from orchestrator.model import Cause, Request
-from orchestrator.service.asker import NOBODY, Asker, held_by_others
+from orchestrator.service.asker import NOBODY, Asker, held_by_others, person_of, started_later
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 
 
 class Asked:
-    """`answer` is valid once `done` is set: None means yes. `spares`: a bay that somebody else holds is left alone."""
+    """`answer` is valid once `done` is set: None means yes. `spares`: a bay that somebody else holds is left alone.
 
-    def __init__(self, request: Request, asker: Asker = NOBODY, *, spares: bool = False) -> None:
+    A start may have a target for its one charge, `target_pct`, and a time, `start_unix_s`: then it is only noted, and
+    made at that time, as `timed`.
+    """
+
+    def __init__(
+        self,
+        request: Request,
+        asker: Asker = NOBODY,
+        spares: bool = False,  # noqa: FBT001, FBT002 - as in a request
+        target_pct: float | None = None,
+        start_unix_s: float | None = None,
+        timed: TimedStart | None = None,
+    ) -> None:
         self.request, self.asker, self.spares = request, asker, spares
+        self.target_pct, self.start_unix_s, self.timed = target_pct, start_unix_s, timed
         self.answer: Cause | None = None
         self.done = Event()
+
+    @classmethod
+    def of(cls, timed: TimedStart) -> "Asked":
+        """A start whose time has come."""
+        return cls(Request.START, spares=timed.spares, target_pct=timed.target_pct, timed=timed)
 
     @property
     def by(self) -> Cause | None:
         """Who asks, and why, as the core takes it."""
-        return self.asker.cause(self.request)
+        if self.timed is not None:
+            return started_later(self.timed)
+        return self.asker.cause(self.request, self.target_pct)
 
     def is_like(self, other: "Asked") -> bool:
         """Whether one decision answers both."""
-        return (self.request, self.asker, self.spares) == (other.request, other.asker, other.spares)
+        return self.sort == other.sort
 
     def spared(self, memory: Memory | None, bay: str) -> Cause | None:
         """Why the bay is left alone, if it is."""
-        what = held_by_others(memory.operator, self.asker) if self.spares and memory is not None else None
+        person = self.asker.person if self.timed is None else person_of(self.timed.by)
+        what = held_by_others(memory.operator, person) if self.spares and memory is not None else None
         return Cause.of("held_by_others", what=what, bay=bay) if what is not None else None
+
+    @property
+    def sort(self) -> tuple[object, ...]:
+        """Equal for requests that are alike."""
+        return self.request, self.asker, self.spares, self.target_pct, self.start_unix_s, self.timed
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """What is asked of one decision."""
+
+    request: Request | None = None
+    by: Cause | None = None  #: who asks, and why
+    target_pct: float | None = None
+    noted: TimedStart | None = None  #: a start that is asked for later …
+    timed: TimedStart | None = None  #: … or one whose time has come
+    refusal: Cause | None = None  #: why nothing is asked of it
+
+    @classmethod
+    def of(cls, asked: Sequence[Asked], memory: Memory | None, bay: str) -> "Taken":
+        """Of the requests that one decision answers: they are all alike."""
+        if not asked:
+            return cls()
+        one = asked[0]
+        if (spared := one.spared(memory, bay)) is not None:
+            return cls(timed=one.timed, refusal=spared)
+        if one.start_unix_s is not None:
+            later = TimedStart(one.start_unix_s, one.asker.cause(one.request), one.target_pct, one.spares)
+            return cls(noted=later)
+        return cls(one.request, one.by, one.target_pct, timed=one.timed)
 
 
 class Requests:
@@ -65,11 +118,11 @@ class Answers:
     """One bay's completed requests that are not on disk yet. Used by the control loop only.
 
     A start that the disk does not take is withdrawn: `withdraw` holds the bay again. Nothing has begun by then: a
-    charger is commanded to run only once the start is on disk.
+    charger is commanded to run only once the start is on disk. One that is asked for later is forgotten (`forget`).
     """
 
-    def __init__(self, store: Store, withdraw: Callable[[], None]) -> None:
-        self._store, self._withdraw = store, withdraw
+    def __init__(self, store: Store, withdraw: Callable[[], None], forget: Callable[[Asked], None]) -> None:
+        self._store, self._withdraw, self._forget = store, withdraw, forget
         self.waiting: list[
             tuple[Asked, int, float, bool]
         ] = []  #: (request, revision that persists it, time until which to wait, whether it changed anything)
@@ -95,7 +148,9 @@ class Answers:
                 asked.answer = Cause.of(
                     "not_done" if starts else "done_not_persisted", problem=problem or Cause("not_taken")
                 )
-                if starts and changed:
+                if asked.start_unix_s is not None:
+                    self._forget(asked)
+                elif starts and changed:
                     self._withdraw()
             asked.done.set()
         self.waiting = left

@@ -2,11 +2,12 @@
 
 import pwd
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 from orchestrator.core.memory import Operator
 from orchestrator.core.operator import NAMED
+from orchestrator.core.persisted import TimedStart
 from orchestrator.lastresort.signing import one_line
 from orchestrator.model import Cause, Request
 from orchestrator.model.cause import parts, together
@@ -61,13 +62,14 @@ class Asker:
             return self.person
         return Cause.of("on_behalf", user=user_name(self.uid), person=self.behind)
 
-    def cause(self, request: Request) -> Cause | None:
-        """What the request becomes; None if nobody knows who makes it."""
+    def cause(self, request: Request, target_pct: float | None = None) -> Cause | None:
+        """What the request becomes, a start with the target of its one charge; None if nobody knows who makes it."""
         if self.uid is None:
             return None
         id_ = "estopped_by" if self.estop and request is Request.STOP else BECOMES[request]
         because = {"because": self.because} if self.because else {}
-        return Cause.of(id_, who=self.who, asked_unix_s=self.unix_s, **because)
+        cause = Cause.of(id_, who=self.who, asked_unix_s=self.unix_s, **because)
+        return cause if target_pct is None else replace(cause.with_(target_pct=target_pct), id="started_to_by")
 
 
 NOBODY = Asker()  #: known
@@ -77,10 +79,25 @@ def _text(value: object) -> str:
     return one_line(value) if isinstance(value, str) else ""
 
 
-def held_by_others(operator: Operator, asker: Asker) -> Cause | None:
-    """The stops and pauses of other people that hold a bay; None if there are none."""
+def started_later(timed: TimedStart) -> Cause | None:
+    """Who has asked for a start whose time has come, as the core takes it."""
+    if timed.by is None:
+        return None
+    told = timed.by.with_(start_unix_s=timed.start_unix_s)
+    if timed.target_pct is None:
+        return replace(told, id="started_later_by")
+    return replace(told.with_(target_pct=timed.target_pct), id="started_later_to_by")
+
+
+def person_of(by: Cause | None) -> str:
+    """The name of the person who has made a request; "" if unknown."""
+    return str(_person(by.param("who")) or "") if by is not None else ""
+
+
+def held_by_others(operator: Operator, person: str) -> Cause | None:
+    """The stops and pauses of others than this person that hold a bay; None if there are none."""
     holds = [one for hold in (operator.hold, operator.paused_by) if hold is not None for one in parts(hold)]
-    others = [one for one in holds if one.id in NAMED and _person(one.param("who")) != asker.person]
+    others = [one for one in holds if one.id in NAMED and _person(one.param("who")) != person]
     return together(others) if others else None
 
 

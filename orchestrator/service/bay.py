@@ -14,7 +14,8 @@ from orchestrator.core.persisted import Persisted
 from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
-from orchestrator.service.asked import Answers, Asked, Requests
+from orchestrator.service.asked import Answers, Asked, Requests, Taken
+from orchestrator.service.bay_document import described
 from orchestrator.service.bayjournal import BayJournal
 from orchestrator.service.bayrecord import BayRecord
 from orchestrator.service.contactor import Contactor
@@ -22,12 +23,12 @@ from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.identified import Identified
 from orchestrator.service.journal import Journal
 from orchestrator.service.news import TICK_S, due_s
-from orchestrator.service.outlook import outlook
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
 from orchestrator.service.records import transition
+from orchestrator.service.start_timer import StartTimer
 from orchestrator.service.starts import Starts
-from orchestrator.service.status import bay_status, contactor_fields, told
+from orchestrator.service.status import contactor_fields
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
 
@@ -55,8 +56,9 @@ class BayRunner:
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
         self._store, self._say = store, say
+        self._timer = StartTimer(self.place, store, journal, say, language)
         # A start that could not be persisted is withdrawn: the bay is held, as after a stop.
-        self._answers = Answers(store, lambda: self.ask(Asked(Request.STOP)))
+        self._answers = Answers(store, lambda: self.ask(Asked(Request.STOP)), self._timer.withdraw)
         self.identified = Identified(bay, store, journal, say, language)
         self._memory: Memory | None = None  # None before the first decision: the persisted state is still being read
         self._revision = 0  # the revision that persists this bay's memory
@@ -68,8 +70,7 @@ class BayRunner:
         self._contactor, self._record = contactor, record
         self._starts = starts or Starts(0.0, "")  # no other bay to wait for
         self._snapshot = Snapshot()
-        self._requests, self._internal = Requests(), ""
-        self._by: Cause | None = None  # who made the request that is being decided
+        self._requests, self._taken, self._internal = Requests(), Taken(), ""
 
     @property
     def verified(self) -> bool:
@@ -131,19 +132,19 @@ class BayRunner:
 
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
-        asked, before = self._requests.take(), self._revision
-        spared = asked[0].spared(self._memory, self.name) if asked else None
-        request, self._by = (asked[0].request, asked[0].by) if asked and spared is None else (None, None)
+        before, clock = self._revision, WallClock(now_s, time())
+        asked = self._requests.take() or self._timer.due(clock)
+        taken = self._taken = Taken.of(asked, self._memory, self.name)
+        self._timer.take(taken)
         try:
-            self._step(now_s, asleep_s, request)
+            self._step(now_s, asleep_s, taken.request)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
             self._charger.command(STOP)
-            self._failed(error, now_s, request)
+            self._failed(error, now_s, taken.request)
             self._drive(now_s, closed=self.decision is not None and self.decision.closed)
+        answer = clock.told(taken.refusal or (self.decision.answer if self.decision else None))
         for one in asked:
-            answer, changed = self.decision.answer if self.decision else None, self._revision != before
-            answer = WallClock(now_s, time()).told(spared or answer)
-            self._answers.give(one, answer, self._revision, now_s, changed=changed)
+            self._answers.give(one, answer, self._revision, now_s, changed=self._revision != before)
         self._answers.look(now_s)
 
     def _failed(self, error: Exception, now_s: float, request: Request | None) -> None:
@@ -154,7 +155,7 @@ class BayRunner:
             self._say(Cause.of("bay_internal", bay=self.name, error=internal))
         self._internal, self.last_s, self.due_s = internal, now_s, now_s + TICK_S
         try:
-            snapshot, memory = replace(self._snapshot, request=request, asked_by=self._by), self._memory
+            snapshot, memory = replace(self._snapshot, request=request, asked_by=self._taken.by), self._memory
             memory = memory or self._store.past(self.place).memory(now_s)
             self.decision, self._memory = carry_on(now_s, snapshot, memory, internal, self.name)
             self._keep(self._memory, now_s)
@@ -183,6 +184,7 @@ class BayRunner:
         if before is None or before.state is not decision.state:
             self._say(transition(self.name, before, decision, clock))
         self.identified.follow(now_s, snapshot, self._memory)
+        self._timer.decided(self._taken, decision.answer, clock)
         self._keep(self._memory, now_s)
         if self._record is not None:
             self._record.take(clock, snapshot, decision, self.policy.rules.bay, self.identified.identity)
@@ -195,12 +197,7 @@ class BayRunner:
         slept_s = asleep_s - self._asleep_s if self.decision else 0.0
         self._asleep_s = asleep_s
         snapshot = Snapshot(
-            reading,
-            charger_link,
-            values,
-            battery_link,
-            request,
-            self._internal,
+            reading, charger_link, values, battery_link, request, self._internal,
             late_s=late_s if late_s > TICK_S else 0.0,  # less is normal on such a machine
             slept_s=slept_s if slept_s > TICK_S else 0.0,
             not_persisted=self._store.not_persisted(now_s),
@@ -208,8 +205,9 @@ class BayRunner:
             waits=self._starts.waits(self.name, now_s),
             moves=self._starts.moves(self.name),
             running_persisted=(on_disk := self._store.on_disk(self.place)) is not None and on_disk.running,
-            asked_by=self._by,
-        )
+            asked_by=self._taken.by,
+            target_pct=self._taken.target_pct,
+        )  # fmt: skip
         if (fitted := self._contactor) is not None:
             return replace(snapshot, connected=fitted.connects(reading), contactor_problem=fitted.problem)
         return snapshot
@@ -228,6 +226,7 @@ class BayRunner:
 
     def _keep(self, memory: Memory, now_s: float) -> None:
         persisted = self.identified.kept(Persisted.of(memory, now_s))
+        persisted = self._timer.kept(persisted)
         if self._waits and not persisted.hold:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)
@@ -236,12 +235,13 @@ class BayRunner:
     def status(self, *, closely: bool = False) -> dict[str, object]:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         decision = self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER)
-        snapshot, memory, rules, contactor = self._snapshot, self._memory, self.policy.rules, self._contactor
-        decision, clock = told(decision, snapshot, memory, rules), WallClock(monotonic(), time())
+        known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
+        contactor = self._contactor
         return {
-            **bay_status(self.name, snapshot, decision, clock.now_s, clock.wall_s, self._language),
-            **outlook(decision, snapshot, memory, rules, clock, self._language, closely=closely),
+            **described(self.name, decision, *known, clock, self._language, closely=closely),
+            **self._timer.next(decision.state, clock),
             "identity": self.identified.status(),
+            "timed_start": self._timer.status(clock),
             "contactor": contactor and contactor_fields(contactor, self._language),
             "port": self.place.port,
             "bmu": {"can": self.place.can, "node_id": self.place.node_id},

@@ -87,7 +87,7 @@ def _next(bay: Bay, clock: WallClock, language: str) -> Iterator[Line]:
     if not coming.get("text"):
         return
     at_s, text = coming.get("at"), str(coming["text"])
-    if isinstance(at_s, int | float) and (end_at := clock.time_of_day(at_s)) not in text:
+    if isinstance(at_s, int | float) and (end_at := clock.time_of_day(at_s)).removesuffix(":00") not in text:
         text = say(Cause.of("next_at", what=text, end_at=end_at), language)
     if not coming.get("by_itself"):
         text = say(Cause.of("next_person", what=text), language)
@@ -133,6 +133,8 @@ def _devices(bay: Bay, language: str) -> Iterator[Line]:
     battery, charger = (cast("Mapping[str, object]", bay[part]) for part in ("battery", "charger"))
     bmu = cast("Mapping[str, object]", bay.get("bmu") or {})
     old = cast("Sequence[str]", battery.get("old", ()))
+    if identity := cast("Mapping[str, object]", bay.get("identity") or {}):
+        yield "page_battery", "", str(identity["text"])
     shown = list(_figures(battery, BATTERY, old, language))
     if bmu:
         shown.append(say(Cause.of("battery_on", can=bmu["can"], node_id=bmu["node_id"]), language))

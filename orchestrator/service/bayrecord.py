@@ -60,8 +60,8 @@ class BayRecord:
 
     def _take(self, look: Look, bay: BayConfig, identity: Identity) -> None:
         session, asked = look.session, look.snapshot
-        if self._charge is None and asked.request is Request.START and asked.asked_by and look.decision.answer is None:
-            self._by = look.plainly(asked.asked_by)
+        if asked.request is Request.START and asked.asked_by is not None and look.decision.answer is None:
+            self._started(look.plainly(asked.asked_by), once=asked.target_pct is not None)
         if self._pending is None:
             self._pending = self._recorder.opened(self._place.bay, self._place.port)
             self._over = self._recorder.last(self._place.bay)
@@ -75,6 +75,13 @@ class BayRecord:
             self._put(charges.unseen(charge), charge.last)
         if session is not None:
             self._begin(look, session, bay, identity)
+
+    def _started(self, by: Mapping[str, object], *, once: bool) -> None:
+        """Somebody has started it; one who gives a charge that goes on a target of its own is named there, too."""
+        if self._charge is None:
+            self._by = by
+        elif once:
+            self._charge = replace(self._charge, head={**self._charge.head, "by": by})
 
     def _go_on(self, pending: Sequence[Charge], look: Look, session: Session | None) -> bool:
         """Go on with the charge left open that the core goes on with; the others have ended unseen. False: not yet."""

@@ -154,7 +154,7 @@ def forecast(f: Facts, clock: WallClock) -> dict[str, object] | None:
         "target_soc_pct": target_pct,
         "goes_full": goes_full(f),
         "key": key,
-        "place": f.rules.policy.source.at(key),
+        "place": f.rules.policy.source.at(key) if key else "",
         "bmu_min": bmu,
         "bmu_at": _after(bmu, clock),
         "own_min": round(own, 1) if own is not None else None,

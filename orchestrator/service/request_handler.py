@@ -20,6 +20,7 @@ from orchestrator.service.request_log import RequestLog
 from orchestrator.service.status import station_status
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.service.strays import Strays
+from orchestrator.service.terms import START_WITH, Terms
 from orchestrator.text.catalogue import say
 
 #: The next decision handles a request; the answer comes when it is on disk, or after 2 s. Later means a hung loop.
@@ -66,13 +67,15 @@ class RequestHandler:
             return station_status(self._station, alarm, shown, problem, not_persisted, strays)
         if verb == RELOAD:
             return self._reread(Asker.of(request, self._wall()))
-        if isinstance(verb, str) and verb in set(Request):
+        if isinstance(verb, str) and verb in {*Request, START_WITH}:
             names, port, asker = request.get("bays"), request.get("port"), Asker.of(request, self._wall())
             if verb == Request.RESET and isinstance(port, str):
                 return self._drop(port, asker)
-            bays, others = (self._bays, {}) if names is None else self._meant(_names(names), verb)
-            spares = verb == Request.START and request.get("spares") is True
-            return self._ask(bays, partial(Asked, Request(verb), asker, spares=spares), others)
+            terms, wanted = Terms.of(request, self._wall()), Request.START if verb == START_WITH else Request(verb)
+            bays, others = (self._bays, {}) if names is None else self._meant(_names(names), wanted)
+            spares = wanted is Request.START and request.get("spares") is True
+            make = partial(Asked, wanted, asker, spares, terms.target_pct, terms.start_unix_s)
+            return terms.told(self._ask(bays, make, others, terms.fields), self._wall, self._language)
         if verb == IDENTIFY:
             return self._identify(request.get("bays"), request.get("battery"), Asker.of(request, self._wall()))
         raise RequestError(
@@ -182,9 +185,16 @@ class RequestHandler:
         return list(meant), {", ".join(told): unknown(told, known)} if told else {}
 
     def _ask(
-        self, bays: Sequence[BayRunner], make: Callable[[], Asked], others: Mapping[str, Cause] | None = None
+        self,
+        bays: Sequence[BayRunner],
+        make: Callable[[], Asked],
+        others: Mapping[str, Cause] | None = None,
+        more: Mapping[str, object] | None = None,
     ) -> Later:
-        """Pass a request to each bay; their answers come later, "" means yes, with those to `others`."""
+        """Pass a request to each bay; their answers come later, "" means yes, with those to `others`.
+
+        `more` is for the record.
+        """
         asked = {bay.name: make() for bay in bays}
         for bay in bays:
             bay.ask(asked[bay.name])
@@ -197,16 +207,21 @@ class RequestHandler:
             if not all(one.done.is_set() for one in asked.values()) and self._clock() < end_s:
                 return None
             answers = {name: one.answer if one.done.is_set() else late for name, one in asked.items()}
-            return self._results({**answers, **(others or {})}, model.request, model.asker)
+            return self._results({**answers, **(others or {})}, model.request, model.asker, more=more)
 
         return results
 
     def _results(
-        self, answers: Mapping[str, Cause | None], verb: str, asker: Asker, notes: Mapping[str, str] | None = None
+        self,
+        answers: Mapping[str, Cause | None],
+        verb: str,
+        asker: Asker,
+        notes: Mapping[str, str] | None = None,
+        more: Mapping[str, object] | None = None,
     ) -> Answer:
         for name, answer in answers.items():
             note = {"note": notes[name]} if notes else {}
-            self._log.write(name, str(verb), asker, answer, **note)
+            self._log.write(name, str(verb), asker, answer, **note, **(more or {}))
         return {
             "language": self._language,
             "results": {name: say(answer, self._language) for name, answer in answers.items()},

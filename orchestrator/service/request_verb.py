@@ -18,10 +18,12 @@ from orchestrator.model.cause import plain, said
 from orchestrator.service.chosen import Chosen, choose, is_plain, unknown
 from orchestrator.service.client import MAX_REQUEST
 from orchestrator.service.started import not_charging, with_hint
+from orchestrator.service.terms import START_WITH, is_target
 from orchestrator.service.where import find_socket
 from orchestrator.show import is_alarming, own_language, stands_by, strays, what_to_do
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import in_language, language_of_answer, refusals
+from orchestrator.text.document import said as in_own
 
 #: The requests that are complete only once the charger is verified in standby, and how long to wait for that: a
 #: disobedient charger is uncontrollable after 3 s.
@@ -54,8 +56,8 @@ def request(arguments: argparse.Namespace) -> int:
     for bay in accepted:
         verified = verb in STOPS and bay not in unverified
         done = Cause.of("accepted_verified" if verified else "accepted", bay=bay, verb=verb)
-        print(say(done, language), flush=True)
-    for line in not_charging(path, accepted, language) if verb == "start" else ():
+        print(say(done if answers.then is None else done.with_(then=answers.then), language), flush=True)
+    for line in not_charging(path, accepted, language) if verb == "start" and answers.then is None else ():
         print(line)
     return 1 if unverified or missing or any(results.values()) else 0
 
@@ -69,6 +71,8 @@ def _check_use(arguments: argparse.Namespace, port: str | None) -> None:
         )
     if port is not None and arguments.excepted:
         raise UsageError("reset: --except goes with bays or --all, not with --port")
+    if (target := getattr(arguments, "to", None)) is not None and not is_target(target):
+        raise UsageError(f"start: --to {target:g}: it is a SOC in percent, above 0 and at most 100")
 
 
 @dataclass(slots=True)
@@ -79,6 +83,7 @@ class _Answers:
     results: dict[str, str] = field(default_factory=dict)
     missing: list[Cause] = field(default_factory=list)
     causes: dict[str, object] = field(default_factory=dict)  #: of the refusals
+    then: Cause | None = None  #: when an accepted start comes, if not now
 
     def take(self, answer: Mapping[str, object]) -> None:
         self.language = language_of_answer(answer, self.language)
@@ -86,13 +91,15 @@ class _Answers:
         told, strangers = refusals(answer, self.language), _strangers(answer)
         self.missing += [said(told[name]) for name in strangers]
         self.results |= {name: why for name, why in told.items() if name not in strangers}
+        if isinstance(then := answer.get("then"), Mapping):
+            self.then = said(in_own(then, str(then.get("text", "")), self.language))
 
 
 def _asked(arguments: argparse.Namespace, port: str | None, path: Path) -> _Answers:
     """Ask the service, in as many requests as the names need."""
     verb, answers = arguments.verb, _Answers(own_language())
     words = None if arguments.all else arguments.bay
-    base = signed({"verb": verb, **_spares(arguments)}, arguments.because)
+    base = signed({"verb": verb, **_spares(arguments), **_terms(arguments)}, arguments.because)
     if port is not None:
         answers.take(ask(path, {**base, "bays": None, "port": os.path.abspath(port)}))  # noqa: PTH100 - not resolved
         return answers
@@ -125,6 +132,12 @@ def _spares(arguments: argparse.Namespace) -> dict[str, bool]:
     """Whoever names a bay means it. `--all`, or a pattern, is not meant for bays that somebody else holds."""
     named = not arguments.all and is_plain(arguments.bay)
     return {"spares": True} if arguments.verb == "start" and not named and not arguments.force else {}
+
+
+def _terms(arguments: argparse.Namespace) -> dict[str, object]:
+    """To which SOC, and when; any other start keeps the verb that every service knows."""
+    found = {name: value for name in ("to", "at") if (value := getattr(arguments, name, None)) is not None}
+    return {"verb": START_WITH, **found} if found else {}
 
 
 def _strangers(answer: Mapping[str, object]) -> list[str]:

@@ -15,6 +15,7 @@ from orchestrator.text.document import in_language
 DECIDED_S, LOOK_S = 1.3, 0.1
 #: The states on the way to a charge.
 AT_WORK = frozenset({"QUALIFYING", "PRECHARGE_PULSE", "PRECHARGE_CONTINUOUS", "CHARGING"})
+FULL_PCT = 100.0
 #: Why a battery wants no charge → what that means for who starts it all the same.
 WANTS_NONE = {"soc_not_below": "nothing_to_do", "charged_again": "nothing_to_do_full"}
 
@@ -46,8 +47,9 @@ def with_hint(cause: Cause, why: object) -> Cause:
     params = found.get("params") if found is not None else None
     if found is None or not isinstance(params, Mapping):
         return cause
-    id_, place, limit = WANTS_NONE[found["id"]], str(found.get("place", "")), str(found.get("key", ""))
-    return cause.with_(then=Cause.of(id_, place=place, limit=limit, threshold_pct=params.get("threshold_pct")))
+    below = (params.get("soc_pct") or 0.0) < FULL_PCT
+    once = Cause.of("charge_once", bay=cause.param("bay") or "BAY") if below else None
+    return cause.with_(then=Cause.of(WANTS_NONE[found["id"]], threshold_pct=params.get("threshold_pct"), once=once))
 
 
 def _all(cause: object) -> Iterator[Mapping[str, Any]]:

@@ -47,15 +47,23 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
         _add_except(request)
         _add_because(request)
         if verb == "start":
-            request.add_argument(
-                "--force", action="store_true", help="with --all or patterns: also bays that another person has stopped"
-            )
+            _add_terms(request)
         if verb == "reset":
             request.add_argument("--port", help="forget the charger on this port, which has no bay and is gone")
         _add_socket(request)
         request.set_defaults(run=_request, verb=verb)
     _add_identify(verbs)
     _add_reload(verbs)
+
+
+def _add_terms(start: argparse.ArgumentParser) -> None:
+    start.add_argument(
+        "--to", type=float, metavar="PCT", help="charge once to this SOC, whatever the policy's target says"
+    )
+    start.add_argument("--at", metavar="TIME", help="start then: 22:00 (today or tomorrow), or 2026-11-28T22:00")
+    start.add_argument(
+        "--force", action="store_true", help="with --all or patterns: also bays that another person has stopped"
+    )
 
 
 def _add_reload(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -39,6 +39,8 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ("start bay-1", "let it charge after a stop, a pause or a reset"),
         ("start --all", "every bay that nobody else has stopped"),
         ("start --all --force --because 'floor is dry'", "those as well"),
+        ("start bay-1 --to 100", "charge it once to 100 %, although the policy has another target"),
+        ("start bay-1 --at 22:00", "let it start then; a stop before cancels that"),
     ),
     "pause": (
         ("pause --all --except bay-2", "all but one"),

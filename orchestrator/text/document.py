@@ -51,7 +51,7 @@ def _problem(part: Mapping[str, Any], language: str) -> dict[str, Any]:
 
 
 def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
-    parts = ("charger", "battery", "contactor")
+    parts, told = ("charger", "battery", "contactor"), ("timed_start", "target")
     return {
         **bay,
         **{name: _problem(bay[name], language) for name in parts if bay.get(name)},
@@ -60,6 +60,7 @@ def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
         "faults": [_fault(one, language) for one in bay["faults"]],
         **({"limits": [_text(one, one["cause"], language) for one in bay["limits"]]} if "limits" in bay else {}),
         **({"next": _text(bay["next"], bay["next"], language)} if bay.get("next") else {}),
+        **{name: _text(bay[name], bay[name], language) for name in told if bay.get(name)},
         **({"identity": _text(bay["identity"], bay["identity"]["cause"], language)} if "identity" in bay else {}),
     }
 

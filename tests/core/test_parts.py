@@ -120,9 +120,12 @@ def test_no_two_parts_have_a_field_of_the_same_name() -> None:
 @pytest.mark.parametrize(
     ("state", "told"),
     [
-        (State.STOPPING, {"battery.full_pct"}),
-        (State.HELD, {"witnessed.sees", "stop.unverified", "battery.full_pct"}),
-        (State.CHARGING, {"witnessed.proved", "stage.ran", "sequence.command", "battery.full_pct"}),
+        (State.STOPPING, {"operator.target_pct", "battery.full_pct"}),
+        (State.HELD, {"witnessed.sees", "operator.target_pct", "stop.unverified", "battery.full_pct"}),
+        (
+            State.CHARGING,
+            {"witnessed.proved", "operator.target_pct", "stage.ran", "sequence.command", "battery.full_pct"},
+        ),
     ],
 )
 def test_what_tells_two_memories_in_a_state_apart(state: State, told: set[str]) -> None:

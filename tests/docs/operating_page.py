@@ -15,8 +15,11 @@ from unittest.mock import patch
 from orchestrator.config.station import JournalConfig
 from orchestrator.core.memory import Memory
 from orchestrator.model import ControlMode, Request
+from orchestrator.record.table import BOM
 from orchestrator.service import bay as bay_module
 from orchestrator.service import policy_in_force as policy_module
+from orchestrator.service.asked import Asked
+from orchestrator.service.asker import Asker
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.journal import GATHER_S, Journal
 from orchestrator.sim.faults import FAULTS
@@ -32,14 +35,15 @@ SHOWN = "/srv/depot"
 #: How long the station of three bays runs before its power fails, and after that, in virtual time.
 BEFORE_S, AFTER_S, MANY_S = 60.0, 900.0, 60.0
 #: Virtual time has this start over the clock, which then is waited for.
-LEAD_S = 40.0
+LEAD_S = 150.0
+#: The bays of the smaller station, and the SOC in the last of them.
+FEW, FULL_PCT = 5, 99.0
 HEAD = """\
 # Operating a station: a question, a command
 
-Each command below was run on an emulated station, and its output is as it came, on a terminal of 100 columns: three
-bays, one overheated, one with a loose plug, a quarter of an hour after a power failure. Not shown: `status` and
-`history` name who stopped a bay and why, `sessions --csv` lists charges for a spreadsheet, `report` sums up a month,
-`battery ID` is the life of a battery, with its health.
+Each command below was run on an emulated station, and its output is as it came, on a terminal of 100 columns: five
+bays, one overheated, one with a loose plug, one stopped, one full, a quarter of an hour after a power failure. Not
+shown: `report` sums up a month, `battery ID` is the life of a battery, with its health.
 `python -m tests.docs.operating_page DIRECTORY` makes this page again.
 
 """
@@ -53,6 +57,7 @@ class Answer:
     look: str
     command: str
     also: tuple[str, ...] = ()  #: further questions that the same output answers
+    columns: int = COLUMNS  #: of the terminal
 
 
 ANSWERS = (
@@ -79,6 +84,39 @@ ANSWERS = (
     Answer("May I reset it, and when?", "NEXT says it, and which command to type.", "status bay-2"),
     Answer("Does it go on by itself, and when?", "NEXT again: with a time, where there is one.", "status bay-3"),
     Answer("Why did it stop an hour ago?", "What needed a person is marked.", "history bay-2 --since 2h"),
+    Answer(
+        "Who stopped it, and why?",
+        "Each stop, pause and start has a name, a time and, with `--because`, a reason. `status bay-4` says it, too.",
+        "history bay-4 --limit 3",
+    ),
+    Answer(
+        "Let it start at 22:00",
+        "It stays as it is until then. `stop`, or another start, cancels it. With `--to`, it also has a target.",
+        "start bay-4 --at 22:00",
+    ),
+    Answer(
+        "Does it start by itself, and when?",
+        "NEXT says it. BATTERY begins with which one it is. If the start could not be made, NOTES says why, for a day.",
+        "status bay-4",
+    ),
+    Answer(
+        "Charge it although it is at 99 %",
+        "`--to` replaces the policy's target for this one charge; its limits hold as ever. A plain `start` says that "
+        "there is nothing to do, and names this command.",
+        "start bay-5 --to 100",
+    ),
+    Answer("How far does it charge, and who wants that?", "NOTES says it until the charge is over.", "status bay-5"),
+    Answer(
+        "How much energy has each charge taken today?",
+        "KWH. A charge that goes on has what it took so far.",
+        f"sessions --since 1d --journal {SHOWN}/journal",
+    ),
+    Answer(
+        "The last ten charges, for a spreadsheet",
+        "Into a file: `> charges.csv`.",
+        f"sessions --limit 10 --csv --journal {SHOWN}/journal",
+        columns=900,
+    ),
     Answer(
         "What did this bay do last week?",
         "The same, further back; `--until` ends it earlier.",
@@ -111,13 +149,18 @@ believe it. A warning says where the BMU's own SOH does not fit. What the figure
 
 def shown(directory: Path, command: str, lines: int = LINES, columns: int = COLUMNS) -> str:
     """The command and what it says, as in a terminal, with its exit status if that is not 0."""
-    env = {"ORCHESTRATOR_SOCKET": str(directory / "socket"), "NO_COLOR": "1", "LC_ALL": "en_US.UTF-8"}
-    with Terminal(lines, columns, *command.split(), env=env) as terminal:
+    env = {
+        "ORCHESTRATOR_SOCKET": str(directory / "socket"),
+        "NO_COLOR": "1",
+        "LC_ALL": "en_US.UTF-8",
+        "SUDO_USER": "kim",
+    }
+    with Terminal(lines, columns, *command.replace(SHOWN, str(directory)).split(), env=env) as terminal:
         status = terminal.end()
         text = "\n".join(line.rstrip() for line in terminal.screen.lines).rstrip()
         assert not terminal.screen.wrapped, command
         assert not terminal.screen.scrolled, command
-    text = text.replace(str(directory), SHOWN)
+    text = text.replace(str(directory), SHOWN).replace(BOM, "")
     code = f"\n$ echo $?\n{status}" if status else ""
     return f"```text\n$ orchestrator {command}\n{text}{code}\n```\n"
 
@@ -126,6 +169,10 @@ def section(answer: Answer, output: str) -> str:
     """A question, where to look, and the output."""
     also = "".join(f"- {one}\n" for one in answer.also)
     return f"## {answer.question}\n{answer.look}\n\n{also}{chr(10) if also else ''}{output}\n"
+
+
+def shown_of(directory: Path, answer: Answer) -> str:
+    return section(answer, shown(directory, answer.command, columns=answer.columns))
 
 
 @contextmanager
@@ -140,7 +187,7 @@ def living(
     natures = []
     for number in range(bays):
         pack = PACKS["48v"]()
-        pack.set_soc(40.0 + number * 7 % 50)
+        pack.set_soc(FULL_PCT if bays == FEW and number == FEW - 1 else 40.0 + number * 7 % 50)
         natures.append(Nature(pack, seed=number + 1))
     now: list[Callable[[], float]] = [lambda: began_s]
     with (
@@ -164,9 +211,17 @@ def living(
 
 
 def ask(made: World, directory: Path, questions: Callable[[], list[str]]) -> list[str]:
-    """The answers of real commands, while virtual time stands still."""
+    """The answers of real commands, while virtual time stands still, but for the bay of which something is asked."""
     time.sleep(max(vars(bay_module)["time"]() - time.time(), 0.0))
-    socket = ControlSocket(directory / "socket", made.supervisor._handler.answer, time.monotonic)
+
+    def answer(request: Mapping[str, object]) -> object:
+        found = made.supervisor._handler.answer(request)
+        for bay in made.bays:
+            if bay._requests:
+                bay.run(made.time.now_s)
+        return found
+
+    socket = ControlSocket(directory / "socket", answer, time.monotonic)  # type: ignore[arg-type]  # as the handler's
     socket.start()
     try:
         return questions()
@@ -175,9 +230,9 @@ def ask(made: World, directory: Path, questions: Callable[[], list[str]]) -> lis
 
 
 def small(directory: Path) -> Iterator[str]:
-    """The sections of the station with three bays, which was without power meanwhile."""
+    """The sections of the station with five bays, which was without power meanwhile."""
     began_s, found = time.time() + LEAD_S - AFTER_S, list[str]()
-    with living(directory, 3, "boot-1", began_s - BEFORE_S - 30) as made:
+    with living(directory, FEW, "boot-1", began_s - BEFORE_S - 30) as made:
         made.time.call_later(BEFORE_S, setattr, made.journal, "put", lambda *_: None)
         made.time.call_later(BEFORE_S, setattr, made.journal, "note", lambda *_: None)
         kept: dict[str, Memory] = {}
@@ -188,16 +243,18 @@ def small(directory: Path) -> Iterator[str]:
 
         made.time.call_later(BEFORE_S, fail)
         made.run()
-    with living(directory, 3, "boot-2", began_s, kept) as made:
-        later, (_, second, third) = made.time.call_later, made.rigs
-        for number in range(3):
+    with living(directory, FEW, "boot-2", began_s, kept) as made:
+        later, (_, second, third, *_) = made.time.call_later, made.rigs
+        for number in range(4):
             later(40.0, made.ask, Request.START, number)
+        kim = Asker(uid=0, behind="kim", because="wet floor", unix_s=began_s + AFTER_S - 600)
+        later(AFTER_S - 600, made.bays[3].ask, Asked(Request.STOP, kim))
         later(AFTER_S - 30, setattr, second.bay.pack, "temperature_c", 57.0)
         later(AFTER_S - 25, third.inject, lambda rig: FAULTS["battery_removed"].happen(rig, None))
         later(AFTER_S - 15, third.inject, lambda rig: FAULTS["heal"].happen(rig, None))
 
         def look() -> None:
-            found.extend(ask(made, directory, lambda: [section(one, shown(directory, one.command)) for one in ANSWERS]))
+            found.extend(ask(made, directory, lambda: [shown_of(directory, one) for one in ANSWERS]))
             made.end()
 
         later(AFTER_S, look)

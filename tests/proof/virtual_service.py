@@ -357,7 +357,7 @@ def _close_all(closings: Iterable[Callable[[], object]], _within_s: float) -> bo
 class _Past:
     """The state persisted by the last run, as a hand-made memory."""
 
-    typed = ""  #: nobody has named a battery
+    typed, timed = "", None  #: nobody has named a battery, or asked for a start at a time of day
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory

@@ -72,6 +72,17 @@ def test_who_asked_for_a_charge_and_which_battery_it_was_stand_with_it(kept: Kep
     assert third["by"] is None
 
 
+def test_a_target_stands_with_the_charge_that_it_is_for(kept: Kept) -> None:
+    kept.bench.charging()
+    kept.bench.bay.ask(Asked(Request.START, Asker(behind="kim", uid=0, unix_s=WALL_S), target_pct=80.0))
+    kept.bench.step()
+    kept.bench.battery.values["soc_pct"] = 80.0
+    kept.bench.until(State.FULL)
+    _, end = kept.records()
+    assert (end["by"]["id"], end["by"]["params"]["target_pct"]) == ("started_to_by", 80.0)
+    assert end["result"]["params"]["what"]["id"] == "once_reached"
+
+
 def test_a_pause_is_part_of_the_charge_with_its_reason(kept: Kept) -> None:
     kept.bench.charging()
     kept.bench.ask(Request.PAUSE)

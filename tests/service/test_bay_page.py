@@ -55,6 +55,20 @@ def charging(the_bay: BayConfig | None = None, run_s: float = 60.0, **values: fl
     return world
 
 
+def test_the_page_names_the_battery_and_tells_what_a_person_has_asked_for() -> None:
+    cause = {"id": "identity_typed", "params": {"battery": "B-0042"}}
+    identity = {"id": "B-0042", "source": "typed", "cause": cause, "text": "B-0042, typed by an operator"}
+    params = {"start_at": "22:00", "who": "kim", "asked_at": "18:10"}
+    timed = {"id": "starts_at", "params": params, "text": "starts at 22:00 (asked by kim at 18:10)", "at": NOW_S}
+    bay = document(charging(), identity=identity, timed_start=timed)
+    assert line(page(bay), "BATTERY") == "B-0042, typed by an operator"
+    assert line(page(bay), "NOTES") == "starts at 22:00 (asked by kim at 18:10)"
+    assert line(page(bay, "ko"), "배터리") == "B-0042(운영자가 입력)"
+    assert line(page(bay, "ko"), "참고") == "22:00에 시작합니다(kim, 18:10 요청)"
+    bay["next"] = {**timed, "by_itself": True, "at": NOW_S - NOW_S % 86400 + 22 * 3600}
+    assert "(22:00" not in line(page(bay), "NEXT").removeprefix("starts at 22:00 (asked")
+
+
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 

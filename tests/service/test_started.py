@@ -19,7 +19,7 @@ from tests.service.bench import Bench
 from tests.service.control_bench import listening
 from tests.service.test_show import STOPPED
 
-TYPE = "to charge it now, raise start.soc_below_pct (policies/li-ion-48v.yaml:26), then type: orchestrator reload"
+TYPE = "to charge it once all the same: orchestrator start bay-1 --to 100"
 
 
 @pytest.fixture(name="bench")
@@ -37,10 +37,12 @@ def test_at_99_percent_there_is_nothing_to_do(bench: Bench) -> None:
     bench.step()
     assert asked.answer is not None
     why = json.loads(json.dumps(plain(asked.answer)))
+    refused = cause("refused").with_(bay="bay-1", why=asked.answer)
     said = say(with_hint(asked.answer, why))
     assert said.startswith("nothing to start: IDLE: SOC 99 % is not below 98 % (policies/li-ion-48v.yaml:26); ")
-    assert said.endswith(f"nothing to do: it charges by itself below 98 %; {TYPE}")
-    assert say(with_hint(asked.answer, why), "ko").endswith("입력하십시오: orchestrator reload")
+    assert said.endswith(" %; to charge it once all the same: orchestrator start BAY --to 100")
+    assert say(with_hint(refused, why)).endswith(f"it charges by itself below 98 %; {TYPE}")
+    assert say(with_hint(refused, why), "ko").endswith("그래도 한 번 충전하려면: orchestrator start bay-1 --to 100")
 
 
 def test_a_full_one_is_charged_again_later(bench: Bench) -> None:
@@ -50,7 +52,7 @@ def test_a_full_one_is_charged_again_later(bench: Bench) -> None:
     bench.until(State.FULL)
     bench.step(3)
     said = say(with_hint(cause("x"), json.loads(json.dumps(bench.bay.status()["cause"]))))
-    assert said == "x; nothing to do: it charges again by itself below 95 %, or if it is taken out and put back"
+    assert said == "x; nothing to do: it charges again by itself below 95 %"
 
 
 @pytest.mark.parametrize("why", [None, "x", {}, {"id": "soc_not_below"}, {"id": "several", "params": {"whats": [1]}}])

@@ -173,8 +173,8 @@ def test_what_is_asked_between_is_decided_before(bench: Bench) -> None:
 @pytest.mark.parametrize(("by", "spared"), [(kim(), False), (lee(), True), (asker({"uid": 0}), True), (NOBODY, True)])
 def test_who_holds_it_may_start_it(by: Asker, spared: bool) -> None:
     operator = Operator(hold=kim().cause(Request.STOP))
-    assert (held_by_others(operator, by) is not None) is spared
-    assert held_by_others(Operator(hold=Cause("operator_stop")), by) is None, "nobody knows whose"
+    assert (held_by_others(operator, by.person) is not None) is spared
+    assert held_by_others(Operator(hold=Cause("operator_stop")), by.person) is None, "nobody knows whose"
 
 
 # --- in the journal ---------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -110,6 +111,29 @@ def test_stop_holds_until_start(station: Station) -> None:
     )
     assert unnamed(service.bay()["reason"]) == "stopped by the operator; to go on: orchestrator start bay-1"
     charging(station)
+
+
+def test_a_start_to_a_target_and_one_at_a_time_of_day(station: Station) -> None:
+    plant, service = station
+    charging(station, 2)
+    service.ask("stop", "bay-2")
+    service.wait("HELD", ["bay-2"])
+    plant.set(2, soc_pct=99.2)
+    wait_until(lambda: service.bay("bay-2")["battery"]["soc_pct"] >= 99, 10, "the SOC")
+    wrong = service.cli("start", "bay-2", "--to", "99")
+    assert (wrong.returncode, wrong.stderr) == (1, "bay-2: its SOC is already 99.0 %, the target is 99 %\n")
+    then = time.localtime(time.time() + 7200)
+    noted = service.cli("start", "bay-*", "--except", "bay-[134]", "--to", "100", "--at", time.strftime("%H:%M", then))
+    assert noted.stdout.startswith("bay-2: start accepted; it starts at ") and ", in 1 h " in noted.stdout
+    assert " and charges once to 100 % (asked by " in service.cli("status", "bay-2").stdout
+    assert service.cli("start", "bay-2", "--to", "100").stdout == "bay-2: start accepted\n"
+    service.wait("CHARGING", ["bay-2"])
+    bay = service.bay("bay-2")
+    assert bay["timed_start"] is None and bay["target"]["text"].startswith("charges once to 100 %, asked by ")
+    record = service.journal("bay-2", "request")[-1]
+    assert (record["request"], record["target_soc_pct"], record["accepted"]) == ("start", 100.0, True)
+    plant.set(2, soc_pct=50.0)
+    service.ask("stop", "bay-2")
 
 
 def test_a_stop_that_nobody_could_verify_is_no_success(station: Station) -> None:

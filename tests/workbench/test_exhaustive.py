@@ -2,23 +2,28 @@
 
 import os
 import sys
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.config.shipped import shipped_names
+from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
-from orchestrator.model import State
+from orchestrator.model import Request, Snapshot, State
 from orchestrator.workbench import processes, verbs
 from orchestrator.workbench.prove import exhaustive
 from orchestrator.workbench.prove.endings import ENDINGS
 from orchestrator.workbench.prove.exhaustive import bay_of, bays_in, here
 from orchestrator.workbench.prove.explore import Explorer
+from orchestrator.workbench.prove.inputs import StationInputs
 from orchestrator.workbench.prove.lasting import reaches, settles
+from orchestrator.workbench.prove.story import Move
 from tests.proof.exploring import few, small, walk_on
 
 ROOT = Path(__file__).parent
@@ -81,6 +86,35 @@ def test_a_shipped_policy_ends_every_charge_and_wakes_every_pack(policy: str) ->
     explorer = Explorer(walk, here(walk))
     explorer.run(most=110)
     assert State.CHARGING in {node.place.memory.state for node in explorer.nodes}
+    reaches(explorer)
+    assert not explorer.found
+
+
+class Aimed:
+    """The same inputs, with a target in every start."""
+
+    def __init__(self, inputs: StationInputs) -> None:
+        self._inputs = inputs
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inputs, name)
+
+    def snapshot(self, move: Move, now_s: float, memory: Memory) -> Snapshot:
+        target_pct = 100.0 if move.request is Request.START else None
+        return replace(self._inputs.snapshot(move, now_s, memory), target_pct=target_pct)
+
+
+def test_a_charge_to_a_target_keeps_every_property() -> None:
+    """With what the endings speak of, and nothing else."""
+    whole = few(Rules.of(bay_of(load_policy("li-ion-48v"))))
+    chargers = {ending.charger: whole.chargers[ending.charger] for ending in ENDINGS}
+    batteries = {ending.battery: whole.batteries[ending.battery] for ending in ENDINGS}
+    walk = walk_on(replace(whole, chargers=chargers, batteries=batteries))
+    walk.inputs = Aimed(walk.inputs)  # type: ignore[arg-type]  # with a snapshot of its own
+    explorer = Explorer(walk, here(walk))
+    explorer.run(most=170)
+    aimed = {node.place.memory.state for node in explorer.nodes if node.place.memory.operator.target_pct is not None}
+    assert {State.QUALIFYING, State.CHARGING, State.SUSPENDED} <= aimed
     reaches(explorer)
     assert not explorer.found
 

@@ -11,6 +11,7 @@ from orchestrator.core.checks.state_of_charge import (
     SOC_STEP_PCT,
 )
 from orchestrator.core.facts import SLOW_STALE_S, Facts
+from orchestrator.core.finish import waits_a_day
 from orchestrator.core.history import same_battery
 from orchestrator.core.history.same_battery import OTHER_V_SHARE
 from orchestrator.core.memory import BatteryHistory
@@ -123,7 +124,7 @@ def _known(f: Facts, known: BatteryHistory) -> BatteryHistory:
 def charged_full(f: Facts, *, all_the_way: bool) -> BatteryHistory:
     """The history after a charge that ended as it should."""
     known = f.memory.battery
-    return changed(known, full_pct=f.soc, full_s=f.now_s if all_the_way else known.full_s)
+    return changed(known, full_pct=f.soc, full_s=f.now_s if all_the_way else waits_a_day(f, known.full_s))
 
 
 def begins(known: BatteryHistory) -> BatteryHistory:

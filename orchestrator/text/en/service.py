@@ -85,9 +85,9 @@ TEXTS: Mapping[str, str] = {
     "accepted_verified": "{bay}: {verb} accepted; stands by, verified",
     "bay_refused": "{bay}: {why}",
     "does_not_charge": "{bay}: does not charge: {state}: {reason}",
-    "nothing_to_do": "nothing to do: it charges by itself below {threshold_pct:g} %; to charge it now, raise {limit}{at}, then "
-    "type: orchestrator reload",
-    "nothing_to_do_full": "nothing to do: it charges again by itself below {threshold_pct:g} %, or if it is taken out and put back",
+    "nothing_to_do": "nothing to do: it charges by itself below {threshold_pct:g} %{once:after}",
+    "nothing_to_do_full": "nothing to do: it charges again by itself below {threshold_pct:g} %{once:after}",
+    "charge_once": "to charge it once all the same: orchestrator start {bay} --to 100",
     "not_seen_to_stop": "{bay}: NOT verified, run `orchestrator estop`: {error}",
     "bay_unknown": "no bay '{bay}' here: {bays}",
     "bays_unknown": "no bays {names:word} here: {bays}",

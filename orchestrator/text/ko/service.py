@@ -86,9 +86,9 @@ TEXTS: Mapping[str, str] = {
     "accepted_verified": "{bay}: {verb} 요청을 수락했습니다. 대기 상태를 확인했습니다",
     "bay_refused": "{bay}: {why}",
     "does_not_charge": "{bay}: 충전하지 않습니다: {state}: {reason}",
-    "nothing_to_do": "할 일이 없습니다. {threshold_pct:g} % 아래에서 스스로 충전합니다. 지금 충전하려면 {limit}{at} 값을 올린 뒤 "
-    "입력하십시오: orchestrator reload",
-    "nothing_to_do_full": "할 일이 없습니다. {threshold_pct:g} % 아래가 되거나 배터리를 뺐다가 다시 넣으면 충전합니다",
+    "nothing_to_do": "할 일이 없습니다. {threshold_pct:g} % 아래에서 스스로 충전합니다{once:after}",
+    "nothing_to_do_full": "할 일이 없습니다. {threshold_pct:g} % 아래가 되면 스스로 다시 충전합니다{once:after}",
+    "charge_once": "그래도 한 번 충전하려면: orchestrator start {bay} --to 100",
     "not_seen_to_stop": "{bay}: 대기 상태가 확인되지 않았습니다. `orchestrator estop`을 실행하십시오: {error}",
     "bay_unknown": "'{bay}' 베이가 없습니다: {bays}",
     "bays_unknown": "{names:word} 베이가 없습니다: {bays}",

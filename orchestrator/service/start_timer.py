@@ -1,0 +1,124 @@
+"""The start of one bay at a time of day: noted, kept over restarts, and made when the wall clock says so.
+
+Theory of operation. The wall clock alone decides: where it is set back the start waits longer, where it is set forward
+it comes earlier. A start that is due is made by the next decision, as if its person had typed it then, and again for a
+minute while it is refused: right after a restart no BMU has been heard yet. What refuses it then is kept, for the
+status. After `MOST_LATE_S` nobody counts on it any more, whether the service was down or the clock
+was set: it is missed, and not made. A stop, or another start, cancels it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from orchestrator.core.persisted import Persisted, TimedStart
+from orchestrator.model import Cause, Request, State
+from orchestrator.service.asked import Asked, Taken
+from orchestrator.service.journal import Journal
+from orchestrator.service.past import Place
+from orchestrator.service.store import Store
+from orchestrator.service.wallclock import WallClock
+from orchestrator.text.catalogue import fields
+
+#: A start that could not be made is still made within this.
+MOST_LATE_S = 3600.0
+#: For how long a start that is refused is tried again, and how often.
+PATIENCE_S, AGAIN_S = 60.0, 5.0
+#: What of the status is not of `next`.
+OWN = frozenset({"target_soc_pct", "pending"})
+#: For how long the status tells why one was not made.
+TOLD_S = 86400.0
+
+
+class StartTimer:
+    """Used by the control loop, except `status`."""
+
+    def __init__(
+        self, place: Place, store: Store, journal: Journal, say: Callable[[Cause], None], language: str
+    ) -> None:
+        self._place, self._bay, self._store = place, place.bay, store
+        self._journal, self._say, self._language = journal, say, language
+        self._read = False  # the persisted state is still being read
+        self._timed: TimedStart | None = None
+        self._first_s: float | None = None  # when it was refused first …
+        self._again_s = 0.0  # … and when it is tried again
+
+    def due(self, clock: WallClock) -> Sequence[Asked]:
+        """The start, if its time has come."""
+        if not self._read:
+            self._timed, self._read = self._store.past(self._place).timed, True
+        timed = self._timed
+        if timed is None or (late_s := clock.wall_s - timed.start_unix_s) < 0:
+            return ()
+        if timed.outcome is not None:
+            if late_s > TOLD_S:
+                self._timed = None
+            return ()
+        if late_s > MOST_LATE_S:
+            self._fails(timed, Cause.of("start_too_late", late_min=late_s / 60), clock)
+            return ()
+        return (Asked.of(timed),) if clock.now_s >= self._again_s else ()
+
+    def take(self, taken: Taken) -> None:
+        """Take note of what is asked of the next decision."""
+        if taken.noted is not None:
+            self._timed, self._first_s, self._again_s = taken.noted, None, 0.0
+        elif taken.request is Request.STOP:
+            self._timed = None
+
+    def decided(self, taken: Taken, answer: Cause | None, clock: WallClock) -> None:
+        """Follow the decision: `answer` is why the request was refused."""
+        why = taken.refusal or answer
+        if taken.timed is not None and why is not None:
+            self._first_s, self._again_s = self._first_s or clock.now_s, clock.now_s + AGAIN_S
+            if clock.now_s - self._first_s >= PATIENCE_S:
+                self._fails(taken.timed, why, clock)
+        elif taken.request is Request.START and why is None:
+            self._timed = None
+            if taken.timed is not None and taken.by is not None:
+                self._tell(taken.by, clock)
+
+    def withdraw(self, asked: Asked) -> None:
+        """The disk has not taken this one: forget it."""
+        if self._timed is not None and self._timed.start_unix_s == asked.start_unix_s:
+            self._timed = None
+
+    def kept(self, persisted: Persisted) -> Persisted:
+        """This state, with the start that is to come."""
+        return replace(persisted, timed=self._timed)
+
+    def status(self, clock: WallClock) -> dict[str, object] | None:
+        """Its part of the status document; `at` is Unix time. Any thread."""
+        timed = self._timed
+        if timed is None:
+            return None
+        told = fields(clock.told(cause_of(timed, self._bay)), self._language) or {}
+        return {
+            **told, "at": timed.start_unix_s, "target_soc_pct": timed.target_pct, "pending": timed.outcome is None,
+        }  # fmt: skip
+
+    def next(self, state: State, clock: WallClock) -> dict[str, object]:
+        """What comes next of a held bay, in the status document: nobody needs to come. Any thread."""
+        told = self.status(clock)
+        if told is None or not told["pending"] or state is not State.HELD:
+            return {}
+        return {"next": {**{name: told[name] for name in told if name not in OWN}, "by_itself": True}}
+
+    def _fails(self, timed: TimedStart, why: Cause, clock: WallClock) -> None:
+        self._timed = replace(timed, outcome=clock.told(why))  # without moments of a clock that a restart resets
+        told = cause_of(self._timed, self._bay)
+        self._tell(told, clock)
+        self._say(Cause.of("bay_refused", bay=self._bay, why=clock.told(told)))
+
+    def _tell(self, what: Cause, clock: WallClock) -> None:
+        self._journal.put(self._bay, ("timed_start", fields(clock.told(what), self._language) or {}), clock.now_s)
+
+
+def cause_of(timed: TimedStart, bay: str) -> Cause:
+    """What people read: when it starts, or why it did not, and who asked for it."""
+    by = timed.by if timed.by is not None else Cause.of("started_by", who="?", asked_unix_s=timed.start_unix_s)
+    told = replace(by.with_(start_unix_s=timed.start_unix_s), id="starts_at")
+    if timed.outcome is not None:
+        return replace(told.with_(why=timed.outcome, bay=bay), id="start_not_made")
+    if timed.target_pct is not None:
+        return replace(told.with_(target_pct=timed.target_pct), id="starts_at_to")
+    return told
