@@ -210,11 +210,14 @@ class Service:
 
 
 def orchestrator(
-    *args: str, env: Mapping[str, str] | None = None, cwd: Path | None = None
+    *args: str,
+    env: Mapping[str, str] | None = None,
+    cwd: Path | None = None,
+    program: Sequence[str] = ("-m", "orchestrator"),
 ) -> subprocess.CompletedProcess[str]:
     """Run one verb of the command line."""
     return subprocess.run(
-        [sys.executable, "-m", "orchestrator", *args],
+        [sys.executable, *program, *args],
         env={**os.environ, **(env or {})},
         cwd=cwd,
         capture_output=True,
