@@ -27,6 +27,11 @@ def charge(plant: PlantProcess, service: Service) -> None:
     wait_until(lambda: all(plant.state(bay)["current_a"] > 13 for bay in bays), 10, "the current")
 
 
+def only_started(plant: PlantProcess, service: Service) -> None:
+    """Started, with no bay charging yet."""
+    service.start()
+
+
 def only_the_plant(plant: PlantProcess, service: Service) -> None:
     """Started by the test itself."""
 

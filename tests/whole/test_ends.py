@@ -2,14 +2,16 @@
 
 import json
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.ahead import Station
-from tests.whole.station import Document, Service, orchestrator, station_document, unnamed
+from tests.whole.ahead import Station, only_started
+from tests.whole.station import Document, Service, die_with_parent, orchestrator, station_document, unnamed
 
 
 def charging(plant: PlantProcess, service: Service) -> None:
@@ -119,6 +121,23 @@ def test_a_charger_in_automatic_mode_is_stopped_and_resumed(station: Station) ->
     service.signal(signal.SIGTERM)
     assert service.ended() == 0
     assert plant.state()["operation"] == 0
+
+
+@pytest.mark.station(ready=only_started)
+def test_who_watches_goes_on_when_the_service_is_started_anew(station: Station) -> None:
+    _, service = station
+    argv = [sys.executable, "-m", "orchestrator", "status", "--watch", "--json", "--socket", str(service.socket)]
+    said = (service.directory / "watch.txt").open("w+")
+    with said, subprocess.Popen(argv, stdout=said, stderr=subprocess.STDOUT, preexec_fn=die_with_parent) as watch:
+        file = service.directory / "watch.txt"
+        wait_until(lambda: '"station"' in file.read_text(), 10, "the first status")
+        service.signal(signal.SIGTERM)
+        service.ended()
+        wait_until(lambda: "orchestrator: no answer since " in file.read_text(), 10, "the loss")
+        service.start()
+        wait_until(lambda: "the service answers again\n" in file.read_text(), 10, "the return")
+        watch.send_signal(signal.SIGINT)
+        assert watch.wait(10) == 130
 
 
 def broken_document(directory: Path) -> Document:

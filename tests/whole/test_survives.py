@@ -15,7 +15,7 @@ import pytest
 from orchestrator.errors import ServiceError
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.ahead import Station, charge, only_the_plant
+from tests.whole.ahead import Station, charge, only_started, only_the_plant
 from tests.whole.station import RUN, Document, Service, unnamed
 
 HELD = "stopped by the operator; to go on: orchestrator start bay-1"
@@ -25,10 +25,6 @@ pytestmark = pytest.mark.station(2)
 
 def on_a_worn_disk(call: str) -> tuple[str, ...]:
     return ("-m", "tests.whole.worn", call)
-
-
-def only_started(plant: PlantProcess, service: Service) -> None:
-    service.start()
 
 
 def killed_in_mid_charge(plant: PlantProcess, service: Service) -> None:
@@ -225,6 +221,30 @@ def test_two_bays_whose_ports_were_changed_over_are_held(station: Station) -> No
         assert "when this service last ran" in bay["reason"]
         assert f"see what is wired where; to go on: orchestrator start {bay['name']}" in bay["reason"]
     assert [plant.state(bay)["operation"] for bay in (1, 2)] == [0, 0]
+
+
+def elsewhere(document: Document) -> None:
+    document["bays"][0]["charger"]["port"] += "-gone"
+
+
+@pytest.mark.station(1)
+def test_a_charger_that_is_gone_for_good_is_dropped(station: Station) -> None:
+    plant, service = station
+    service.kill_all()
+    port = plant.bays[0]["port"]
+    plant.inject("port_gone")
+    service.edit(elsewhere)
+    service.start()
+    wait_until(service.strays, 10, "the charger in hand")
+    refused = service.cli("reset", "--port", "/dev/other")
+    assert refused.returncode == 1 and f"(waited for: {port})" in refused.stderr
+    done = service.cli("reset", "--port", port)
+    assert (done.returncode, done.stdout) == (0, f"bay-1 on {port}: reset accepted\n")
+    assert service.strays() == []
+    service.kill_all()
+    service.start()
+    assert service.strays() == [], "it was on the disk before that was said"
+    assert service.cli("reset", "bay-1", "--port", port).returncode == 2
 
 
 @pytest.mark.station(2, ready=only_started)
