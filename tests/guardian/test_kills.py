@@ -4,6 +4,7 @@ import json
 import os
 import signal
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,7 +62,7 @@ CASES = (
         }.items()
     ),
 )
-#: Number of services started ahead of need.
+#: Number of services started ahead of need, one at a time.
 AHEAD = 4
 OTHERS = (
     "half a frame",
@@ -108,19 +109,24 @@ class Charging:
 
 
 class Services:
-    """A service per test, each with its own bay and bus. Some are started ahead: they need 3 s to charge."""
+    """A service per test, each with its own bay and bus. Some are started ahead: they need 3 s to charge.
 
-    def __init__(self, directory: Path, plant: PlantProcess, cans: Sequence[Mapping[str, object]]) -> None:
-        self._directory, self._plant, self._cans = directory, plant, cans
-        self._started: dict[str, Charging] = {}
+    The thread of `pool` outlives the services: the kernel kills a process when the thread that started it ends.
+    """
+
+    def __init__(
+        self, directory: Path, plant: PlantProcess, cans: Sequence[Mapping[str, object]], pool: ThreadPoolExecutor
+    ) -> None:
+        self._directory, self._plant, self._cans, self._pool = directory, plant, cans, pool
+        self._started: dict[str, Future[Charging]] = {}
 
     def take(self, name: str) -> Charging:
         """The service of this name, once its charger runs."""
         names = list(BAYS)
         for near in names[names.index(name) :][:AHEAD]:
             if near not in self._started:
-                self._started[near] = self._start(near)
-        one = self._started[name]
+                self._started[near] = self._pool.submit(self._start, near)
+        one = self._started[name].result()
         one.service.wait("CHARGING")
         wait_until(lambda: one.runs, what="current")
         return one
@@ -136,7 +142,8 @@ class Services:
 
     def close(self) -> None:
         for one in self._started.values():
-            one.service.close()
+            if not one.cancel() and one.exception() is None:
+                one.result().service.close()
 
 
 @pytest.fixture(name="services", scope="module")
@@ -144,8 +151,8 @@ def _services(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Services]:
     directory = tmp_path_factory.mktemp("kills")
     cans = [udp_keys() for _ in BAYS]
     can_args = [arg for keys in cans for arg in ("--can", json.dumps(keys))]
-    with PlantProcess(directory, "--bays", str(len(BAYS)), *can_args) as plant:
-        services = Services(directory, plant, cans)
+    with ThreadPoolExecutor(1) as pool, PlantProcess(directory, "--bays", str(len(BAYS)), *can_args) as plant:
+        services = Services(directory, plant, cans, pool)
         try:
             yield services
         finally:
