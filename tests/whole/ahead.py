@@ -66,13 +66,17 @@ class Ahead:
     @contextmanager
     def take(self, name: str) -> Iterator[Station]:
         """The station of this test; those of the next ones are begun."""
-        at = self._names.index(name)
-        for near in self._names[at : at + 1 + AHEAD]:
-            if near not in self._begun:
-                self._begun[near] = self._pool.submit(self._make, self._recipes[near], self._directory())
+        self.begin(name, 1 + AHEAD)
         made = self._begun[name].result()
         with made.stack:
             yield made.station
+
+    def begin(self, name: str, count: int = 1) -> None:
+        """Begin with this test's station and those of the next ones."""
+        at = self._names.index(name)
+        for near in self._names[at : at + count]:
+            if near not in self._begun:
+                self._begun[near] = self._pool.submit(self._make, self._recipes[near], self._directory())
 
     def close(self) -> None:
         """Take down those that no test has taken."""

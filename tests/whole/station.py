@@ -87,7 +87,7 @@ class Service:
 
     # --- the process ---
 
-    def start(self, stderr: int | None = None) -> Self:
+    def start(self, stderr: int | None = None, env: Mapping[str, str] | None = None) -> Self:
         """Start it and wait for an answer; its output goes into its log, or to `stderr`."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
@@ -95,6 +95,7 @@ class Service:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log if stderr is None else stderr,
+                env={**os.environ, **(env or {})},
                 start_new_session=True,
                 preexec_fn=die_with_parent,
             )
