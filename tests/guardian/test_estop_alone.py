@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator.lastresort.bareport import HELD
 from orchestrator.lastresort.estop import HURRIED, LOST
-from tests.guardian.briefly import BRIEFLY
+from tests.guardian import briefly
 from tests.guardian.chargers import running_chargers
 from tests.link.strangers import holding
 from tests.waiting import wait_until
@@ -23,7 +23,7 @@ DONE = "every charger stands by, verified\n"
 
 
 def estop(*args: str, **env: str) -> "subprocess.CompletedProcess[str]":
-    return orchestrator("estop", *args, env={"ORCHESTRATOR_SOCKET": "", **env}, program=BRIEFLY)
+    return orchestrator("estop", *args, env={"ORCHESTRATOR_SOCKET": "", **env}, program=briefly.ESTOP)
 
 
 def test_ports_without_a_service(tmp_path: Path) -> None:

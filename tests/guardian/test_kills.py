@@ -4,7 +4,6 @@ import json
 import os
 import signal
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from orchestrator.lastresort.guardian import ACTED
 from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import encode
 from orchestrator.sim.client import PlantProcess
+from tests.guardian import briefly
 from tests.guardian.saboteur import MODES
 from tests.guardian.watched import state_of
 from tests.sim.wires import udp_keys
@@ -62,7 +62,7 @@ CASES = (
         }.items()
     ),
 )
-#: Number of services started ahead of need, one at a time.
+#: Number of services started ahead of need.
 AHEAD = 4
 OTHERS = (
     "half a frame",
@@ -77,6 +77,7 @@ OTHERS = (
 #: Start options of services with unusual ones.
 RUNS: Mapping[str, Sequence[str]] = {
     **{case.name: ("-c", GUARD, case.mode) for case in CASES if case.mode},
+    **dict.fromkeys(("SIGSEGV", "SIGSTOP", "half a frame"), (*briefly.GUARDIAN, "run")),
     "without streams": ("-c", WITHOUT_STREAMS),
 }
 BAYS = {name: number for number, name in enumerate([*(case.name for case in CASES), *OTHERS], start=1)}
@@ -109,24 +110,19 @@ class Charging:
 
 
 class Services:
-    """A service per test, each with its own bay and bus. Some are started ahead: they need 3 s to charge.
+    """A service per test, each with its own bay and bus. Some are started ahead: they need 3 s to charge."""
 
-    The thread of `pool` outlives the services: the kernel kills a process when the thread that started it ends.
-    """
-
-    def __init__(
-        self, directory: Path, plant: PlantProcess, cans: Sequence[Mapping[str, object]], pool: ThreadPoolExecutor
-    ) -> None:
-        self._directory, self._plant, self._cans, self._pool = directory, plant, cans, pool
-        self._started: dict[str, Future[Charging]] = {}
+    def __init__(self, directory: Path, plant: PlantProcess, cans: Sequence[Mapping[str, object]]) -> None:
+        self._directory, self._plant, self._cans = directory, plant, cans
+        self._started: dict[str, Charging] = {}
 
     def take(self, name: str) -> Charging:
         """The service of this name, once its charger runs."""
         names = list(BAYS)
         for near in names[names.index(name) :][:AHEAD]:
             if near not in self._started:
-                self._started[near] = self._pool.submit(self._start, near)
-        one = self._started[name].result()
+                self._started[near] = self._start(near)
+        one = self._started[name]
         one.service.wait("CHARGING")
         wait_until(lambda: one.runs, what="current")
         return one
@@ -142,8 +138,7 @@ class Services:
 
     def close(self) -> None:
         for one in self._started.values():
-            if not one.cancel() and one.exception() is None:
-                one.result().service.close()
+            one.service.close()
 
 
 @pytest.fixture(name="services", scope="module")
@@ -151,8 +146,8 @@ def _services(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Services]:
     directory = tmp_path_factory.mktemp("kills")
     cans = [udp_keys() for _ in BAYS]
     can_args = [arg for keys in cans for arg in ("--can", json.dumps(keys))]
-    with ThreadPoolExecutor(1) as pool, PlantProcess(directory, "--bays", str(len(BAYS)), *can_args) as plant:
-        services = Services(directory, plant, cans, pool)
+    with PlantProcess(directory, "--bays", str(len(BAYS)), *can_args) as plant:
+        services = Services(directory, plant, cans)
         try:
             yield services
         finally:

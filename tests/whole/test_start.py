@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator.lastresort.guardian import ACTED
 from orchestrator.protocol.charger import STOP_FRAME
+from tests.guardian import briefly
 from tests.waiting import wait_until
 from tests.whole.station import Service, orchestrator, station_document
 
@@ -138,20 +139,11 @@ def drain(master: int) -> None:
         os.read(master, 4096)
 
 
-#: The guardian waits a second for the proof that this port will never give.
-BRIEFLY = (
-    "-P",
-    "-c",
-    "import sys; from orchestrator.lastresort import guardian; guardian.VERIFY_S = 1.0; "
-    "from orchestrator.__main__ import main; sys.exit(main())",
-)
-
-
 def test_a_start_that_fails_later_has_stopped_the_chargers(tmp_path: Path) -> None:
     service, _ = of_one_bay(tmp_path)
     service.edit(lambda document: document["control"].update(socket="/proc/nowhere/socket"))
     with silent_port(tmp_path / "bay-1") as master:
-        ended = orchestrator("run", str(service.file), program=BRIEFLY)
+        ended = orchestrator("run", str(service.file), program=briefly.GUARDIAN)
         read_until(master, STOP_FRAME)
     assert ended.returncode == ACTED
     assert "orchestrator: the control socket /proc/nowhere/socket cannot be opened" in ended.stderr
