@@ -20,11 +20,11 @@ LONG = (
     "guardian/test_estop.py", "proof/test_campaign.py", "whole/test_charge.py", "proof/test_explore.py",
     "tests/test_surroundings.py", "workbench/test_leap.py", "whole/test_beginning.py", "core/test_decide.py",
     "guardian/test_emergency.py", "proof/test_nth_call.py", "guardian/test_laststop.py",
-    "workbench/test_ordinary_charges.py", "whole/test_identity.py", "fuzz/test_short.py", "whole/test_faults.py", "proof/test_others_on_the_bus.py",
-    "whole/test_korean.py", "core/test_persisted.py", "whole/test_others.py", "proof/test_gist.py",
-    "devices/test_battery_bus.py", "proof/test_journal_size.py", "whole/test_demo.py", "workbench/test_replay.py",
-    "tests/test_benchmarks.py", "proof/test_soak.py", "whole/test_start.py", "core/test_honest.py",
-    "guardian/test_estop_alone.py", "core/test_faults.py", "whole/test_who.py",
+    "workbench/test_ordinary_charges.py", "whole/test_identity.py", "fuzz/test_short.py", "whole/test_faults.py",
+    "proof/test_others_on_the_bus.py", "whole/test_korean.py", "core/test_persisted.py", "whole/test_others.py",
+    "proof/test_gist.py", "devices/test_battery_bus.py", "proof/test_journal_size.py", "whole/test_demo.py",
+    "workbench/test_replay.py", "tests/test_benchmarks.py", "proof/test_soak.py", "whole/test_start.py",
+    "core/test_honest.py", "guardian/test_estop_alone.py", "core/test_faults.py", "whole/test_who.py",
 )  # fmt: skip
 
 #: What ends a service, or has it read its files again.

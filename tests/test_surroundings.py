@@ -50,7 +50,7 @@ def _folder(tmp_path: Path) -> Path:
 def begun(
     way: str, folder: Path, words: Sequence[str], env: Mapping[str, str] | None = None, **streams: int
 ) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
+    process: subprocess.Popen[str] = subprocess.Popen(
         [sys.executable, *(("-P",) if way == "script" else ()), *WAYS[way], *words],
         env={**os.environ, "PYTHONPATH": str(ROOT), "ORCHESTRATOR_SOCKET": str(folder / "no.sock"), **(env or {})},
         cwd=folder,
@@ -58,8 +58,9 @@ def begun(
         encoding="utf-8",
         errors="replace",
         preexec_fn=die_with_parent,
-        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams},  # type: ignore[call-overload,no-any-return]
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams},  # type: ignore[call-overload]
     )
+    return process
 
 
 def done(process: "subprocess.Popen[str]") -> subprocess.CompletedProcess[str]:
