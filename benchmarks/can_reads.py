@@ -18,7 +18,6 @@ from benchmarks.can_reader import BITRATE, READS_HZ
 from benchmarks.effort import Effort
 from benchmarks.report import Goal, Result, Series
 
-SETTLE_S = 2.0  #: imports, opening, and every node asked once
 SIDES = ("bare", "ours")
 NEAR = 0.9  #: of READS_HZ: a window with less was not measured at what the row says …
 TRIES = 5  #: … and is repeated
@@ -35,12 +34,12 @@ class Cost:
 
 def measure(effort: Effort) -> Iterator[Result]:
     """Both interfaces; both sides in turns, so that what else the machine does is shared out."""
-    window_s = effort.choose(5, 2)
+    settle_s, window_s = effort.choose(2, 1), effort.choose(5, 1)  # opening, and every node asked once; then measured
     for interface in ("udp_multicast", "socketcan"):
         costs = {side: Cost() for side in SIDES}
-        for _ in range(effort.choose(7, 2)):
+        for _ in range(effort.choose(7, 1)):
             for side in SIDES:
-                if not any(_window(interface, side, window_s, costs[side]) for _ in range(TRIES)):
+                if not any(_window(interface, side, settle_s, window_s, costs[side]) for _ in range(TRIES)):
                     raise RuntimeError(
                         f"{side} on {interface} does not make {READS_HZ} reads a second: a busy machine?"
                     )
@@ -50,7 +49,7 @@ def measure(effort: Effort) -> Iterator[Result]:
         yield Result(f"… and wake-ups, {interface}", "", ours, bare)
 
 
-def _window(interface: str, side: str, seconds: float, cost: Cost) -> bool:
+def _window(interface: str, side: str, settle_s: float, seconds: float, cost: Cost) -> bool:
     """Fresh processes each time: nothing of one window is left in the next."""
     with ExitStack() as stack:
         if interface == "socketcan":
@@ -70,7 +69,7 @@ def _window(interface: str, side: str, seconds: float, cost: Cost) -> bool:
             reader = stack.enter_context(_Asked(["can_reader", side, json.dumps(words)]))
         nodes.ready()
         reader.ask()
-        time.sleep(SETTLE_S)
+        time.sleep(settle_s)
         begin_s, (begin_ns, begin_wakeups), begin_reads = time.monotonic(), reader.ask(), nodes.ask()
         time.sleep(seconds)
         end_s, (end_ns, end_wakeups), end_reads = time.monotonic(), reader.ask(), nodes.ask()

@@ -16,13 +16,15 @@ from tests.ids import name_of
 #: processes and one that computes, so that both are under way at any time.
 LONG = (
     "whole/test_operator.py", "proof/test_seeded_bugs.py", "whole/test_survives.py", "proof/test_grid.py",
-    "tests/test_benchmarks.py", "proof/test_explore.py", "whole/test_ends.py", "proof/test_campaign.py",
-    "whole/test_beginning.py", "workbench/test_exhaustive.py", "guardian/test_kills.py", "workbench/test_leap.py",
-    "guardian/test_estop.py", "core/test_decide.py", "guardian/test_emergency.py", "proof/test_nth_call.py",
-    "guardian/test_laststop.py", "proof/test_environment.py", "whole/test_demo.py", "tests/test_surroundings.py",
-    "whole/test_charge.py", "workbench/test_ordinary_charges.py", "guardian/test_estop_alone.py",
-    "fuzz/test_short.py", "whole/test_others.py", "proof/test_others_on_the_bus.py", "whole/test_start.py",
-    "core/test_persisted.py", "whole/test_faults.py", "whole/test_korean.py",
+    "guardian/test_kills.py", "workbench/test_exhaustive.py", "whole/test_ends.py", "proof/test_environment.py",
+    "guardian/test_estop.py", "proof/test_campaign.py", "whole/test_charge.py", "proof/test_explore.py",
+    "tests/test_surroundings.py", "workbench/test_leap.py", "whole/test_beginning.py", "core/test_decide.py",
+    "guardian/test_emergency.py", "proof/test_nth_call.py", "guardian/test_laststop.py",
+    "workbench/test_ordinary_charges.py", "whole/test_identity.py", "fuzz/test_short.py", "whole/test_faults.py",
+    "proof/test_others_on_the_bus.py", "whole/test_korean.py", "core/test_persisted.py", "whole/test_others.py",
+    "proof/test_gist.py", "devices/test_battery_bus.py", "proof/test_journal_size.py", "whole/test_demo.py",
+    "workbench/test_replay.py", "tests/test_benchmarks.py", "proof/test_soak.py", "whole/test_start.py",
+    "core/test_honest.py", "guardian/test_estop_alone.py", "core/test_faults.py", "whole/test_who.py",
 )  # fmt: skip
 
 #: What ends a service, or has it read its files again.

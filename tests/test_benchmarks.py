@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from argparse import ArgumentTypeError
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +18,41 @@ from orchestrator.protocol.charger import OPERATION_STOP_FRAME, STATUS_KINDS, ST
 ROOT = Path(__file__).resolve().parent.parent
 
 
-@pytest.mark.parametrize(
-    ("part", "row"),
-    [
-        ("step", "step(), charging"),
-        ("decoder", "decoder, clean frames, one a read"),
-        ("simulate", "simulate, a charge of 4 h"),
-        ("can", "CAN thread, a read of 960/s, socketcan"),
-    ],
-)
-def test_a_quick_part_prints_a_table_and_writes_the_figures(part: str, row: str, tmp_path: Path) -> None:
-    figures = tmp_path / "figures.json"
-    command = [sys.executable, "-m", "benchmarks", "--quick", "--only", part, "--json", str(figures)]
-    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=True)
-    assert row in run.stdout
-    document = json.loads(figures.read_text(encoding="utf-8"))
+#: Quick parts, and a row of each.
+QUICK = {
+    "gateway": "a fixed piece of Python, for the gateway factor",
+    "step": "step(), charging",
+    "decoder": "decoder, clean frames, one a read",
+    "simulate": "simulate, a charge of 4 h",
+    "can": "CAN thread, a read of 960/s, socketcan",
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of the quick parts, in which each process measures the gateway factor once."""
+
+    printed: str
+    figures: Path
+
+    @property
+    def document(self) -> dict[str, Any]:
+        return dict(json.loads(self.figures.read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def quick_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    figures = tmp_path_factory.mktemp("benchmarks") / "figures.json"
+    parts = (word for part in QUICK for word in ("--only", part))
+    command = [sys.executable, "-m", "benchmarks", "--quick", *parts, "--json", str(figures)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=110, check=True)
+    return Run(run.stdout, figures)
+
+
+@pytest.mark.parametrize("part", [part for part in QUICK if part != "gateway"])
+def test_a_quick_part_prints_a_table_and_writes_the_figures(part: str, quick_run: Run) -> None:
+    row, document = QUICK[part], quick_run.document
+    assert row in quick_run.printed
     (result,) = (result for result in document["results"] if result["what"] == row)
     assert all(result[side]["median"] > 0 and result[side]["n"] > 0 for side in ("ours", "beside"))
     assert document["machine"]["cores"] >= 1
@@ -84,19 +105,13 @@ def test_nothing_is_better_than_never() -> None:
     assert "never" in table([result])
 
 
-def test_the_gateway_factor_is_at_the_top_of_every_table_and_an_earlier_run_beside_it(tmp_path: Path) -> None:
-    figures = tmp_path / "figures.json"
-    command = [sys.executable, "-m", "benchmarks", "--quick", "--only", "gateway"]
-    first = subprocess.run(
-        [*command, "--json", str(figures)], cwd=ROOT, capture_output=True, text=True, timeout=120, check=True
-    )
-    machine = json.loads(figures.read_text(encoding="utf-8"))["machine"]
+def test_the_gateway_factor_is_at_the_top_of_every_table_and_an_earlier_run_beside_it(quick_run: Run) -> None:
+    machine = quick_run.document["machine"]
     assert machine["gateway_factor"] > 0
-    assert first.stdout.partition("\n")[0].endswith(f", gateway factor {machine['gateway_factor']}")
-    assert "change" not in first.stdout
-    second = subprocess.run(
-        [*command, "--before", str(figures)], cwd=ROOT, capture_output=True, text=True, timeout=120, check=True
-    )
+    assert quick_run.printed.partition("\n")[0].endswith(f", gateway factor {machine['gateway_factor']}")
+    assert "change" not in quick_run.printed
+    command = [sys.executable, "-m", "benchmarks", "--quick", "--only", "gateway", "--before", str(quick_run.figures)]
+    second = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=110, check=True)
     heading, row = second.stdout.splitlines()[1:]
     assert heading.split()[-2:] == ["before", "change"]
     assert row.startswith("a fixed piece of Python") and row.endswith(" %")

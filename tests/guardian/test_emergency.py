@@ -17,6 +17,7 @@ from orchestrator.lastresort import inhand
 from orchestrator.lastresort.estop import LOST, UNTOLD
 from orchestrator.lastresort.inhand import ports_in_hand, stations
 from orchestrator.lastresort.running_service import NOBODY, Service
+from tests.guardian import briefly
 from tests.guardian.chargers import Bench, running_chargers
 from tests.guardian.services import answering, bay
 from tests.link.ptys import plugged
@@ -27,7 +28,7 @@ DONE = "every charger stands by, verified\n"
 
 def estop(*args: str, cwd: Path, stdout: int = subprocess.PIPE, **env: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(
-        [sys.executable, "-m", "orchestrator", "estop", *args], cwd=cwd,
+        [sys.executable, *briefly.ESTOP, "estop", *args], cwd=cwd,
         env={**os.environ, "ORCHESTRATOR_SOCKET": "", **env}, stdin=subprocess.DEVNULL, stdout=stdout,
         stderr=subprocess.PIPE, text=True, encoding="latin-1", timeout=30, check=False,
     )  # fmt: skip
@@ -206,7 +207,7 @@ def test_whoever_does_not_listen_changes_nothing(tmp_path: Path, arguments: list
         words = [bench.name if word == "PORT" else word for word in arguments]
         heard = estop(*words, cwd=tmp_path)
         for gone in (1, 2):
-            argv = [sys.executable, "-m", "orchestrator", "estop", *words]
+            argv = [sys.executable, *briefly.ESTOP, "estop", *words]
             closed = subprocess.run(
                 ["sh", "-c", f'exec {gone}>&-; exec "$@"', "sh", *argv], cwd=tmp_path, capture_output=True, text=True,
                 check=False, env={**os.environ, "ORCHESTRATOR_SOCKET": ""},

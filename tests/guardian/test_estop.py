@@ -11,12 +11,17 @@ import pytest
 from orchestrator.lastresort.estop import UNTOLD
 from orchestrator.lastresort.port_owner import control_sockets
 from orchestrator.protocol.standby import STOP_FRAME
-from orchestrator.sim.client import PlantProcess
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
-from tests.whole.station import Service, orchestrator, whole_station
+from tests.whole.ahead import Ahead, Recipe, Station, stations_ahead
+from tests.whole.station import orchestrator, whole_station
 
-Station = tuple[PlantProcess, Service]
+#: Tests that need all bays, or the whole service.
+LAST = (
+    "test_with_its_station_file_every_bay_is_held",
+    "test_a_controller_that_hangs",
+    "test_a_service_that_is_frozen_as_a_whole_and_then_dead",
+)
 NOBODY = "no service is running\n"
 DONE = "every charger stands by, verified\n"
 
@@ -25,19 +30,33 @@ def estop(*args: str, **env: str) -> "subprocess.CompletedProcess[str]":
     return orchestrator("estop", *args, env={"ORCHESTRATOR_SOCKET": "", **env})
 
 
+@pytest.fixture(name="ahead", scope="module")
+def _ahead(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ahead]:
+    """Stations of four charging bays for the last tests, made ready while the others run."""
+    with stations_ahead(dict.fromkeys(LAST, Recipe(4)), lambda: tmp_path_factory.mktemp("fresh")) as ahead:
+        yield ahead
+
+
+@pytest.fixture(name="fresh")
+def _fresh(ahead: Ahead, request: pytest.FixtureRequest) -> Iterator[Station]:
+    with ahead.take(request.function.__name__) as station:
+        yield station
+
+
 @pytest.fixture(name="station", scope="module")
-def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+def _station(ahead: Ahead, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     """Four charging bays. The tests run in order, and each starts with its own bay."""
     with whole_station(tmp_path_factory.mktemp("estop"), 4) as (plant, service):
         service.start()
         charging((plant, service))
+        ahead.begin(LAST[0])
         yield plant, service
 
 
-def charging(station: Station, *bays: int) -> None:
-    """Get these bays (default: all) charging, with the service aware of it."""
+def charging(station: Station) -> None:
+    """Get all bays charging, with the service aware of it."""
     _, service = station
-    names = [f"bay-{bay}" for bay in bays or (1, 2, 3, 4)]
+    names = [f"bay-{bay}" for bay in (1, 2, 3, 4)]
     service.wait({"IDLE", "HELD", "CHARGING"}, names)
     service.ask("start", *names)
     service.wait("CHARGING", names)
@@ -109,12 +128,11 @@ def test_what_was_stopped_stays_so_and_nobody_is_alarmed(station: Station) -> No
         assert "UNCONTROLLABLE" not in service.path_of(name) or name == "bay-4"
 
 
-def test_with_its_station_file_every_bay_is_held(station: Station) -> None:
-    charging(station)
-    plant, service = station
+def test_with_its_station_file_every_bay_is_held(fresh: Station) -> None:
+    plant, service = fresh
     done = estop(str(service.file))
     assert done.returncode == 0
-    standby = [f"bay-{n} ({port_of(station, n)}): standby verified" for n in (1, 2, 3, 4)]
+    standby = [f"bay-{n} ({port_of(fresh, n)}): standby verified" for n in (1, 2, 3, 4)]
     assert done.stdout.splitlines() == [*standby, DONE.strip()]
     assert done.stderr == held("bay-1", "bay-2", "bay-3", "bay-4")
     bays = service.wait("HELD", ["bay-1", "bay-2", "bay-3", "bay-4"]).values()
@@ -131,9 +149,8 @@ def test_a_port_that_this_service_does_not_have_is_verified_without_it(station: 
         assert done.stderr == "the service holds none of these ports\n"
 
 
-def test_a_controller_that_hangs(station: Station) -> None:
-    charging(station, 1, 2)
-    plant, service = station
+def test_a_controller_that_hangs(fresh: Station) -> None:
+    plant, service = fresh
     os.kill(service.controller, signal.SIGSTOP)
     done = estop(str(service.file))
     assert done.returncode == ("the service has not" in done.stderr), "one that holds the ports may start them again"
@@ -142,10 +159,8 @@ def test_a_controller_that_hangs(station: Station) -> None:
     assert not any(plant.state(bay)["operation"] for bay in (1, 2, 3, 4))
 
 
-def test_a_service_that_is_frozen_as_a_whole_and_then_dead(station: Station) -> None:
-    plant, service = station
-    service.start()
-    charging(station, 1, 2)
+def test_a_service_that_is_frozen_as_a_whole_and_then_dead(fresh: Station) -> None:
+    plant, service = fresh
     os.killpg(service.guardian, signal.SIGSTOP)
     left = estop(str(service.file), "--leave-held", SERVICE_RESULT="success")
     assert left.stdout.count("left alone: a service holds this port") == 4

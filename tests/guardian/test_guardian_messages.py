@@ -61,7 +61,7 @@ def locked(fd: int) -> bool:
 
 def test_a_port_whose_close_hangs_keeps_nobody_from_watching(tmp_path: Path) -> None:
     """Nor when the others have to be stopped in the end."""
-    with running_chargers(tmp_path, 2) as (stuck, good), watched(tmp_path, hangs=("close", stuck.name)) as guardian:
+    with running_chargers(tmp_path, 2) as (stuck, good), watched(tmp_path, hangs={"close": stuck.name}) as guardian:
         for bench in (stuck, good):
             guardian.hand_over(bench.name, bench.fd)
         guardian.send(DROP + stuck.name.encode())
@@ -78,26 +78,30 @@ def test_a_port_whose_close_hangs_keeps_nobody_from_watching(tmp_path: Path) -> 
         assert not stuck.runs, "it was opened anew"
 
 
-@pytest.mark.parametrize("call", ["open", "write", "isatty", "tcsetattr", "close"])
+#: Each hangs on a port of its own.
+CALLS = ("open", "write", "isatty", "tcsetattr", "close")
+
+
 @pytest.mark.parametrize("is_open", [True, False])
-def test_a_driver_that_hangs_delays_no_other_charger_and_not_the_end(
-    tmp_path: Path, call: str, *, is_open: bool
-) -> None:
-    with running_chargers(tmp_path, 3) as benches, watched(tmp_path, hangs=(call, benches[0].name)) as guardian:
-        for bench in benches:
-            guardian.hand_over(bench.name, bench.fd)
-            if not is_open and call != "close":
-                guardian.send(DROP + bench.name.encode())
-        guardian.beat()
-        dies_s = time.monotonic()
-        guardian.link.close()
-        assert guardian.ended() == ACTED
-        assert time.monotonic() - dies_s < 4.0
-        for bench in benches[1:]:
-            stop_s = bench.wire.counters.first_stop_s
-            assert stop_s is not None
-            assert stop_s - dies_s < 0.2
-            assert f"guardian: {bench.name}: standby verified" in guardian.log
+def test_a_driver_that_hangs_delays_no_other_charger_and_not_the_end(tmp_path: Path, *, is_open: bool) -> None:
+    with running_chargers(tmp_path, len(CALLS) + 2) as benches:
+        stuck, good = benches[: len(CALLS)], benches[len(CALLS) :]
+        hangs = {call: bench.name for call, bench in zip(CALLS, stuck, strict=True)}
+        with watched(tmp_path, hangs=hangs) as guardian:
+            for bench in benches:
+                guardian.hand_over(bench.name, bench.fd)
+                if not is_open and bench.name != hangs["close"]:
+                    guardian.send(DROP + bench.name.encode())
+            guardian.beat()
+            dies_s = time.monotonic()
+            guardian.link.close()
+            assert guardian.ended() == ACTED
+            assert time.monotonic() - dies_s < 4.0
+            for bench in good:
+                stop_s = bench.wire.counters.first_stop_s
+                assert stop_s is not None
+                assert stop_s - dies_s < 0.2
+                assert f"guardian: {bench.name}: standby verified" in guardian.log
 
 
 def test_a_port_that_was_closed_when_the_controller_died_is_stopped_all_the_same(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from orchestrator.lastresort.guardian import ACTED
 from orchestrator.model import Action, Command
 from orchestrator.protocol.charger import encode
 from orchestrator.sim.client import PlantProcess
+from tests.guardian import briefly
 from tests.guardian.saboteur import MODES
 from tests.guardian.watched import state_of
 from tests.sim.wires import udp_keys
@@ -76,6 +77,7 @@ OTHERS = (
 #: Start options of services with unusual ones.
 RUNS: Mapping[str, Sequence[str]] = {
     **{case.name: ("-c", GUARD, case.mode) for case in CASES if case.mode},
+    **dict.fromkeys(("SIGSEGV", "SIGSTOP", "half a frame"), (*briefly.GUARDIAN, "run")),
     "without streams": ("-c", WITHOUT_STREAMS),
 }
 BAYS = {name: number for number, name in enumerate([*(case.name for case in CASES), *OTHERS], start=1)}

@@ -7,8 +7,9 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -360,29 +361,52 @@ def hanging(patch: pytest.MonkeyPatch, module: Any, call: str, port: str) -> Ite
             goes_on.set()
 
 
-@pytest.mark.parametrize("opened", [True, False])
-@pytest.mark.parametrize(
-    ("module", "call"),
-    [
-        (os, "open"), (os, "write"), (os, "close"), (os, "isatty"), (os, "set_blocking"), (termios, "tcsetattr"),
-        (termios, "tcgetattr"), (termios, "tcflush"), (termios, "tcflow"), (fcntl, "ioctl"), (fcntl, "flock"),
-    ],
-    ids=lambda value: getattr(value, "__name__", value),
+#: Every call that a stop makes to a port's driver.
+CALLS = (
+    (os, "open"), (os, "write"), (os, "close"), (os, "isatty"), (os, "set_blocking"), (termios, "tcsetattr"),
+    (termios, "tcgetattr"), (termios, "tcflush"), (termios, "tcflow"), (fcntl, "ioctl"), (fcntl, "flock"),
 )  # fmt: skip
-def test_a_driver_that_hangs_delays_no_other_port(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: Any, call: str, *, opened: bool
-) -> None:
-    """In any call, with the port open or not, and at any place in the list."""
-    with running_chargers(tmp_path, 3) as benches, hanging(monkeypatch, module, call, benches[1].name):
+
+
+@dataclass(frozen=True)
+class Hung:
+    """A stop of one port for each of CALLS, which hangs in that call, between two good ones."""
+
+    took_s: float
+    told: Mapping[str, str]  #: of those that hang, by call
+    good: Mapping[str, str]
+    stops_s: Sequence[float | None]  #: of the good ones, from the beginning
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["opened", "not opened"])
+def hung(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Hung:
+    patch, directory = pytest.MonkeyPatch(), tmp_path_factory.mktemp("hung")
+    with running_chargers(directory, len(CALLS) + 2) as benches, ExitStack() as stack:
+        first, *bad, last = benches
+        for (module, call), bench in zip(CALLS, bad, strict=True):
+            stack.enter_context(hanging(patch, module, call, bench.name))
+        ports = {bench.name: bench.duplicate() if request.param else None for bench in benches}
         began_s = time.monotonic()
-        told = stop_all({bench.name: bench.duplicate() if opened else None for bench in benches}, 3 * ROUND_S)
-        assert time.monotonic() - began_s < 3 * ROUND_S + laststop.CLOSE_S + 0.3
-        for bench in (benches[0], benches[2]):
-            assert told[bench.name] == ""
-            stop_s = bench.wire.counters.first_stop_s
-            assert stop_s is not None
-            assert stop_s - began_s < ROUND_S - 0.1
-        assert told[benches[1].name] in ("", HANGS, SILENT)
+        told = stop_all(ports, 3 * ROUND_S)
+        took_s = time.monotonic() - began_s
+        stops_s = [bench.wire.counters.first_stop_s for bench in (first, last)]
+        return Hung(
+            took_s,
+            {call: told[bench.name] for (_, call), bench in zip(CALLS, bad, strict=True)},
+            {bench.name: told[bench.name] for bench in (first, last)},
+            [at_s and at_s - began_s for at_s in stops_s],
+        )
+
+
+@pytest.mark.parametrize("call", [call for _, call in CALLS])
+def test_a_driver_that_hangs_delays_no_other_port(hung: Hung, call: str) -> None:
+    """In any call, with the port open or not, and at any place in the list."""
+    assert hung.took_s < 3 * ROUND_S + laststop.CLOSE_S + 0.3
+    assert set(hung.good.values()) == {""}
+    for stop_s in hung.stops_s:
+        assert stop_s is not None
+        assert stop_s < ROUND_S - 0.1
+    assert hung.told[call] in ("", HANGS, SILENT)
 
 
 def test_a_hundred_ports_are_stopped_at_once(tmp_path: Path) -> None:

@@ -2,25 +2,28 @@
 
 import array
 import fcntl
+import json
 import os
 import signal
 import socket
 import subprocess
 import sys
 import termios
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 from orchestrator.lastresort.guardian import ALIVE, BEAT, PORT
 from tests.waiting import wait_until
 from tests.whole.station import die_with_parent
 
-#: Arguments: the connection, the controller's code, then guardian constants such as END_S=0.3. Most machines have no
-#: GPIO line: a test passes a pipe, and the guardian's requests to the kernel come out at its other end.
+#: Arguments: the connection, the controller's code, the calls that hang by port, then guardian constants such as
+#: END_S=0.3. Most machines have no GPIO line: a test passes a pipe, and the guardian's requests to the kernel come out
+#: at its other end.
 LAUNCH = """
-import os, socket, struct, sys, termios, time
+import json, os, socket, struct, sys, termios, time
 from orchestrator.lastresort import guardian, lastopen
 ioctl = lastopen.fcntl.ioctl
 def drive(fd, number, asked=0):
@@ -28,8 +31,7 @@ def drive(fd, number, asked=0):
         return ioctl(fd, number, asked)
     return os.write(fd, struct.pack("=dI16s", time.monotonic(), number, asked))
 lastopen.fcntl.ioctl = drive
-call, port = sys.argv[3:5]
-if call:
+def hang(call, port):
     module = os if hasattr(os, call) else termios
     good, device = getattr(module, call), os.path.realpath(port)
     def stuck(which, *rest, **named):
@@ -42,7 +44,9 @@ if call:
                 time.sleep(100)
         return good(which, *rest, **named)
     setattr(module, call, stuck)
-for word in sys.argv[5:]:
+for call, port in json.loads(sys.argv[3]).items():
+    hang(call, port)
+for word in sys.argv[4:]:
     name, _, value = word.partition("=")
     assert hasattr(guardian, name)
     setattr(guardian, name, float(value))
@@ -145,7 +149,7 @@ def watched(
     stderr: int | None = None,
     notify: str = "",
     terminal: int | None = None,
-    hangs: tuple[str, str] = ("", ""),
+    hangs: Mapping[str, str] = MappingProxyType({}),
 ) -> Iterator[Watched]:
     """`hangs`: this system call never returns for this port, as with adapters with dead firmware."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -154,7 +158,16 @@ def watched(
     environment = {key: value for key, value in os.environ.items() if key != "NOTIFY_SOCKET"}
     with log.open("ab") as file, ours:
         process = subprocess.Popen(
-            [sys.executable, "-c", LAUNCH, str(theirs.fileno()), controller, *hangs, "VERIFY_S=1", *constants],
+            [
+                sys.executable,
+                "-c",
+                LAUNCH,
+                str(theirs.fileno()),
+                controller,
+                json.dumps(dict(hangs)),
+                "VERIFY_S=1",
+                *constants,
+            ],
             stdin=subprocess.DEVNULL,
             stdout=file,
             stderr=file if stderr is None else stderr,

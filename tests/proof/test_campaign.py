@@ -22,7 +22,7 @@ from tests.proof.script import BaySetup, Happening, Script
 Patch = pytest.MonkeyPatch
 
 
-@pytest.mark.parametrize("first", range(0, 96, 12))
+@pytest.mark.parametrize("first", range(0, 48, 12))  # `make campaign` plays a thousand
 def test_no_random_script_breaks_anything(first: int) -> None:
     all_played = [play_seed(seed) for seed in range(first, first + 12)]
     broken = {played.script.seed: played.violations for played in all_played if played.violations}

@@ -6,7 +6,9 @@ from orchestrator.link import serial as serial_module
 from tests.proof.nth_call import ERRORS, Case, cases, charge
 
 #: Every Nth of all failures; `make campaign` plays them all.
-SAMPLE = 100
+SAMPLE = 200
+#: Enough to have the error that a boundary is made to leak.
+DENSER = 100
 
 
 @pytest.fixture(name="sample", scope="module")
@@ -32,5 +34,5 @@ def test_a_charge_goes_on_after_a_port_that_failed() -> None:
 
 def test_an_exception_that_leaks_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serial_module, "_FAILURES", (OSError,))
-    leaks = [case for case in cases(SAMPLE) if (case.call, case.error) == ("read", "TypeError")]
+    leaks = [case for case in cases(DENSER) if (case.call, case.error) == ("read", "TypeError")]
     assert any(charge(case, brief=True).violations for case in leaks)

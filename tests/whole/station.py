@@ -21,6 +21,8 @@ from tests.waiting import wait_until
 
 Document = dict[str, Any]
 
+#: How Python is told to run a service.
+RUN = ("-m", "orchestrator", "run")
 POLICY = Path(__file__).with_name("policy.yaml")
 #: Python starts, imports everything and opens the socket within this, even on a busy machine.
 START_S = 20.0
@@ -35,9 +37,13 @@ def unnamed(text: str) -> str:
     return re.sub(r" by [^;,]+? at \d\d:\d\d", " by the operator", text)
 
 
+#: Looked up here: between fork and exec, other threads may hold any lock for ever.
+PRCTL = ctypes.CDLL(None).prctl
+
+
 def die_with_parent() -> None:
     """In a child before exec: have the kernel kill it when the tests end, however they end."""
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+    PRCTL(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
 def station_document(directory: Path, cans: Sequence[Mapping[str, object]], bays: int) -> Document:
@@ -69,7 +75,7 @@ def station_document(directory: Path, cans: Sequence[Mapping[str, object]], bays
 class Service:
     """`python -m orchestrator run` on a station file; its output is in `directory`/service.log."""
 
-    def __init__(self, directory: Path, document: Document, run: Sequence[str] = ("-m", "orchestrator", "run")) -> None:
+    def __init__(self, directory: Path, document: Document, run: Sequence[str] = RUN) -> None:
         self.directory = directory
         self._run = run
         self.file = directory / "station.yaml"
@@ -81,7 +87,7 @@ class Service:
 
     # --- the process ---
 
-    def start(self, stderr: int | None = None) -> Self:
+    def start(self, stderr: int | None = None, env: Mapping[str, str] | None = None) -> Self:
         """Start it and wait for an answer; its output goes into its log, or to `stderr`."""
         with self._log.open("ab") as log:
             self._process = subprocess.Popen(
@@ -89,6 +95,7 @@ class Service:
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=log if stderr is None else stderr,
+                env={**os.environ, **(env or {})},
                 start_new_session=True,
                 preexec_fn=die_with_parent,
             )
@@ -204,11 +211,14 @@ class Service:
 
 
 def orchestrator(
-    *args: str, env: Mapping[str, str] | None = None, cwd: Path | None = None
+    *args: str,
+    env: Mapping[str, str] | None = None,
+    cwd: Path | None = None,
+    program: Sequence[str] = ("-m", "orchestrator"),
 ) -> subprocess.CompletedProcess[str]:
     """Run one verb of the command line."""
     return subprocess.run(
-        [sys.executable, "-m", "orchestrator", *args],
+        [sys.executable, *program, *args],
         env={**os.environ, **(env or {})},
         cwd=cwd,
         capture_output=True,
@@ -226,6 +236,7 @@ def whole_station(
     *plant_args: str,
     change: Callable[[Document], None] = lambda _: None,
     buses: int = 1,
+    run: Sequence[str] = RUN,
 ) -> Iterator[tuple[PlantProcess, Service]]:
     """A running plant and a service not started yet, on separate buses and ports.
 
@@ -234,7 +245,7 @@ def whole_station(
     cans = [{**udp_keys(), "channel": f"239.74.163.{2 + number}"} for number in range(buses)]
     document = station_document(directory, cans, bays)
     change(document)
-    service = Service(directory, document)
+    service = Service(directory, document, run)
     can_args = [arg for keys in cans for arg in ("--can", json.dumps(keys))]
     with PlantProcess(directory, "--bays", str(bays), *can_args, *plant_args) as plant:
         try:

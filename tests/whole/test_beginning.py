@@ -4,17 +4,15 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import pytest
 
 from orchestrator.lastresort.guardian import ACTED
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.station import Service, whole_station
-
-Station = tuple[PlantProcess, Service]
+from tests.whole.ahead import Station, charge
+from tests.whole.station import Service
 
 #: The controller with a limit on its threads; a limit of the system (TasksMax=, ulimit -u) fails in the same way.
 FEW_THREADS = """
@@ -39,15 +37,14 @@ sys.exit(guardian.guard(sys.argv[2:], ("-c", sys.argv[1])))
 """
 
 
-@pytest.fixture
-def station(tmp_path: Path) -> Iterator[Station]:
+def left_running(plant: PlantProcess, service: Service) -> None:
     """A charger that runs without any service, although its service had persisted that it runs."""
-    with whole_station(tmp_path) as (plant, service):
-        service.start().wait("CHARGING")
-        wait_until(lambda: plant.state()["current_a"] > 13, 10, "the current")
-        service.kill_all()
-        assert plant.state()["run"]
-        yield plant, service
+    charge(plant, service)
+    service.kill_all()
+    assert plant.state()["run"]
+
+
+pytestmark = pytest.mark.station(ready=left_running)
 
 
 def run(command: Sequence[str], service: Service) -> tuple[int, str]:

@@ -17,7 +17,7 @@ from orchestrator.lastresort.asking import ask
 from orchestrator.sim.client import PlantProcess
 from tests.sim.wires import udp_keys
 from tests.waiting import wait_until
-from tests.whole.station import Document, Service, die_with_parent, orchestrator, unnamed, whole_station
+from tests.whole.station import Document, Service, orchestrator, unnamed, whole_station
 
 Station = tuple[PlantProcess, Service]
 
@@ -29,8 +29,16 @@ def one_automatic(document: Document) -> None:
     document["bays"][3]["charger"]["port"] += "-missing"
 
 
+@pytest.fixture(name="unplugged", scope="module")
+def _unplugged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    """Another station of two bays: what happens to their plugs takes its time beside the tests that follow."""
+    with whole_station(tmp_path_factory.mktemp("unplugged"), 2) as (plant, service):
+        service.start()
+        yield plant, service
+
+
 @pytest.fixture(name="station", scope="module")
-def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+def _station(unplugged: Station, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     with whole_station(tmp_path_factory.mktemp("operator"), 4, change=one_automatic) as (plant, service):
         service.start().wait("CHARGING", ["bay-1", "bay-2"])
         yield plant, service
@@ -67,6 +75,39 @@ def test_status_shows_every_bay_and_why(station: Station) -> None:
     assert document["bays"][0]["charger"]["online"] is True
     directory = str(service.directory / "run" / "journal")
     assert document["journal"] == {"directory": directory, "problem": "", "cause": None}
+
+
+def test_an_adapter_that_is_unplugged_and_plugged_in_again(unplugged: Station) -> None:
+    plant, service = unplugged
+    service.wait("CHARGING", ["bay-1"])
+    wait_until(lambda: plant.state(1)["current_a"] > 13, 10, "the current")
+    plant.inject("port_gone", 1)
+    bay = service.wait("UNCONTROLLABLE", ["bay-1"])["bay-1"]
+    assert bay["alarm"] == "danger"
+    assert "no such port" in bay["reason"]
+    assert bay["charger"]["old"] is True and bay["charger"]["age_s"] > 2
+    table = service.cli("status", "bay-1").stdout
+    assert table.splitlines()[1].startswith("ALARM: bay-1: CUT THE MAINS of this charger (")
+    assert " A (old)" in table and "OLD: the charger's " in table and "; the BMU sees " in table
+    plant.inject("heal", 1)
+    service.wait("SUSPENDED", ["bay-1"])
+    truth = plant.state(1)
+    assert (truth["operation"], truth["resting"]) == (0, True)
+    assert truth["first_stop_s"] == truth["first_byte_s"]  # the first frame on the new line was a stop
+
+
+def test_a_battery_that_leaves_and_another_that_comes(unplugged: Station) -> None:
+    plant, service = unplugged
+    service.wait("CHARGING", ["bay-2"])
+    wait_until(lambda: plant.state(2)["current_a"] > 13, 10, "the current")
+    plant.inject("battery_removed", 2)
+    assert service.wait("IDLE", ["bay-2"])["bay-2"]["reason"] == "no battery"
+    plant.set(2, soc_pct=99)
+    plant.inject("heal", 2)
+    wait_until(
+        lambda: "SOC 99 % is not below 98 %" in service.bay("bay-2")["reason"], 10, "the fuller battery is left alone"
+    )
+    plant.set(2, soc_pct=40)
 
 
 def test_pause_and_start(station: Station) -> None:
@@ -256,77 +297,6 @@ def test_probe_is_refused_while_the_service_runs(station: Station) -> None:
     assert refused.stderr.startswith("orchestrator: a service is running this station")
 
 
-def test_an_adapter_that_is_unplugged_and_plugged_in_again(station: Station) -> None:
-    charging(station)
-    plant, service = station
-    plant.inject("port_gone")
-    bay = service.wait("UNCONTROLLABLE")["bay-1"]
-    assert bay["alarm"] == "danger"
-    assert "no such port" in bay["reason"]
-    assert bay["charger"]["old"] is True and bay["charger"]["age_s"] > 2
-    table = service.cli("status", "bay-1").stdout
-    assert table.splitlines()[1].startswith("ALARM: bay-1: CUT THE MAINS of this charger (")
-    assert " A (old)" in table and "OLD: the charger's " in table and "; the BMU sees " in table
-    plant.inject("heal")
-    service.wait("SUSPENDED")
-    truth = plant.state()
-    assert (truth["operation"], truth["resting"]) == (0, True)
-    assert truth["first_stop_s"] == truth["first_byte_s"]  # the first frame on the new line was a stop
-    service.wait("CHARGING", timeout_s=40)  # by itself, after the backoff
-
-
-def test_a_battery_that_leaves_and_another_that_comes(station: Station) -> None:
-    charging(station)
-    plant, service = station
-    plant.inject("battery_removed")
-    assert service.wait("IDLE")["bay-1"]["reason"] == "no battery"
-    plant.set(soc_pct=99)
-    plant.inject("heal")
-    wait_until(lambda: "SOC 99 % is not below 98 %" in service.bay()["reason"], 10, "the fuller battery is left alone")
-    plant.set(soc_pct=40)
-    service.wait("CHARGING", timeout_s=40)  # after the backoff of a battery removed in mid-charge
-
-
-def test_who_watches_goes_on_when_the_service_is_started_anew(tmp_path: Path) -> None:
-    with whole_station(tmp_path) as (_, service):
-        service.start()
-        argv = [sys.executable, "-m", "orchestrator", "status", "--watch", "--json", "--socket", str(service.socket)]
-        said = (tmp_path / "watch.txt").open("w+")
-        with said, subprocess.Popen(argv, stdout=said, stderr=subprocess.STDOUT, preexec_fn=die_with_parent) as watch:
-            file = tmp_path / "watch.txt"
-            wait_until(lambda: '"station"' in file.read_text(), 10, "the first status")
-            service.signal(signal.SIGTERM)
-            service.ended()
-            wait_until(lambda: "orchestrator: no answer since " in file.read_text(), 10, "the loss")
-            service.start()
-            wait_until(lambda: "the service answers again\n" in file.read_text(), 10, "the return")
-            watch.send_signal(signal.SIGINT)
-            assert watch.wait(10) == 130
-
-
-def test_a_charger_that_is_gone_for_good_is_dropped(tmp_path: Path) -> None:
-    def elsewhere(document: Document) -> None:
-        document["bays"][0]["charger"]["port"] += "-gone"
-
-    with whole_station(tmp_path) as (plant, service):
-        service.start().wait("CHARGING")
-        service.kill_all()
-        port = plant.bays[0]["port"]
-        plant.inject("port_gone")
-        service.edit(elsewhere)
-        service.start()
-        wait_until(service.strays, 10, "the charger in hand")
-        refused = service.cli("reset", "--port", "/dev/other")
-        assert refused.returncode == 1 and f"(waited for: {port})" in refused.stderr
-        done = service.cli("reset", "--port", port)
-        assert (done.returncode, done.stdout) == (0, f"bay-1 on {port}: reset accepted\n")
-        assert service.strays() == []
-        service.kill_all()
-        service.start()
-        assert service.strays() == [], "it was on the disk before that was said"
-        assert service.cli("reset", "bay-1", "--port", port).returncode == 2
-
-
 def test_a_service_that_may_open_too_few_files_says_so(tmp_path: Path) -> None:
     with whole_station(tmp_path) as (_, service):
         done = subprocess.run(
@@ -338,6 +308,12 @@ def test_a_service_that_may_open_too_few_files_says_so(tmp_path: Path) -> None:
         assert "Traceback" not in done.stderr
         assert done.stderr.startswith("orchestrator: at most 12 files may be open at once, and this station needs ")
         assert len(done.stderr.splitlines()) == 1
+
+
+def test_after_the_backoff_of_their_faults_both_charge_again_by_themselves(unplugged: Station) -> None:
+    """The adapter that was plugged in again, and the battery that another one had left in mid-charge."""
+    _, service = unplugged
+    service.wait("CHARGING", ["bay-1", "bay-2"], timeout_s=40)
 
 
 def test_the_end_names_the_charger_that_nobody_could_verify(station: Station) -> None:

@@ -6,14 +6,17 @@ from contextlib import contextmanager
 from typing import Any
 
 import can
+import pytest
 from durand.scheduler import get_scheduler, set_scheduler  # type: ignore[import-untyped]  # it has no annotations
 
 from orchestrator.sim.background import Background
 from orchestrator.sim.can_wire import CanWire
+from orchestrator.sim.client import PlantProcess
 from orchestrator.sim.forger import Forger, Lie, When
 from orchestrator.sim.second_master import SecondMaster
 from tests.waiting import wait_until
-from tests.whole.station import Document, whole_station
+from tests.whole.ahead import Station, only_the_plant
+from tests.whole.station import Document, Service
 
 #: Faults that only report somebody else's presence.
 SAID = {"other_master", "heartbeat_set", "soc_jump"}
@@ -46,28 +49,31 @@ def reads_everything(loop: Any, wire: CanWire) -> SecondMaster:
     return master
 
 
-def test_a_whole_charge_beside_a_master_that_reads_everything(tmp_path: Any) -> None:
-    plant_args = ("--pack", "demo", "--speed", "4", "--bmu", "mainloop")
-    with whole_station(tmp_path, 1, *plant_args) as (plant, service):
-        document = json.loads(service.file.read_text(encoding="utf-8"))
-        with stranger(document, reads_everything) as master:
-            service.start()
-            service.wait("FULL", timeout_s=60)
-            assert plant.state()["soc_pct"] > 95
-            assert master.seen.values > 100
-            assert master.seen.aborts > 0  # it does not wait for the end of its own longer transfers
-            wait_until(lambda: len(service.journal("bay-1", "session")) == 2, what="the session's end in the journal")
-        assert {fault["id"] for fault in service.journal("bay-1", "fault")} <= SAID
-        assert [event["event"] for event in service.journal("bay-1", "session")] == ["begin", "end"]
-
-
-def test_a_forged_temperature_stops_the_charge(tmp_path: Any) -> None:
-    with whole_station(tmp_path, 1, "--pack", "demo", "--soc", "30", "--bmu", "mainloop") as (plant, service):
+@pytest.mark.station(plant_args=("--pack", "demo", "--speed", "4", "--bmu", "mainloop"), ready=only_the_plant)
+def test_a_whole_charge_beside_a_master_that_reads_everything(station: Station) -> None:
+    plant, service = station
+    document = json.loads(service.file.read_text(encoding="utf-8"))
+    with stranger(document, reads_everything) as master:
         service.start()
-        service.wait("CHARGING", timeout_s=30)
-        document = json.loads(service.file.read_text(encoding="utf-8"))
-        with stranger(document, lambda loop, wire: Forger(loop, wire, NODE_ID, Lie(when=When.AFTER, word=310))):
-            service.wait({"SUSPENDED", "TRIPPED"}, timeout_s=5)
-            assert plant.state()["operation"] == 0
-        faults = {fault["id"]: fault for fault in service.journal("bay-1", "fault")}
-        assert "two answers to one request" in faults["temperature_invalid"]["text"]
+        service.wait("FULL", timeout_s=60)
+        assert plant.state()["soc_pct"] > 95
+        assert master.seen.values > 100
+        assert master.seen.aborts > 0  # it does not wait for the end of its own longer transfers
+        wait_until(lambda: len(service.journal("bay-1", "session")) == 2, what="the session's end in the journal")
+    assert {fault["id"] for fault in service.journal("bay-1", "fault")} <= SAID
+    assert [event["event"] for event in service.journal("bay-1", "session")] == ["begin", "end"]
+
+
+def until_it_charges(plant: PlantProcess, service: Service) -> None:
+    service.start().wait("CHARGING", timeout_s=30)
+
+
+@pytest.mark.station(plant_args=("--pack", "demo", "--soc", "30", "--bmu", "mainloop"), ready=until_it_charges)
+def test_a_forged_temperature_stops_the_charge(station: Station) -> None:
+    plant, service = station
+    document = json.loads(service.file.read_text(encoding="utf-8"))
+    with stranger(document, lambda loop, wire: Forger(loop, wire, NODE_ID, Lie(when=When.AFTER, word=310))):
+        service.wait({"SUSPENDED", "TRIPPED"}, timeout_s=5)
+        assert plant.state()["operation"] == 0
+    faults = {fault["id"]: fault for fault in service.journal("bay-1", "fault")}
+    assert "two answers to one request" in faults["temperature_invalid"]["text"]

@@ -3,14 +3,15 @@
 import os
 import select
 import tty
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import pytest
 
 from orchestrator.lastresort.guardian import ACTED
 from orchestrator.protocol.charger import STOP_FRAME
+from tests.guardian import briefly
 from tests.waiting import wait_until
 from tests.whole.station import Service, orchestrator, station_document
 
@@ -58,14 +59,11 @@ def silent_port(path: Path) -> Iterator[int]:
         os.close(slave)
 
 
-@pytest.fixture
-def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
-    """Of one bay; modules in `tmp_path/first` come before all others."""
-    (tmp_path / "first").mkdir()
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path / 'first'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}")
-    made = Service(tmp_path, station_document(tmp_path, [{"interface": "virtual"}], 1))
-    yield made
-    made.close()
+def of_one_bay(directory: Path) -> tuple[Service, dict[str, str]]:
+    """A service, and its environment: modules in `directory/first` come before all others."""
+    (directory / "first").mkdir()
+    path = f"{directory / 'first'}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    return Service(directory, station_document(directory, [{"interface": "virtual"}], 1)), {"PYTHONPATH": path}
 
 
 def read_until(master: int, frame: bytes, within_s: float = 20.0) -> None:
@@ -79,14 +77,12 @@ def is_part_of(name: str, packages: tuple[str, ...]) -> bool:
     return any(name == package or name.startswith(f"{package}.") for package in packages)
 
 
-def test_the_ports_wait_for_no_import_that_they_do_not_need(
-    service: Service, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_ports_wait_for_no_import_that_they_do_not_need(tmp_path: Path) -> None:
+    service, env = of_one_bay(tmp_path)
     (tmp_path / "first" / "sitecustomize.py").write_text(SPY, encoding="utf-8")
-    monkeypatch.setenv("SPY_LOG", str(tmp_path / "imports"))
-    monkeypatch.setenv("SPY_PORT", str(tmp_path / "bay-1"))
-    with silent_port(tmp_path / "bay-1") as master:
-        service.start()
+    spied = {"SPY_LOG": str(tmp_path / "imports"), "SPY_PORT": str(tmp_path / "bay-1")}
+    with silent_port(tmp_path / "bay-1") as master, closing(service):
+        service.start(env={**env, **spied})
         read_until(master, POLL)
         guardian, controller = (
             (tmp_path / f"imports.{pid}").read_text(encoding="utf-8").splitlines()
@@ -99,29 +95,55 @@ def test_the_ports_wait_for_no_import_that_they_do_not_need(
     assert [name for name in (*guardian, *controller) if is_part_of(name, NEVER)] == []
 
 
-@pytest.mark.parametrize("library", ["can", "canopen"])
-@pytest.mark.parametrize(
-    ("source", "problem"),
-    [("raise ImportError('it is broken')", "it is broken"), ("import threading; threading.Event().wait()", "")],
-    ids=["fails", "hangs"],
-)
+#: What a broken library does when it is imported, and what the status says about it.
+BROKEN = {
+    "fails": ("raise ImportError('it is broken')", "it is broken"),
+    "hangs": ("import threading; threading.Event().wait()", ""),
+}
+LIBRARIES = [(library, how) for library in ("can", "canopen") for how in BROKEN]
+
+
+@pytest.fixture(scope="module")
+def with_broken_libraries(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Mapping[tuple[str, str], tuple[Service, int]]]:
+    """A service and the other end of its silent port for each: all wait for their chargers at the same time."""
+    with ExitStack() as stack:
+        services = {}
+        for library, how in LIBRARIES:
+            directory = tmp_path_factory.mktemp("broken")
+            service, env = of_one_bay(directory)
+            (directory / "first" / f"{library}.py").write_text(BROKEN[how][0], encoding="utf-8")
+            master = stack.enter_context(silent_port(directory / "bay-1"))
+            services[library, how] = stack.enter_context(closing(service)).start(env=env), master
+        yield services
+
+
+@pytest.mark.parametrize(("library", "how"), LIBRARIES)
 def test_a_can_library_that_cannot_be_imported_hurts_no_port(
-    service: Service, tmp_path: Path, library: str, source: str, problem: str
+    with_broken_libraries: Mapping[tuple[str, str], tuple[Service, int]], library: str, how: str
 ) -> None:
-    (tmp_path / "first" / f"{library}.py").write_text(source, encoding="utf-8")
-    with silent_port(tmp_path / "bay-1") as master:
-        service.start()
-        service.wait(("OFFLINE", "UNCONTROLLABLE"))  # it is decided what to do about a charger that is silent
-        wait_until(lambda: problem in str(service.bay()["battery"]), what=problem)
-        for frame in (STOP_FRAME, POLL, STOP_FRAME, POLL):
-            read_until(master, frame)
-        assert not service.bay()["battery"]["online"]
+    service, master = with_broken_libraries[library, how]
+    service.wait(("OFFLINE", "UNCONTROLLABLE"))  # it is decided what to do about a charger that is silent
+    problem = BROKEN[how][1]
+    wait_until(lambda: problem in str(service.bay()["battery"]), what=problem)
+    drain(master)
+    for frame in (STOP_FRAME, POLL, STOP_FRAME, POLL):
+        read_until(master, frame)
+    assert not service.bay()["battery"]["online"]
 
 
-def test_a_start_that_fails_later_has_stopped_the_chargers(service: Service, tmp_path: Path) -> None:
+def drain(master: int) -> None:
+    """What was written before does not count."""
+    while select.select([master], [], [], 0)[0]:
+        os.read(master, 4096)
+
+
+def test_a_start_that_fails_later_has_stopped_the_chargers(tmp_path: Path) -> None:
+    service, _ = of_one_bay(tmp_path)
     service.edit(lambda document: document["control"].update(socket="/proc/nowhere/socket"))
     with silent_port(tmp_path / "bay-1") as master:
-        ended = orchestrator("run", str(service.file))
+        ended = orchestrator("run", str(service.file), program=briefly.GUARDIAN)
         read_until(master, STOP_FRAME)
     assert ended.returncode == ACTED
     assert "orchestrator: the control socket /proc/nowhere/socket cannot be opened" in ended.stderr

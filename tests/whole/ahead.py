@@ -1,0 +1,114 @@
+"""Stations that are made ready while the tests before theirs run: most of a test would be waiting for its charge."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.sim.client import PlantProcess
+from tests.waiting import wait_until
+from tests.whole.station import RUN, Document, Service, whole_station
+
+Station = tuple[PlantProcess, Service]
+#: A charge that a very busy machine has interrupted meanwhile goes on within this, after its backoff.
+AGAIN_S = 40.0
+#: As many stations are made ready beside the one under test: more of them would slow each other down.
+AHEAD = 1
+
+
+def unchanged(document: Document) -> None:
+    """The station file as it is."""
+
+
+def charge(plant: PlantProcess, service: Service) -> None:
+    """Started, with all bays charging and their currents up."""
+    service.start()
+    until_all_charge(plant, service)
+
+
+def until_all_charge(plant: PlantProcess, service: Service, timeout_s: float = 20.0) -> None:
+    """Wait for the charges, or look whether they are still going on."""
+    bays = range(1, len(plant.bays) + 1)
+    service.wait("CHARGING", [f"bay-{bay}" for bay in bays], timeout_s)
+    wait_until(lambda: all(plant.state(bay)["current_a"] > 13 for bay in bays), 10, "the current")
+
+
+def only_started(plant: PlantProcess, service: Service) -> None:
+    """Started, with no bay charging yet."""
+    service.start()
+
+
+def only_the_plant(plant: PlantProcess, service: Service) -> None:
+    """Started by the test itself."""
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a station is like when its test begins."""
+
+    bays: int = 1
+    plant_args: tuple[str, ...] = ()
+    change: Callable[[Document], None] = unchanged
+    run: Sequence[str] = RUN
+    ready: Callable[[PlantProcess, Service], None] = charge
+
+
+@dataclass(frozen=True)
+class Made:
+    """A station, and what takes it down."""
+
+    station: Station
+    stack: ExitStack
+
+
+class Ahead:
+    """The stations of a module's tests, by the tests' names, in their order."""
+
+    def __init__(self, recipes: Mapping[str, Recipe], directory: Callable[[], Path], pool: ThreadPoolExecutor) -> None:
+        self._recipes, self._directory, self._pool = recipes, directory, pool
+        self._names = list(recipes)
+        self._begun: dict[str, Future[Made]] = {}
+
+    @contextmanager
+    def take(self, name: str) -> Iterator[Station]:
+        """The station of this test; those of the next ones are begun."""
+        self.begin(name, 1 + AHEAD)
+        made = self._begun[name].result()
+        with made.stack:
+            if self._recipes[name].ready is charge:
+                until_all_charge(*made.station, AGAIN_S)
+            yield made.station
+
+    def begin(self, name: str, count: int = 1) -> None:
+        """Begin with this test's station and those of the next ones."""
+        at = self._names.index(name)
+        for near in self._names[at : at + count]:
+            if near not in self._begun:
+                self._begun[near] = self._pool.submit(self._make, self._recipes[near], self._directory())
+
+    def close(self) -> None:
+        """Take down those that no test has taken."""
+        for one in self._begun.values():
+            if not one.cancel() and one.exception() is None:
+                one.result().stack.close()
+
+    @staticmethod
+    def _make(recipe: Recipe, directory: Path) -> Made:
+        with ExitStack() as stack:
+            plant, service = stack.enter_context(
+                whole_station(directory, recipe.bays, *recipe.plant_args, change=recipe.change, run=recipe.run)
+            )
+            recipe.ready(plant, service)
+            return Made((plant, service), stack.pop_all())
+
+
+@contextmanager
+def stations_ahead(recipes: Mapping[str, Recipe], directory: Callable[[], Path]) -> Iterator[Ahead]:
+    """The threads live as long as the stations: the kernel kills a process when the thread that started it ends."""
+    with ThreadPoolExecutor(1 + AHEAD) as pool:
+        ahead = Ahead(recipes, directory, pool)
+        try:
+            yield ahead
+        finally:
+            ahead.close()
