@@ -3,7 +3,7 @@
 import io
 import zlib
 from collections.abc import Iterator
-from gzip import GzipFile
+from gzip import BadGzipFile, GzipFile
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, cast
 
@@ -15,7 +15,7 @@ TAIL = 4096
 TRAILER = 8
 BUFFER = 1 << 20
 #: What reading a damaged gzip file raises.
-DAMAGED = (EOFError, zlib.error)
+DAMAGED = (BadGzipFile, EOFError, zlib.error)
 
 
 class Known(NamedTuple):

@@ -6,7 +6,7 @@ import os
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -146,6 +146,22 @@ def test_a_line_is_read_once_it_is_whole(folder: Folder) -> None:
         assert folder.listed() == []
         folder.add(NOVEMBER, part)
     assert folder.listed() == [(id_of(1), "end", 2.0)]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [lambda _: b"", lambda _: b"no gzip", lambda data: data[:-30], lambda data: data[:-8] + bytes(8)],
+    ids=["empty", "no gzip", "torn", "changed"],
+)
+def test_a_damaged_packed_month_costs_only_what_is_damaged(folder: Folder, damage: Callable[[bytes], bytes]) -> None:
+    folder.add(NOVEMBER, *(end(number, 1) for number in range(40)))
+    folder.pack(NOVEMBER)
+    folder.add(DECEMBER, end(41, 1))
+    path = folder.path / f"{NOVEMBER}.gz"
+    path.write_bytes(damage(path.read_bytes()))
+    assert folder.listed()[0] == (id_of(41), "end", 0.0)
+    assert next(folder.charges().whole([id_of(41), id_of(0)]))["id"] == id_of(41)
+    assert folder.dump() == folder.rebuilt()
 
 
 def test_a_month_that_is_gone_takes_its_charges_with_it(folder: Folder) -> None:
