@@ -74,6 +74,7 @@ class Reader:
 
     def __init__(self, path: Path, known: Known | None) -> None:
         self._path = path
+        self.is_damaged = False  #: what comes after the damage is lost
         self.at, self._crc = (known.read, known.crc) if known is not None else (0, 0)  #: where it begins
 
     def __iter__(self) -> Iterator[bytes]:
@@ -83,7 +84,7 @@ class Reader:
                 with opened(self._path) as file:
                     yield from file
             except DAMAGED:
-                pass
+                self.is_damaged = True
             return
         with opened(self._path) as file:
             file.seek(self.at)

@@ -71,6 +71,7 @@ TEXTS: Mapping[str, str] = {
     "longer the more there are",
     "index_being_built": "another command is building it",
     "index_failed": "no index can be built in {folder}: {error}",
+    "records_damaged": "{file} is damaged: the records behind the damage are lost",
     "index_busy": "another command is building the index: wait until it has finished, then try again",
     "index_rebuilt": "index built anew; charges: {charges}",
 }
