@@ -41,7 +41,7 @@ class UselessError(Exception):
 def opened(folder: Path, say: Say) -> sqlite3.Connection:
     """The index as of now, to be read only: the one on disk, or in memory. OSError if the files cannot be read."""
     if not folder.is_dir():
-        return _built(":memory:", None)
+        return _built(":memory:", None, say)
     for _ in range(AGAIN):
         with suppress(FileNotFoundError):
             return _opened(folder, say)
@@ -65,16 +65,16 @@ def _opened(folder: Path, say: Say) -> sqlite3.Connection:
         db = _connected(folder / NAME, "ro")
         _check(db)
     except (UselessError, sqlite3.Error):
-        built = _built(":memory:", folder)
+        built = _built(":memory:", folder, say)
         say(Cause.of("index_not_written", folder=str(folder), error=why))
         return built
-    return _current(db, folder)
+    return _current(db, folder, say)
 
 
-def rebuilt(folder: Path) -> int:
+def rebuilt(folder: Path, say: Say) -> int:
     """Build the index anew, whatever is there; the number of charges in it. BusyError, OSError or sqlite3.Error."""
     with _locked(folder):
-        _rebuild(folder)
+        _rebuild(folder, say)
     with closing(_connected(folder / NAME, "ro")) as db:
         return int(db.execute("SELECT count(*) FROM charges").fetchone()[0])
 
@@ -103,7 +103,7 @@ def _refresh(folder: Path, say: Say) -> None:
         with closing(_connected(path, "rw")) as db:
             _check(db)
             if changed(db, folder):
-                _update(db, folder)
+                _update(db, folder, say)
             return
     except (AnotherFileError, UselessError):
         pass
@@ -113,7 +113,7 @@ def _refresh(folder: Path, say: Say) -> None:
             say(Cause.of("index_damaged", file=str(folder / DAMAGED), error=str(error)))
         elif path.exists():
             raise
-    _rebuild(folder)
+    _rebuild(folder, say)
 
 
 def _is_damage(error: sqlite3.DatabaseError) -> bool:
@@ -121,11 +121,11 @@ def _is_damage(error: sqlite3.DatabaseError) -> bool:
     return not isinstance(error, sqlite3.OperationalError) or error.sqlite_errorcode == sqlite3.SQLITE_ERROR
 
 
-def _rebuild(folder: Path) -> None:
+def _rebuild(folder: Path, say: Say) -> None:
     new, path = folder / NEW, folder / NAME
     new.unlink(missing_ok=True)
     try:
-        _built(str(new), folder).close()
+        _built(str(new), folder, say).close()
         with new.open("rb+") as file:
             os.fsync(file.fileno())
         if os.geteuid() == 0:  # the next asker may be the service's own user
@@ -141,7 +141,7 @@ def _rebuild(folder: Path) -> None:
         os.close(descriptor)
 
 
-def _built(name: str, folder: Path | None) -> sqlite3.Connection:
+def _built(name: str, folder: Path | None, say: Say) -> sqlite3.Connection:
     """A new index of these files; without a folder an empty one."""
     db = sqlite3.connect(name, isolation_level=None)
     try:
@@ -149,14 +149,14 @@ def _built(name: str, folder: Path | None) -> sqlite3.Connection:
         db.execute("PRAGMA synchronous = OFF")  # … and it is synced before it is used
         db.executescript(SCHEMA)
         if folder is not None:
-            _update(db, folder)
+            _update(db, folder, say)
     except BaseException:
         db.close()
         raise
     return db
 
 
-def _current(db: sqlite3.Connection, folder: Path) -> sqlite3.Connection:
+def _current(db: sqlite3.Connection, folder: Path, say: Say) -> sqlite3.Connection:
     """The same if it is up to date, else a copy in memory that is."""
     try:
         if not changed(db, folder):
@@ -164,15 +164,15 @@ def _current(db: sqlite3.Connection, folder: Path) -> sqlite3.Connection:
         copy = sqlite3.connect(":memory:", isolation_level=None)
         with closing(db):
             db.backup(copy)
-        _update(copy, folder)
+        _update(copy, folder, say)
     except AnotherFileError:
-        return _built(":memory:", folder)
+        return _built(":memory:", folder, say)
     return copy
 
 
-def _update(db: sqlite3.Connection, folder: Path) -> None:
+def _update(db: sqlite3.Connection, folder: Path, say: Say) -> None:
     db.execute("BEGIN IMMEDIATE")
-    update(db, folder)
+    update(db, folder, say)
     db.execute("COMMIT")
 
 

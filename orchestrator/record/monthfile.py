@@ -3,7 +3,7 @@
 import io
 import zlib
 from collections.abc import Iterator
-from gzip import GzipFile
+from gzip import BadGzipFile, GzipFile
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, cast
 
@@ -15,7 +15,7 @@ TAIL = 4096
 TRAILER = 8
 BUFFER = 1 << 20
 #: What reading a damaged gzip file raises.
-DAMAGED = (EOFError, zlib.error)
+DAMAGED = (BadGzipFile, EOFError, zlib.error)
 
 
 class Known(NamedTuple):
@@ -74,6 +74,7 @@ class Reader:
 
     def __init__(self, path: Path, known: Known | None) -> None:
         self._path = path
+        self.is_damaged = False  #: what comes after the damage is lost
         self.at, self._crc = (known.read, known.crc) if known is not None else (0, 0)  #: where it begins
 
     def __iter__(self) -> Iterator[bytes]:
@@ -83,7 +84,7 @@ class Reader:
                 with opened(self._path) as file:
                     yield from file
             except DAMAGED:
-                pass
+                self.is_damaged = True
             return
         with opened(self._path) as file:
             file.seek(self.at)

@@ -4,12 +4,13 @@
 and the newest checkpoint. `charges` has a row for each charge.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from itertools import groupby
 from pathlib import Path
 from sqlite3 import Connection
 
+from orchestrator.model import Cause
 from orchestrator.record.fold import Fold, Piece
 from orchestrator.record.lines import BEGIN, CHECKPOINT, END, Record, decoded
 from orchestrator.record.monthfile import DAMAGED, Known, Reader, is_continued, is_more, is_same, opened
@@ -55,8 +56,8 @@ def changed(db: Connection, folder: Path) -> bool:
     )
 
 
-def update(db: Connection, folder: Path) -> None:
-    """Take in what the files have and the tables lack, in the caller's transaction."""
+def update(db: Connection, folder: Path, say: Callable[[Cause], None]) -> None:
+    """Take in what the files have and the tables lack, in the caller's transaction; `say` is told of damaged files."""
     present = files(path.name for path in folder.iterdir())
     for name in _known(db):
         if name not in present:
@@ -74,6 +75,8 @@ def update(db: Connection, folder: Path) -> None:
         if is_more(folder / name, known.get(name)):
             reader = Reader(folder / name, known.get(name))
             fold.take(reader, name, reader.at)
+            if reader.is_damaged:
+                say(Cause.of("records_damaged", file=str(folder / name)))
             db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?)", (name, *reader.known))
     _write_ends(db, ends)
     _write_open(db, folder, fold)

@@ -11,7 +11,6 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from gzip import GzipFile
 from pathlib import Path
 
 from orchestrator.model import Cause
@@ -19,6 +18,7 @@ from orchestrator.record import months
 from orchestrator.record.charge import Charge
 from orchestrator.record.earlier import Earlier
 from orchestrator.record.lines import CHECKPOINT, Record, encoded
+from orchestrator.record.monthfile import DAMAGED, opened
 from orchestrator.record.ulid import CHANCE, after
 from orchestrator.service.curves import Curves
 from orchestrator.service.disk import code_of, make_directory, sync_directory
@@ -163,8 +163,8 @@ class Recorder:
         self._loaded.set()
 
     def _take(self, name: str, earlier: Earlier) -> None:
-        with (self._folder / name).open("rb") as file:
-            earlier.take(GzipFile(fileobj=file) if name.endswith(months.PACKED) else file)
+        with suppress(*DAMAGED), opened(self._folder / name) as file:
+            earlier.take(file)
 
     def _write(self) -> None:
         if not self._waiting:

@@ -13,7 +13,7 @@ from orchestrator.record.lines import Record
 from orchestrator.record.table import as_csv, table
 from orchestrator.record.utc import unix_s
 from orchestrator.service.chosen import choose
-from orchestrator.service.record_place import charges_of, journal_of
+from orchestrator.service.record_place import charges_of, journal_of, tell
 from orchestrator.service.timespan import moment
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
@@ -103,7 +103,7 @@ def _rebuild(arguments: argparse.Namespace) -> int:
         print(say(Cause("charges_none"), own_language()))
         return 0
     try:
-        count = rebuilt(folder)
+        count = rebuilt(folder, tell)
     except BusyError:
         raise CauseError(Cause("index_busy")) from None
     except (OSError, Error) as error:

@@ -45,7 +45,7 @@ def test_each_battery_is_in_the_list_once(journal: Path, capsys: pytest.CaptureF
 def test_a_life_says_where_the_id_is_from(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
     life = said(capsys, journal, "B-1").splitlines()
     assert life[:2] == [
-        "battery B-1, 2026-11-28 to 2026-12-01: charges: 3, 80.0 Ah, 4000 Wh",
+        "battery B-1, 2026-11-28 to 2026-12-01; charges: 3, 80.0 Ah, 4000 Wh",
         "SOH by its BMU: 99 % at first, 97 % at last",
     ]
     assert any("assumed from its node id, 2026-11-28 to 2026-11-28; charges: 1" in line for line in life)

@@ -6,7 +6,7 @@ import os
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -34,7 +34,10 @@ class Folder:
             file.writelines(one if isinstance(one, bytes) else encoded(one) for one in records)
 
     def charges(self) -> Charges:
-        return Charges(self.path, lambda cause: self.said.append(cause.id))
+        return Charges(self.path, self.say)
+
+    def say(self, cause: Cause) -> None:
+        self.said.append(cause.id)
 
     def listed(self) -> list[tuple[str, str, float]]:
         return [(one["id"], one["type"], one["charger"]["ah"]) for one in self.charges().listed()]
@@ -46,7 +49,7 @@ class Folder:
         return text
 
     def rebuilt(self) -> str:
-        index.rebuilt(self.path)
+        index.rebuilt(self.path, self.say)
         return self.dump()
 
     def pack(self, name: str) -> None:
@@ -78,9 +81,9 @@ def test_a_list_does_not_read_what_it_has_read(folder: Folder, monkeypatch: pyte
     folder.charges()
     read, real = list[Path](), tables.update
 
-    def update(db: sqlite3.Connection, path: Path) -> None:
+    def update(db: sqlite3.Connection, path: Path, say: Callable[[Cause], None]) -> None:
         read.append(path)
-        real(db, path)
+        real(db, path, say)
 
     monkeypatch.setattr(index, "update", update)
     folder.charges()
@@ -112,7 +115,7 @@ def test_a_month_that_is_packed_is_not_read_again(folder: Folder, monkeypatch: p
     folder.charges()
     folder.pack(NOVEMBER)
     with monkeypatch.context() as patched:
-        patched.setattr(index, "_rebuild", lambda _: pytest.fail("it was built anew"))
+        patched.setattr(index, "_rebuild", lambda *_: pytest.fail("it was built anew"))
         assert len(folder.listed()) == 2
     assert [one["charger"]["ah"] for one in folder.charges().whole([id_of(1), id_of(2)])] == [1.0, 0.0]
     assert folder.dump() == folder.rebuilt()
@@ -146,6 +149,23 @@ def test_a_line_is_read_once_it_is_whole(folder: Folder) -> None:
         assert folder.listed() == []
         folder.add(NOVEMBER, part)
     assert folder.listed() == [(id_of(1), "end", 2.0)]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [lambda _: b"", lambda _: b"no gzip", lambda data: data[:-30], lambda data: data[:-8] + bytes(8)],
+    ids=["empty", "no gzip", "torn", "changed"],
+)
+def test_a_damaged_packed_month_costs_only_what_is_damaged(folder: Folder, damage: Callable[[bytes], bytes]) -> None:
+    folder.add(NOVEMBER, *(end(number, 1) for number in range(40)))
+    folder.pack(NOVEMBER)
+    folder.add(DECEMBER, end(41, 1))
+    path = folder.path / f"{NOVEMBER}.gz"
+    path.write_bytes(damage(path.read_bytes()))
+    assert folder.listed()[0] == (id_of(41), "end", 0.0)
+    assert next(folder.charges().whole([id_of(41), id_of(0)]))["id"] == id_of(41)
+    assert folder.said == ([] if path.stat().st_size == 0 else ["records_damaged"])
+    assert folder.dump() == folder.rebuilt()
 
 
 def test_a_month_that_is_gone_takes_its_charges_with_it(folder: Folder) -> None:
@@ -236,7 +256,7 @@ def test_who_may_not_write_there_reads_all_the_same(folder: Folder, monkeypatch:
     assert len(folder.listed()) == 1
     assert folder.said == ["index_not_written"]
     assert not (folder.path / index.NAME).exists()
-    index.rebuilt(folder.path)
+    index.rebuilt(folder.path, folder.say)
     folder.add(NOVEMBER, end(1, 1, ah=3.0))
     before = folder.dump()
     assert folder.listed() == [(id_of(1), "end", 3.0)]
@@ -262,7 +282,7 @@ def test_while_another_one_writes_what_is_there_is_read(folder: Folder, monkeypa
         folder.add(NOVEMBER, end(1, 1, ah=3.0))
         assert folder.listed() == [(id_of(1), "end", 3.0)]
         with pytest.raises(index.BusyError):
-            index.rebuilt(folder.path)
+            index.rebuilt(folder.path, folder.say)
         assert folder.said == []
         (folder.path / index.NAME).unlink()
         assert len(folder.listed()) == 1
@@ -273,8 +293,8 @@ def test_a_list_that_is_still_read_keeps_nobody_from_the_newest(
     folder: Folder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(index, "PAUSE_S", 0.0)
-    monkeypatch.setattr(index, "_rebuild", lambda _: pytest.fail("it was built anew"))
-    index._built(str(folder.path / index.NAME), folder.path).close()
+    monkeypatch.setattr(index, "_rebuild", lambda *_: pytest.fail("it was built anew"))
+    index._built(str(folder.path / index.NAME), folder.path, folder.say).close()
     folder.add(NOVEMBER, *(end(number, 1) for number in range(300)))
     reading = folder.charges().listed()
     next(reading)

@@ -1,15 +1,17 @@
 """The record of a bay's charges, as it is on the disk: over ends, pauses, restarts and deaths of the service."""
 
+import gzip
 import time
 from pathlib import Path
 
 import pytest
 
 from orchestrator.core.persisted import Persisted
-from orchestrator.model import Request, State
+from orchestrator.model import Cause, Request, State
 from orchestrator.record.charges import Charges
 from orchestrator.service.asked import Asked
 from orchestrator.service.asker import Asker
+from orchestrator.service.recorder import Recorder
 from tests.record.kept import WALL_S, Kept
 
 
@@ -239,8 +241,6 @@ def test_a_defect_in_the_record_costs_no_charge(kept: Kept, monkeypatch: pytest.
 
 
 def test_the_thread_writes_and_ends(tmp_path: Path) -> None:
-    from orchestrator.service.recorder import Recorder
-
     recorder = Recorder(tmp_path, 5.0, time.time)
     recorder.start()
     recorder.put({"type": "begin", "id": "0" * 26, "n": 0})
@@ -266,3 +266,14 @@ def test_a_finished_month_is_compressed_and_still_read(tmp_path: Path, monkeypat
     assert names == [*(f"{month}.jsonl.gz" for month in packed), *(f"{month}.jsonl" for month in plain)]
     found = list(Charges(tmp_path / "sessions").listed())
     assert [one["type"] for one in found] == ["end"] * 4
+
+
+@pytest.mark.parametrize("data", [b"no gzip", gzip.compress(bytes(1000))[:-9]], ids=["no gzip", "torn"])
+def test_a_damaged_month_keeps_no_charge_from_the_record(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "sessions").mkdir()
+    (tmp_path / "sessions" / "2026-11.jsonl.gz").write_bytes(data)
+    said = list[Cause]()
+    recorder = Recorder(tmp_path, 5.0, lambda: WALL_S, said.append)
+    recorder.turn()
+    assert recorder.loaded
+    assert said == []

@@ -41,7 +41,7 @@ TEXTS: Mapping[str, str] = {
     # batteries
     "batteries_head": "BATTERY|ID FROM|CHARGES|FIRST|LAST|AH|KWH|SOH",
     "battery_unknown": "no charge of a battery {battery} is on record; orchestrator battery lists those that are",
-    "battery_life": "battery {battery}, {begin_at} to {end_at}: charges: {charges}, {ah:.1f} Ah, {wh:.0f} Wh",
+    "battery_life": "battery {battery}, {begin_at} to {end_at}; charges: {charges}, {ah:.1f} Ah, {wh:.0f} Wh",
     "battery_ids": "Where its id is from:",
     "battery_id_typed": "typed by an operator, {begin_at} to {end_at}; charges: {charges}",
     "battery_id_assumed": "assumed from its node id, {begin_at} to {end_at}; charges: {charges}; some may be another battery's",
@@ -69,6 +69,7 @@ TEXTS: Mapping[str, str] = {
     "longer the more there are",
     "index_being_built": "another command is building it",
     "index_failed": "no index can be built in {folder}: {error}",
+    "records_damaged": "{file} is damaged: the records behind the damage are lost",
     "index_busy": "another command is building the index: wait until it has finished, then try again",
     "index_rebuilt": "index built anew; charges: {charges}",
 }

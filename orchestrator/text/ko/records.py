@@ -68,6 +68,7 @@ TEXTS: Mapping[str, str] = {
     "index_not_written": "{folder}에 색인을 쓸 수 없어({error}) 모든 기록을 직접 읽었습니다. 기록이 많을수록 오래 걸립니다",
     "index_being_built": "다른 명령이 만들고 있습니다",
     "index_failed": "{folder}에 색인을 만들 수 없습니다: {error}",
+    "records_damaged": "{file} 파일이 손상되어 손상된 부분 뒤의 기록을 읽을 수 없습니다",
     "index_busy": "다른 명령이 색인을 만들고 있습니다. 끝난 뒤에 다시 시도하십시오",
     "index_rebuilt": "색인을 새로 만들었습니다: 충전 {charges}건",
 }
