@@ -1,6 +1,6 @@
 """A battery's health, from the charges on record: what it holds, its resistance, and what it has been through. Pure.
 
-`health` takes the records of one battery as `reading.py` gives them. The estimates use the newest `WINDOW` charges
+`health` takes the records of one battery as `Charges.whole` gives them. The estimates use the newest `WINDOW` charges
 that say something, of the last year: a battery is as it is now, not as it was. Everything else counts all charges
 given.
 
