@@ -8,11 +8,11 @@ from pathlib import Path
 
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.station import RUN, Document, Service, whole_station
+from tests.whole.station import LOOK_S, RUN, Document, Service, whole_station
 
 Station = tuple[PlantProcess, Service]
-#: A charge that a very busy machine has interrupted meanwhile goes on within this, after its backoff.
-AGAIN_S = 40.0
+#: A charge begins within this, even if a very busy machine has interrupted it and its backoff has to pass.
+CHARGE_S = 60.0
 #: As many stations are made ready beside the one under test: more of them would slow each other down.
 AHEAD = 1
 
@@ -27,11 +27,15 @@ def charge(plant: PlantProcess, service: Service) -> None:
     until_all_charge(plant, service)
 
 
-def until_all_charge(plant: PlantProcess, service: Service, timeout_s: float = 20.0) -> None:
+def until_all_charge(plant: PlantProcess, service: Service) -> None:
     """Wait for the charges, or look whether they are still going on."""
-    bays = range(1, len(plant.bays) + 1)
-    service.wait("CHARGING", [f"bay-{bay}" for bay in bays], timeout_s)
-    wait_until(lambda: all(plant.state(bay)["current_a"] > 13 for bay in bays), 10, "the current")
+    bays = [(number, f"bay-{number}") for number in range(1, len(plant.bays) + 1)]
+
+    def charging() -> bool:
+        shown = service.status()
+        return all(shown[name]["state"] == "CHARGING" and plant.state(bay)["current_a"] > 13 for bay, name in bays)
+
+    wait_until(charging, CHARGE_S, "a charge in every bay", LOOK_S)
 
 
 def only_started(plant: PlantProcess, service: Service) -> None:
@@ -77,7 +81,7 @@ class Ahead:
         made = self._begun[name].result()
         with made.stack:
             if self._recipes[name].ready is charge:
-                until_all_charge(*made.station, AGAIN_S)
+                until_all_charge(*made.station)
             yield made.station
 
     def begin(self, name: str, count: int = 1) -> None:
