@@ -1,5 +1,6 @@
 """Stations that are made ready while the tests before theirs run: most of a test would be waiting for its charge."""
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -8,13 +9,15 @@ from pathlib import Path
 
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.station import RUN, Document, Service, whole_station
+from tests.whole.station import LOOK_S, RUN, Document, Service, whole_station
 
 Station = tuple[PlantProcess, Service]
-#: A charge that a very busy machine has interrupted meanwhile goes on within this, after its backoff.
-AGAIN_S = 40.0
+#: A charge begins within this, even if a very busy machine has interrupted it and its backoff has to pass.
+CHARGE_S = 60.0
 #: As many stations are made ready beside the one under test: more of them would slow each other down.
 AHEAD = 1
+#: Where more programs than this wait for each processor, a station is begun when its test begins.
+BUSY = 2.5
 
 
 def unchanged(document: Document) -> None:
@@ -27,11 +30,15 @@ def charge(plant: PlantProcess, service: Service) -> None:
     until_all_charge(plant, service)
 
 
-def until_all_charge(plant: PlantProcess, service: Service, timeout_s: float = 20.0) -> None:
+def until_all_charge(plant: PlantProcess, service: Service) -> None:
     """Wait for the charges, or look whether they are still going on."""
-    bays = range(1, len(plant.bays) + 1)
-    service.wait("CHARGING", [f"bay-{bay}" for bay in bays], timeout_s)
-    wait_until(lambda: all(plant.state(bay)["current_a"] > 13 for bay in bays), 10, "the current")
+    bays = [(number, f"bay-{number}") for number in range(1, len(plant.bays) + 1)]
+
+    def charging() -> bool:
+        shown = service.status()
+        return all(shown[name]["state"] == "CHARGING" and plant.state(bay)["current_a"] > 13 for bay, name in bays)
+
+    wait_until(charging, CHARGE_S, "a charge in every bay", LOOK_S)
 
 
 def only_started(plant: PlantProcess, service: Service) -> None:
@@ -73,19 +80,24 @@ class Ahead:
     @contextmanager
     def take(self, name: str) -> Iterator[Station]:
         """The station of this test; those of the next ones are begun."""
-        self.begin(name, 1 + AHEAD)
+        at = self._names.index(name)
+        self._begin(name)
+        for near in self._names[at + 1 : at + 1 + AHEAD]:
+            self.begin(near)
         made = self._begun[name].result()
         with made.stack:
             if self._recipes[name].ready is charge:
-                until_all_charge(*made.station, AGAIN_S)
+                until_all_charge(*made.station)
             yield made.station
 
-    def begin(self, name: str, count: int = 1) -> None:
-        """Begin with this test's station and those of the next ones."""
-        at = self._names.index(name)
-        for near in self._names[at : at + count]:
-            if near not in self._begun:
-                self._begun[near] = self._pool.submit(self._make, self._recipes[near], self._directory())
+    def begin(self, name: str) -> None:
+        """Begin with this test's station, if the machine has time for it."""
+        if os.getloadavg()[0] < BUSY * len(os.sched_getaffinity(0)):
+            self._begin(name)
+
+    def _begin(self, name: str) -> None:
+        if name not in self._begun:
+            self._begun[name] = self._pool.submit(self._make, self._recipes[name], self._directory())
 
     def close(self) -> None:
         """Take down those that no test has taken."""
