@@ -112,7 +112,7 @@ FINISH = (
     Edge(ends_full, False, bmu={"voltage_v": None}),
 )  # fmt: skip
 
-# --- what a charge that is over leaves ----------------------------------------------------------------------------------
+# --- what a charge that is over leaves --------------------------------------------------------------------------------
 
 
 def charged_full_s(f: Facts) -> object:
@@ -134,7 +134,7 @@ LEAVES = (
 def goes(f: Facts) -> tuple[Trigger | None, Cause, object]:
     """Where a bay goes, why, and what changes with it."""
     trigger, why, changes = next_transition(f, ())
-    return trigger, why, dict(changes)
+    return trigger, why, tuple(changes.items())
 
 
 RULE = Cause("limit_pack", (("allowed_a", 14.0),), "pack.current_a", "somewhere:1")
@@ -153,9 +153,9 @@ def at_the_top(left_min: float) -> Cause:
 
 
 GOES: tuple[Edge, ...] = (
-    Edge(goes, (None, charging(), {}), ON_STEP_5),
-    Edge(goes, (None, charging(at_the_top(20.0)), {}), {**ON_STEP_5, **held(600)}, policy=HOLDS),
-    Edge(goes, (None, charging(at_the_top(0.5)), {}), {**ON_STEP_5, **held(1770)}, policy=HOLDS),
+    Edge(goes, (None, charging(), ()), ON_STEP_5),
+    Edge(goes, (None, charging(at_the_top(20.0)), ()), {**ON_STEP_5, **held(600)}, policy=HOLDS),
+    Edge(goes, (None, charging(at_the_top(0.5)), ()), {**ON_STEP_5, **held(1770)}, policy=HOLDS),
 )  # fmt: skip
 
 
@@ -176,10 +176,10 @@ def woken(pulse_s: float = 0.0, rise_s: float = 60.0) -> dict[str, Any]:
 
 
 def changes(reached_s: float | None, rise_s: float = 60.0, rise_v: float = 30.0, pulse_s: float = 0.0) -> object:
-    return {
-        "stage": Stage(ran=True, reached_s=reached_s),
-        "session": Session(0.0, pulse_s=pulse_s, rise_s=rise_s, rise_v=rise_v),
-    }
+    return (
+        ("stage", Stage(ran=True, reached_s=reached_s)),
+        ("session", Session(0.0, pulse_s=pulse_s, rise_s=rise_s, rise_v=rise_v)),
+    )
 
 
 def reached(key: str, target_v: float) -> Cause:
@@ -222,16 +222,14 @@ RESTS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "edge", [*FINISH, *LEAVES, *GOES, *ENDS, *PRECHARGE, *RESTS], ids=lambda edge: edge.name
-)
+@pytest.mark.parametrize("edge", [*FINISH, *LEAVES, *GOES, *ENDS, *PRECHARGE, *RESTS], ids=lambda edge: edge.name)
 def test_the_end_of_a_charge_at_its_edge(edge: Edge) -> None:
     assert edge.rule(edge.facts) == edge.says
 
 
 def test_an_automatic_charger_is_not_told_a_step() -> None:
     f = Edge(goes, None, control=ControlMode.AUTOMATIC).facts
-    assert goes(f) == (None, Cause("charges_by_itself"), {})
+    assert goes(f) == (None, Cause("charges_by_itself"), ())
 
 
 # --- what limits it ---------------------------------------------------------------------------------------------------

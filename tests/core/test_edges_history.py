@@ -188,7 +188,7 @@ def test_a_charge_that_begins_forgets_that_the_pack_was_full() -> None:
 
 
 @pytest.mark.parametrize(("all_the_way", "full_s"), [(True, NOW_S), (False, ago(99))])
-def test_only_a_charge_all_the_way_counts_as_one(all_the_way: bool, full_s: float) -> None:  # noqa: FBT001
+def test_only_a_charge_all_the_way_counts_as_one(all_the_way: bool, full_s: float) -> None:
     f = Edge(watched, None, {"full_s": ago(99)}).facts
     assert battery.charged_full(f, all_the_way=all_the_way) == BatteryHistory(full_pct=50.0, full_s=full_s)
 
@@ -219,7 +219,7 @@ LOW, HIGH = CurrentStep(0, 2.0, cause("low")), CurrentStep(4, 14.0, cause("high"
 
 
 @pytest.mark.parametrize("intends", [True, False])
-def test_a_bay_is_ready_whether_or_not_its_turn_has_come(intends: bool) -> None:  # noqa: FBT001
+def test_a_bay_is_ready_whether_or_not_its_turn_has_come(intends: bool) -> None:
     assert stage.is_ready(Stage(qualified_s=3.0), intends=intends) == Stage(
         qualified_s=3.0, ready=True, intends=intends
     )

@@ -105,5 +105,5 @@ def test_what_is_remembered_of_a_fault(edge: Edge) -> None:
 
 
 @pytest.mark.parametrize(("latched", "effect"), [(False, Effect.STOP), (True, Effect.TRIP)])
-def test_a_latched_fault_trips(latched: bool, effect: Effect) -> None:  # noqa: FBT001
+def test_a_latched_fault_trips(latched: bool, effect: Effect) -> None:
     assert latches.effect("implausible", FaultMemory(latched=latched)) is effect

@@ -81,7 +81,7 @@ def test_a_soc_that_nobody_knows_is_not_written() -> None:
         (S.IDLE, False, False, False),
     ],
 )
-def test_whether_the_charger_may_be_running(state: State, intends: bool, unverified: bool, running: bool) -> None:  # noqa: FBT001
+def test_whether_the_charger_may_be_running(state: State, intends: bool, unverified: bool, running: bool) -> None:
     memory = remembering(state=state, intends=intends, unverified=unverified)
     assert Persisted.of(memory, 100.0).running is running
 

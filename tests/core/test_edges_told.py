@@ -115,7 +115,7 @@ LOCKED = Cause.of("reset_locked", until_t_s=ago(300) + 3600, times=3)
 @pytest.mark.parametrize(
     ("name", "latched", "request_"), [("reverse_polarity", True, "reset"), ("emergency", False, "start")]
 )
-def test_out_of_control_nothing_is_asked_for_before_a_lasting_standby(name: str, latched: bool, request_: str) -> None:  # noqa: FBT001
+def test_out_of_control_nothing_is_asked_for_before_a_lasting_standby(name: str, latched: bool, request_: str) -> None:
     memory = bay(S.UNCONTROLLABLE, **{name: fault(latched=latched)})
     says = Cause.of("after_standby", request=request_, lasts_s=LASTS_S)
     assert act(memory, NOW_S, "bay-1", name, out=True) == says

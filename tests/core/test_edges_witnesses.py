@@ -109,7 +109,7 @@ PAIRED = (
 BMU_WRONG = Cause.of("bmu_likelier_wrong", by=Cause("by_soc"))
 CHARGER_WRONG = Cause.of("charger_likelier_wrong", by=Cause("by_soc"))
 LOWEST_V, HIGHEST_V = (13 * cell_v for cell_v in NMC.bounds_v(50.0))
-assert (LOWEST_V / 13, HIGHEST_V / 13) == NMC.bounds_v(50.0), "the division must hit the bound exactly"
+assert NMC.bounds_v(50.0) == (LOWEST_V / 13, HIGHEST_V / 13), "the division must hit the bound exactly"
 
 
 def volts(charger_v: float, pack_v: float, wrong: Cause | None) -> Edge:
@@ -183,8 +183,6 @@ CHARGER_FROZEN = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "edge", [*PACK, *PAIRED, *WRONG, *BMU_FROZEN, *CHARGER_FROZEN], ids=lambda edge: edge.name
-)
+@pytest.mark.parametrize("edge", [*PACK, *PAIRED, *WRONG, *BMU_FROZEN, *CHARGER_FROZEN], ids=lambda edge: edge.name)
 def test_both_witnesses_at_their_edges(edge: Edge) -> None:
     assert edge.rule(edge.facts) == edge.says
