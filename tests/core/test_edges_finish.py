@@ -246,7 +246,7 @@ def row(key: str, **memory: Any) -> Any:
     return said
 
 
-def span(id_: str, pack_c: float, low: float, high: float, **more: float) -> Cause:
+def span(id_: str, pack_c: float, low: float, high: float, **more: Any) -> Cause:
     return Cause.of(id_, value=Cause.of("value_temperature_c", pack_c=pack_c), **more, low=low, high=high)
 
 

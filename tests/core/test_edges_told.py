@@ -37,7 +37,7 @@ def gone(seconds: float) -> Cause:
 
 # --- a fault that ends by itself --------------------------------------------------------------------------------------
 
-HOT = {"over_temperature": fault()}
+HOT: dict[str, Any] = {"over_temperature": fault()}
 GOES_ON, CLEARS = (Cause.of(f"{verb}_after", wait_s=10, strike=None) for verb in ("goes_on", "clears"))
 
 
@@ -88,7 +88,7 @@ def test_a_backoff_says_which_strike_it_is() -> None:
     ],
 )
 def test_a_fault_that_is_gone_counts_down(
-    state: State, others: dict[str, FaultMemory], id_: str, left_s: int, until_s: float
+    state: State, others: dict[str, Any], id_: str, left_s: int, until_s: float
 ) -> None:
     memory = bay(state, over_temperature=fault(gone_s=3.5), **others)
     says = Cause.of(id_, gone=gone(3.5), left_s=left_s, until_t_s=until_s, strike=None)
@@ -116,7 +116,8 @@ LOCKED = Cause.of("reset_locked", until_t_s=ago(300) + 3600, times=3)
     ("name", "latched", "request_"), [("reverse_polarity", True, "reset"), ("emergency", False, "start")]
 )
 def test_out_of_control_nothing_is_asked_for_before_a_lasting_standby(name: str, latched: bool, request_: str) -> None:
-    memory = bay(S.UNCONTROLLABLE, **{name: fault(latched=latched)})
+    known: dict[str, Any] = {name: fault(latched=latched)}
+    memory = bay(S.UNCONTROLLABLE, **known)
     says = Cause.of("after_standby", request=request_, lasts_s=LASTS_S)
     assert act(memory, NOW_S, "bay-1", name, out=True) == says
 
@@ -141,7 +142,8 @@ def test_out_of_control_nothing_is_asked_for_before_a_lasting_standby(name: str,
 def test_why_a_reset_is_refused(
     name: str, known: FaultMemory, resets: tuple[tuple[float, str], ...], says: Cause | None
 ) -> None:
-    assert refused_for(bay(S.TRIPPED, resets, **{name: known}), NOW_S, name, Request.RESET) == says
+    memory = remembering(bay(S.TRIPPED, resets), faults={name: known})
+    assert refused_for(memory, NOW_S, name, Request.RESET) == says
 
 
 def refused(memory: Memory, request: Request) -> Cause:
@@ -225,9 +227,10 @@ def test_the_figures_now_are_told_only_if_all_are_known() -> None:
     known = FaultMemory(raised_s=1.0, clean_s=2.0, cause=VOLTS)
     row, raised_s = ROW["volts_disagree"], ("raised_t_s", 1.0)
     now = tuple(Cause.of("figure_v", value=volts) for volts in (48.0, 47.0))
+    heard, unheard = (Edge(bool, True, bmu={"voltage_v": pack_v}).facts for pack_v in (47.0, None))
     assert times(row, known) == (raised_s,)
-    assert times(row, known, Edge(times, None, bmu={"voltage_v": 47.0}).facts) == (raised_s, ("now", now))
-    assert times(row, known, Edge(times, None, bmu={"voltage_v": None}).facts) == (raised_s,)
+    assert times(row, known, heard) == (raised_s, ("now", now))
+    assert times(row, known, unheard) == (raised_s,)
 
 
 def test_an_active_fault_carries_the_evidence_as_it_was_raised() -> None:

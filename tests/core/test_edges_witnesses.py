@@ -32,7 +32,7 @@ def low(pack_v: float) -> Cause:
 
 def before(*samples: tuple[float, float, float, float]) -> dict[str, Any]:
     """Seconds ago, the pack's volts and amps, the charger's volts; oldest first."""
-    return witnessed(trail=tuple(Sample(ago(age_s), *values, 10.0) for age_s, *values in samples))
+    return witnessed(trail=tuple(Sample(ago(age_s), pack_v, pack_a, v, 10.0) for age_s, pack_v, pack_a, v in samples))
 
 
 def fell(before_v: float, pack_v: float, passed_s: float, pack_a: float = 10.0) -> Cause:
