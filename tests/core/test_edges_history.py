@@ -94,6 +94,9 @@ FULL = (
     Edge(full, (None, None, 0.0), found_full(), bmu={"soc_pct": 86.9}),
     Edge(full, (FOUND, 90.0, 60.25), found_full(), bmu={"soc_pct": None}),
     Edge(full, (FOUND, None, 60.25), found_full(None), bmu={"soc_pct": 0.0}),
+    # an unknown SOC counts as 0 %, and a map may let one be negative
+    Edge(full, (FOUND, None, 60.25), found_full(None), bmu={"soc_pct": -3.0}),
+    Edge(full, (None, None, 0.0), found_full(None), bmu={"soc_pct": -3.1}),
     Edge(full, (FOUND, 90.0, 60.0), found_full(), State.SUSPENDED, bmu={"soc_pct": 87.0}),
     Edge(full, (None, None, 0.0), found_full(), State.SUSPENDED, bmu={"soc_pct": 86.9}),
     Edge(full, (None, None, 0.0), {"session": Session(0.0)}, bmu={"soc_pct": 99.9}),
