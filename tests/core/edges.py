@@ -13,6 +13,7 @@ from orchestrator.core.witnesses.followed import Witnessed
 from orchestrator.model import (
     BatteryLink,
     BatteryReading,
+    Cause,
     ChargeMode,
     ChargerLink,
     ChargerReading,
@@ -96,6 +97,11 @@ class Edge:
         the_bay = bay(self.policy, self.control)
         the_bay = replace(the_bay, battery=replace(the_bay.battery, tpdo_s=self.tpdo_s))
         return Facts.of(NOW_S, replace(snapshot, **self.snapshot), memory, Rules.of(the_bay))
+
+
+def by_policy(id_: str, key: str, /, **params: Any) -> Cause:
+    """A cause with a key of the usual policy and the line where it stands."""
+    return Cause(id_, tuple(params.items()), key, AT(key))
 
 
 def session(hours: float = 1.0, ah: float = 1.0, soc_start_pct: float | None = 0.0) -> dict[str, Any]:

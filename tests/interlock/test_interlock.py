@@ -15,6 +15,7 @@ from orchestrator.keys import Range
 from orchestrator.model import (
     Action,
     BatteryReading,
+    Cause,
     ChargeMode,
     ChargerReading,
     Command,
@@ -116,6 +117,12 @@ def test_steps_pass_up_to_the_stations_current(current_a: float, highest: int) -
     assert allowed == set(range(highest + 1))
 
 
+@pytest.mark.parametrize("shown", [None, -1, 5])
+def test_a_step_that_is_unknown_is_told(shown: int | None) -> None:
+    why = permit(RUN, replace(GOOD, current_step=shown), NOW_S, MANUAL, LIMITS)
+    assert why == Cause.of("step_unknown", command="run", step=shown)
+
+
 def test_a_step_whose_current_the_station_does_not_state_is_refused() -> None:
     three = replace(MANUAL, steps_a=(2.0, 5.0, 8.0))
     assert Command(Action.SET_LIMIT, 3) not in passing(GOOD, three)
@@ -185,6 +192,12 @@ def with_ages(charger_s: float, volts_s: float, temperature_s: float) -> Snapsho
 
 def test_a_grant_holds_the_evidence() -> None:
     assert grant(FRESH, NOW_S) == Grant(NOW_S + 0.8, 50.0, 20.0, 2)
+
+
+@pytest.mark.parametrize("persisted", [True, False])
+def test_a_grant_says_whether_the_disk_knows_that_the_charger_may_run(persisted: bool) -> None:
+    found = grant(replace(FRESH, running_persisted=persisted), NOW_S)
+    assert found == Grant(NOW_S + 0.8, 50.0, 20.0, 2, kept=persisted)
 
 
 def test_the_higher_voltage_counts() -> None:

@@ -104,6 +104,15 @@ def test_decimal_scales_give_decimal_values() -> None:
         assert decoded["voltage_v"] == Measurement(float(f"{raw // 100}.{raw % 100:02d}"), 0.0)
 
 
+@pytest.mark.parametrize(
+    ("scale", "raw", "value"), [(0.1, 5258217, 525821.7), (0.01, 52439619, 524396.19), (0.001, 524443695, 524443.695)]
+)
+def test_large_words_have_no_more_digits_than_their_scale(scale: float, raw: int, value: float) -> None:
+    """The tenth digit after the point is the last of such a float, and wrong."""
+    row = bits("available_wh", 0, 32, scale=scale)
+    assert decode_word(entry(row), raw, 4, 0.0) == {"available_wh": Measurement(value, 0.0)}
+
+
 @given(st.integers(0, 31), st.integers(1, 32), st.booleans(), st.integers(0, 0xFFFFFFFF))
 def test_bits_are_cut_as_a_string_of_bits_would_be(first_bit: int, width: int, signed: bool, word: int) -> None:
     width = min(width, 32 - first_bit)
