@@ -13,12 +13,13 @@ from dataclasses import replace
 
 from orchestrator.core.persisted import Persisted, TimedStart
 from orchestrator.model import Alarm, Cause, Decision, Request, State
+from orchestrator.model.cause import plain
 from orchestrator.service.asked import Asked, Taken
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
-from orchestrator.text.catalogue import fields
+from orchestrator.text.catalogue import fields, say
 
 #: A start that could not be made is still made within this.
 MOST_LATE_S = 3600.0
@@ -125,7 +126,9 @@ class StartTimer:
         self._say(Cause.of("bay_refused", bay=self._bay, why=clock.told(told)))
 
     def _tell(self, what: Cause, clock: WallClock) -> None:
-        self._journal.put(self._bay, ("timed_start", fields(clock.told(what), self._language) or {}), clock.now_s)
+        told = clock.told(what) or what
+        said = {"text": say(told, self._language), "cause": plain(told)}
+        self._journal.put(self._bay, ("timed_start", said), clock.now_s)
 
 
 def cause_of(timed: TimedStart, bay: str) -> Cause:

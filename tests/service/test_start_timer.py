@@ -83,8 +83,9 @@ def test_it_starts_by_itself_at_that_time(tmp_path: Path, wall: Wall) -> None:
     wall.now_s = AT_S
     bench.charging()
     assert told(bench) == ""
-    texts = [fields_of(line)["text"] for _, _, _, line in bench.journal._waiting[False] if line[0] == "timed_start"]
-    assert texts == ["started at 22:00, as root for kim asked at 18:10"]
+    made = [fields_of(line) for _, _, _, line in bench.journal._waiting[False] if line[0] == "timed_start"]
+    assert [one["text"] for one in made] == ["started at 22:00, as root for kim asked at 18:10"]
+    assert isinstance(cause := made[0]["cause"], dict) and cause["id"] == "started_later_by"
     wall.now_s = AT_S - 7200  # the clock is set back: it has been made
     asks(bench, Asked(Request.STOP, LEE))
     wall.now_s = AT_S + 1
