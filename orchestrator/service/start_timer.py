@@ -136,7 +136,8 @@ def cause_of(timed: TimedStart, bay: str) -> Cause:
     by = timed.by if timed.by is not None else Cause.of("started_by", who="?", asked_unix_s=timed.start_unix_s)
     told = replace(by.with_(start_unix_s=timed.start_unix_s), id="starts_at")
     if timed.outcome is not None:
-        return replace(told.with_(why=timed.outcome, bay=bay), id="start_not_made")
+        then = Cause.of("start_it_now", bay=bay)  # after the person's own words
+        return replace(told.with_(why=timed.outcome, bay=bay, then=then), id="start_not_made")
     if timed.target_pct is not None:
         return replace(told.with_(target_pct=timed.target_pct), id="starts_at_to")
     return told

@@ -59,7 +59,7 @@ def texts(*records: Mapping[str, Any], language: str = "en") -> list[str]:
 
 def test_a_start_for_later_is_told_when_it_is_asked_for_and_once_when_it_was_not_made() -> None:
     why = Cause.of("target_reached", soc_pct=91.0, target_pct=70.0)
-    asked = {"who": "kim", "asked_unix_s": NOW_S, "start_unix_s": NOW_S + 600}
+    asked: dict[str, Any] = {"who": "kim", "asked_unix_s": NOW_S, "start_unix_s": NOW_S + 600}
     missed = Cause.of("start_not_made", **asked, why=why, bay="bay-1")
     missed = WallClock(700.0, NOW_S + 700).told(missed) or missed
     lines = (

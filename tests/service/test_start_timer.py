@@ -199,6 +199,15 @@ def test_a_request_before_the_first_decision(tmp_path: Path, wall: Wall, request
     assert (bench.store.past(bench.bay.place).timed is not None) is is_kept
 
 
+def test_the_command_to_type_is_not_mixed_with_a_persons_words(tmp_path: Path, wall: Wall) -> None:
+    bench = held(tmp_path)
+    kim = Asker(behind="kim", uid=0, unix_s=ASKED_S, because="night tariff")
+    asks(bench, Asked(Request.START, kim, start_unix_s=AT_S))
+    wall.now_s = AT_S + 3700
+    bench.step(2)
+    assert told(bench).endswith("62 min late: night tariff; to start it now: orchestrator start bay-1")
+
+
 def test_after_a_restart_it_waits_for_the_battery(tmp_path: Path, wall: Wall) -> None:
     """A charge to a target needs its SOC, which nobody has heard yet."""
     before = held(tmp_path, target_pct=60.0)
