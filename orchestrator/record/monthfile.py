@@ -5,15 +5,17 @@ import zlib
 from collections.abc import Iterator
 from gzip import BadGzipFile, GzipFile
 from pathlib import Path
-from typing import BinaryIO, NamedTuple, cast
+from typing import Any, BinaryIO, NamedTuple, cast
 
-from orchestrator.record.months import PACKED
+from orchestrator.record.months import PACKED, files
 
 #: So many bytes before the place where reading stopped show that what came before is the same.
 TAIL = 4096
 #: The end of a gzip file: CRC-32 and length of what was compressed.
 TRAILER = 8
 BUFFER = 1 << 20
+#: A line that is longer is no record: damage, that must not fill the memory.
+LONGEST = 8 << 20
 #: What reading a damaged gzip file raises.
 DAMAGED = (BadGzipFile, EOFError, zlib.error)
 
@@ -24,6 +26,11 @@ class Known(NamedTuple):
     read: int  #: bytes, of a packed file modulo 2³²
     crc: int  #: CRC-32 of these
     tail: int  #: CRC-32 of the last of these; 0: it is packed
+
+
+def present(folder: Path) -> list[str]:
+    """The files of records there, by their month."""
+    return files(path.name for path in folder.iterdir() if path.is_file())
 
 
 def is_packed(name: str) -> bool:
@@ -63,10 +70,24 @@ def _tail(path: Path, read: int) -> int:
         return zlib.crc32(file.read(min(TAIL, read)))
 
 
+class _Unpacked(GzipFile):
+    """Gives what it has at once: what comes before damage is not lost with it."""
+
+    def readinto(self, into: Any) -> int:  # noqa: ANN401 - any buffer
+        data = self.read1(len(into))
+        into[: len(data)] = data
+        return len(data)
+
+
 def opened(path: Path) -> BinaryIO:
     """The file as it was written, packed or not."""
     file = path.open("rb", BUFFER)
-    return cast("BinaryIO", io.BufferedReader(GzipFile(fileobj=file), BUFFER)) if is_packed(path.name) else file
+    return cast("BinaryIO", io.BufferedReader(_Unpacked(fileobj=file), BUFFER)) if is_packed(path.name) else file
+
+
+def lines(file: BinaryIO) -> Iterator[bytes]:
+    """Its lines; one that is too long in pieces."""
+    return iter(lambda: file.readline(LONGEST), b"")
 
 
 class Reader:
@@ -82,14 +103,14 @@ class Reader:
         if is_packed(self._path.name):
             try:
                 with opened(self._path) as file:
-                    yield from file
+                    yield from lines(file)
             except DAMAGED:
                 self.is_damaged = True
             return
         with opened(self._path) as file:
             file.seek(self.at)
-            for line in file:
-                if not line.endswith(b"\n"):
+            for line in lines(file):
+                if not line.endswith(b"\n") and len(line) < LONGEST:
                     return  # it is being written, or torn
                 self._crc, self.at = zlib.crc32(line, self._crc), self.at + len(line)
                 yield line

@@ -13,8 +13,7 @@ from sqlite3 import Connection
 from orchestrator.model import Cause
 from orchestrator.record.fold import Fold, Piece
 from orchestrator.record.lines import BEGIN, CHECKPOINT, END, Record, decoded
-from orchestrator.record.monthfile import DAMAGED, Known, Reader, is_continued, is_more, is_same, opened
-from orchestrator.record.months import files
+from orchestrator.record.monthfile import DAMAGED, Known, Reader, is_continued, is_more, is_same, opened, present
 from orchestrator.record.row import COLUMNS, TYPES, as_row
 
 #: Of these tables; another one is built anew.
@@ -44,23 +43,21 @@ class AnotherFileError(Exception):
 
 def changed(db: Connection, folder: Path) -> bool:
     """Whether the files have anything that the tables lack. AnotherFileError if the tables have what no file has."""
-    known, present = _known(db), files(path.name for path in folder.iterdir())
+    known, there = _known(db), present(folder)
     for name, read in known.items():
-        gone, packed = name not in present, f"{name}.gz"
-        if gone and (packed not in present or packed in known or not is_same(read, folder / packed)):
+        gone, packed = name not in there, f"{name}.gz"
+        if gone and (packed not in there or packed in known or not is_same(read, folder / packed)):
             raise AnotherFileError
         if not gone and not is_continued(folder / name, read):
             raise AnotherFileError
-    return any(name not in present for name in known) or any(
-        is_more(folder / name, known.get(name)) for name in present
-    )
+    return any(name not in there for name in known) or any(is_more(folder / name, known.get(name)) for name in there)
 
 
 def update(db: Connection, folder: Path, say: Callable[[Cause], None]) -> None:
     """Take in what the files have and the tables lack, in the caller's transaction; `say` is told of damaged files."""
-    present = files(path.name for path in folder.iterdir())
+    there = present(folder)
     for name in _known(db):
-        if name not in present:
+        if name not in there:
             _packed(db, name)
     known, ends = _known(db), list[Piece]()
 
@@ -71,7 +68,7 @@ def update(db: Connection, folder: Path, say: Callable[[Cause], None]) -> None:
             ends.clear()
 
     fold = Fold(ended)
-    for name in present:
+    for name in there:
         if is_more(folder / name, known.get(name)):
             reader = Reader(folder / name, known.get(name))
             fold.take(reader, name, reader.at)

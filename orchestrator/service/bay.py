@@ -133,9 +133,9 @@ class BayRunner:
         `asleep_s` is how long the machine has been suspended since it was switched on.
         """
         before, clock = self._revision, WallClock(now_s, time())
-        asked = self._requests.take() or self._timer.due(clock)
-        taken = self._taken = Taken.of(asked, self._memory, self.name)
-        self._timer.take(taken)
+        due = self._timer.due(clock)  # in any case: the first time reads what was kept
+        asked = self._requests.take() or (due if self.decision is not None else ())
+        taken = self._taken = self._timer.take(Taken.of(asked, self._memory, self.name), self.decision)
         try:
             self._step(now_s, asleep_s, taken.request)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
@@ -239,7 +239,7 @@ class BayRunner:
         contactor = self._contactor
         return {
             **described(self.name, decision, *known, clock, self._language, closely=closely),
-            **self._timer.next(decision.state, clock),
+            **self._timer.next(decision, clock),
             "identity": self.identified.status(),
             "timed_start": self._timer.status(clock),
             "contactor": contactor and contactor_fields(contactor, self._language),

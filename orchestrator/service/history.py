@@ -122,7 +122,20 @@ class Story:
             return Cause("event_run"), ""
         return Cause("event_run_dead" if before == boot else "event_run_boot"), "attention"
 
+    def _request(self, record: Fields) -> tuple[Cause, str] | None:
+        """One that was refused, and a start for later, of which nothing else tells yet."""
+        if not record.get("accepted") or record.get("start_at") is None:
+            return self._other(record)
+        words = {name: record[name] for name in ("target_soc_pct", "because") if record.get(name)}
+        target = {"target_pct": words.pop("target_soc_pct")} if "target_soc_pct" in words else {}
+        who, asked_s = record["by"] or "?", unix_s(record["wall"])
+        id_ = "starts_at_to" if target else "starts_at"
+        what = Cause.of(id_, who=who, asked_unix_s=asked_s, start_unix_s=record["start_at"], **target, **words)
+        return WallClock(record["t"], asked_s).told(what) or what, ""
+
     def _station(self, record: Fields) -> tuple[Cause, str] | None:
+        if _id(record) == "bay_refused":
+            return None  # a start for later: its own record says it
         self._ended = _id(record) in ("ended", "ended_well")
         return self._cause(record, "text"), "attention" if _id(record) in FAILURES else ""
 
@@ -156,6 +169,7 @@ TELLERS: Mapping[str, Teller] = {
     "session": Story._session,  # noqa: SLF001
     "contactor": Story._contactor,  # noqa: SLF001
     "run": Story._run,  # noqa: SLF001
+    "request": Story._request,  # noqa: SLF001
     "station": Story._station,  # noqa: SLF001
     "lost": Story._lost,  # noqa: SLF001
 }

@@ -18,7 +18,7 @@ from orchestrator.record import months
 from orchestrator.record.charge import Charge
 from orchestrator.record.earlier import Earlier
 from orchestrator.record.lines import CHECKPOINT, Record, encoded
-from orchestrator.record.monthfile import DAMAGED, opened
+from orchestrator.record.monthfile import DAMAGED, lines, opened
 from orchestrator.record.ulid import CHANCE, after
 from orchestrator.service.curves import Curves
 from orchestrator.service.disk import code_of, make_directory, sync_directory
@@ -164,7 +164,7 @@ class Recorder:
 
     def _take(self, name: str, earlier: Earlier) -> None:
         with suppress(*DAMAGED), opened(self._folder / name) as file:
-            earlier.take(file)
+            earlier.take(lines(file))
 
     def _write(self) -> None:
         if not self._waiting:
@@ -174,8 +174,8 @@ class Recorder:
         if name != now:
             self._begin(path)
         count = len(self._waiting)
-        lines = b"".join(encoded(self._waiting[at]) for at in range(count))
-        append(path, (cut_off(path) if name != now else b"") + lines, durable=True)
+        data = b"".join(encoded(self._waiting[at]) for at in range(count))
+        append(path, (cut_off(path) if name != now else b"") + data, durable=True)
         if name != now:
             sync_directory(self._folder)
             self._name = now

@@ -58,8 +58,9 @@ def _list(arguments: argparse.Namespace) -> int:
             sys.stdout.writelines(as_csv(_meant(charges, arguments, since), language))
             return 0
         found = list(_meant(charges, arguments, since, USUAL + 1))
+        none = Cause("charges_none_such" if not found and charges.bays() else "charges_none")
     shown = found if arguments.limit is not None or since else found[:USUAL]
-    print(table(shown, language, own_width()) if found else say(Cause("charges_none"), language))
+    print(table(shown, language, own_width()) if found else say(none, language))
     if len(shown) < len(found):
         print(say(Cause.of("charges_more", shown=USUAL), language))
     return 0

@@ -3,7 +3,8 @@
 Theory of operation. The wall clock alone decides: where it is set back the start waits longer, where it is set forward
 it comes earlier. A start that is due is made by the next decision, as if its person had typed it then, and again for a
 minute while it is refused: right after a restart no BMU has been heard yet. What refuses it then is kept, for the
-status. After `MOST_LATE_S` nobody counts on it any more, whether the service was down or the clock
+status. It is not made where something has happened since that a person must look at first: who asked did not know of
+it. After `MOST_LATE_S` nobody counts on it any more, whether the service was down or the clock
 was set: it is missed, and not made. A stop, or another start, cancels it.
 """
 
@@ -11,13 +12,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from orchestrator.core.persisted import Persisted, TimedStart
-from orchestrator.model import Cause, Request, State
+from orchestrator.model import Alarm, Cause, Decision, Request, State
+from orchestrator.model.cause import plain
 from orchestrator.service.asked import Asked, Taken
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
-from orchestrator.text.catalogue import fields
+from orchestrator.text.catalogue import fields, say
 
 #: A start that could not be made is still made within this.
 MOST_LATE_S = 3600.0
@@ -25,6 +27,8 @@ MOST_LATE_S = 3600.0
 PATIENCE_S, AGAIN_S = 60.0, 5.0
 #: What of the status is not of `next`.
 OWN = frozenset({"target_soc_pct", "pending"})
+#: Why a bay is paused by a person: only a start ends that.
+PAUSES = frozenset({"operator_pause", "paused_by"})
 #: For how long the status tells why one was not made.
 TOLD_S = 86400.0
 
@@ -41,6 +45,7 @@ class StartTimer:
         self._timed: TimedStart | None = None
         self._first_s: float | None = None  # when it was refused first …
         self._again_s = 0.0  # … and when it is tried again
+        self._known = ""  # what a person had to look at already when it was asked for
 
     def due(self, clock: WallClock) -> Sequence[Asked]:
         """The start, if its time has come."""
@@ -58,12 +63,17 @@ class StartTimer:
             return ()
         return (Asked.of(timed),) if clock.now_s >= self._again_s else ()
 
-    def take(self, taken: Taken) -> None:
-        """Take note of what is asked of the next decision."""
+    def take(self, taken: Taken, last: Decision | None) -> Taken:
+        """What is asked of the next decision, after the last one, with note taken of it."""
+        needs_look = last is None or last.alarm is not Alarm.NONE
         if taken.noted is not None:
             self._timed, self._first_s, self._again_s = taken.noted, None, 0.0
+            self._known = last.cause.id if last is not None and needs_look else ""
         elif taken.request is Request.STOP:
             self._timed = None
+        elif taken.timed is not None and last is not None and needs_look and last.cause.id != self._known:
+            return Taken(timed=taken.timed, refusal=taken.refusal or last.cause)
+        return taken
 
     def decided(self, taken: Taken, answer: Cause | None, clock: WallClock) -> None:
         """Follow the decision: `answer` is why the request was refused."""
@@ -96,12 +106,18 @@ class StartTimer:
             **told, "at": timed.start_unix_s, "target_soc_pct": timed.target_pct, "pending": timed.outcome is None,
         }  # fmt: skip
 
-    def next(self, state: State, clock: WallClock) -> dict[str, object]:
-        """What comes next of a held bay, in the status document: nobody needs to come. Any thread."""
+    def next(self, decision: Decision, clock: WallClock) -> dict[str, object]:
+        """What comes next of a bay that waits for a start, in the status document: nobody needs to come. Any thread."""
         told = self.status(clock)
-        if told is None or not told["pending"] or state is not State.HELD:
+        if told is None or not told["pending"] or not self._waits(decision):
             return {}
         return {"next": {**{name: told[name] for name in told if name not in OWN}, "by_itself": True}}
+
+    def _waits(self, decision: Decision) -> bool:
+        """Whether nothing but the time is waited for."""
+        if decision.alarm is not Alarm.NONE and decision.cause.id != self._known:
+            return False
+        return decision.state is State.HELD or decision.cause.id in PAUSES
 
     def _fails(self, timed: TimedStart, why: Cause, clock: WallClock) -> None:
         self._timed = replace(timed, outcome=clock.told(why))  # without moments of a clock that a restart resets
@@ -110,7 +126,9 @@ class StartTimer:
         self._say(Cause.of("bay_refused", bay=self._bay, why=clock.told(told)))
 
     def _tell(self, what: Cause, clock: WallClock) -> None:
-        self._journal.put(self._bay, ("timed_start", fields(clock.told(what), self._language) or {}), clock.now_s)
+        told = clock.told(what) or what
+        said = {"text": say(told, self._language), "cause": plain(told)}
+        self._journal.put(self._bay, ("timed_start", said), clock.now_s)
 
 
 def cause_of(timed: TimedStart, bay: str) -> Cause:
@@ -118,7 +136,8 @@ def cause_of(timed: TimedStart, bay: str) -> Cause:
     by = timed.by if timed.by is not None else Cause.of("started_by", who="?", asked_unix_s=timed.start_unix_s)
     told = replace(by.with_(start_unix_s=timed.start_unix_s), id="starts_at")
     if timed.outcome is not None:
-        return replace(told.with_(why=timed.outcome, bay=bay), id="start_not_made")
+        then = Cause.of("start_it_now", bay=bay)  # after the person's own words
+        return replace(told.with_(why=timed.outcome, bay=bay, then=then), id="start_not_made")
     if timed.target_pct is not None:
         return replace(told.with_(target_pct=timed.target_pct), id="starts_at_to")
     return told

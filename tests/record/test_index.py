@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from orchestrator.model import Cause
-from orchestrator.record import index, tables
+from orchestrator.record import index, monthfile, tables
 from orchestrator.record.charges import Charges
 from orchestrator.record.lines import Record, encoded
 from tests.record.made import begin, checkpoint, end, id_of
@@ -166,6 +166,33 @@ def test_a_damaged_packed_month_costs_only_what_is_damaged(folder: Folder, damag
     assert next(folder.charges().whole([id_of(41), id_of(0)]))["id"] == id_of(41)
     assert folder.said == ([] if path.stat().st_size == 0 else ["records_damaged"])
     assert folder.dump() == folder.rebuilt()
+
+
+def test_a_packed_month_is_read_up_to_its_damage(folder: Folder) -> None:
+    folder.add(NOVEMBER, *(end(number, 1) for number in range(400)))
+    folder.pack(NOVEMBER)
+    path = folder.path / f"{NOVEMBER}.gz"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    assert 150 < len(folder.listed()) < 250
+    assert folder.said == ["records_damaged"]
+
+
+def test_a_line_that_is_too_long_does_not_fill_the_memory(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(monthfile, "LONGEST", 10_000)
+    folder.add(NOVEMBER, end(1, 1), b"\0" * 35_000)
+    with (folder.path / NOVEMBER).open("rb") as file:
+        assert max(map(len, monthfile.lines(file))) == 10_000
+    assert len(folder.listed()) == 1
+    folder.add(NOVEMBER, b"\0" * 7_000 + b"\n", end(2, 1))
+    assert len(folder.listed()) == 2
+    assert folder.dump() == folder.rebuilt()
+
+
+def test_what_is_no_file_is_no_month(folder: Folder) -> None:
+    folder.add(NOVEMBER, end(1, 1))
+    (folder.path / DECEMBER).symlink_to("/dev/zero")
+    (folder.path / "2026-10.jsonl").mkdir()
+    assert len(folder.listed()) == 1
 
 
 def test_a_month_that_is_gone_takes_its_charges_with_it(folder: Folder) -> None:

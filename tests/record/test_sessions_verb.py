@@ -88,6 +88,12 @@ def test_bay_battery_time_and_number_choose(journal: Path, capsys: pytest.Captur
     assert count("--since", "2126-11-28") == 0
 
 
+def test_none_of_these_is_not_none_at_all(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for choice in (("--bay", "bay-2"), ("--battery", "can0:0x11"), ("--since", "2126-11-28")):
+        told = said(capsys, "--journal", str(journal), *choice)
+        assert told == "there are charges on record, but none of these\n"
+
+
 def test_csv_is_what_a_spreadsheet_reads(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = said(capsys, "--csv", "--journal", str(journal))
     assert text.startswith("\ufeffid,station,bay,")

@@ -21,6 +21,7 @@ from orchestrator.service.history_page import HistoryPage, as_json
 from orchestrator.service.history_verb import ON_PAGE, last_events
 from orchestrator.service.journal import Journal
 from orchestrator.service.journal_place import event_files, journal_place
+from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import say
 from tests.whole.station import orchestrator
 
@@ -54,6 +55,24 @@ def told(*records: Mapping[str, Any], language: str = "en") -> list[Happened]:
 
 def texts(*records: Mapping[str, Any], language: str = "en") -> list[str]:
     return [one.text for one in told(*records, language=language)]
+
+
+def test_a_start_for_later_is_told_when_it_is_asked_for_and_once_when_it_was_not_made() -> None:
+    why = Cause.of("target_reached", soc_pct=91.0, target_pct=70.0)
+    asked: dict[str, Any] = {"who": "kim", "asked_unix_s": NOW_S, "start_unix_s": NOW_S + 600}
+    missed = Cause.of("start_not_made", **asked, why=why, bay="bay-1")
+    missed = WallClock(700.0, NOW_S + 700).told(missed) or missed
+    lines = (
+        record("request", request="start", by="kim", accepted=True, answer="", cause=None, start_at=NOW_S + 600),
+        record("request", request="start", by="kim", accepted=True, answer="", cause=None),
+        record("timed_start", text=say(missed), cause=plain(missed)),
+        station("bay_refused", bay="bay-1", why=missed),
+    )
+    at, then = strftime("%H:%M", localtime(NOW_S + 100)), strftime("%H:%M", localtime(NOW_S + 600))
+    first, second = texts(*lines)
+    assert first == f"starts at {then} (asked by kim at {at})"
+    assert second.startswith(f"the start at {then}, asked by kim at ") and "was not made: its SOC" in second
+    assert "실행하지 않았습니다" in texts(*lines, language="ko")[1]
 
 
 # --- sentences -------------------------------------------------------------------------------------------------------

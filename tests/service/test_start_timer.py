@@ -83,8 +83,9 @@ def test_it_starts_by_itself_at_that_time(tmp_path: Path, wall: Wall) -> None:
     wall.now_s = AT_S
     bench.charging()
     assert told(bench) == ""
-    texts = [fields_of(line)["text"] for _, _, _, line in bench.journal._waiting[False] if line[0] == "timed_start"]
-    assert texts == ["started at 22:00, as root for kim asked at 18:10"]
+    made = [fields_of(line) for _, _, _, line in bench.journal._waiting[False] if line[0] == "timed_start"]
+    assert [one["text"] for one in made] == ["started at 22:00, as root for kim asked at 18:10"]
+    assert isinstance(cause := made[0]["cause"], dict) and cause["id"] == "started_later_by"
     wall.now_s = AT_S - 7200  # the clock is set back: it has been made
     asks(bench, Asked(Request.STOP, LEE))
     wall.now_s = AT_S + 1
@@ -146,6 +147,65 @@ def test_what_refuses_it_is_told(tmp_path: Path, wall: Wall) -> None:
     again = after(bench, tmp_path / "2")
     again.step()
     assert told(again) == told(bench)
+
+
+def test_a_charge_that_was_interrupted_since_is_not_resumed_by_it(tmp_path: Path, wall: Wall) -> None:
+    """Who asked for it did not know that somebody must look first."""
+    before = Bench(tmp_path)
+    before.charging()
+    asks(before, Asked(Request.START, KIM, start_unix_s=AT_S))
+    bench = after(before, tmp_path / "2")
+    bench.until(State.HELD)
+    document = bench.bay.status()
+    coming = document["next"]
+    assert document["alarm"] == "attention" and isinstance(coming, dict) and not coming["by_itself"]
+    wall.now_s = AT_S
+    assert bench.step(20) is State.HELD
+    bench.now_s += 60
+    assert bench.step(20) is State.HELD
+    assert "was not made: at " in told(bench) and "ended in mid-charge" in told(bench)
+
+
+def test_what_had_to_be_looked_at_already_does_not_hinder_it(tmp_path: Path, wall: Wall) -> None:
+    before = Bench(tmp_path)
+    before.charging()
+    bench = after(before, tmp_path / "2")
+    bench.until(State.HELD)
+    asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S))
+    coming = bench.bay.status()["next"]
+    assert isinstance(coming, dict) and coming["by_itself"]
+    wall.now_s = AT_S
+    bench.charging()
+
+
+def test_what_comes_next_of_a_pause_is_the_start(tmp_path: Path, wall: Wall) -> None:
+    bench = Bench(tmp_path)
+    bench.charging()
+    asks(bench, Asked(Request.PAUSE, LEE))
+    bench.until(State.SUSPENDED)
+    asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S))
+    coming = bench.bay.status()["next"]
+    assert isinstance(coming, dict) and (coming["by_itself"], coming["at"]) == (True, AT_S)
+    wall.now_s = AT_S
+    bench.charging()
+
+
+@pytest.mark.parametrize(("request_", "is_kept"), [(Request.PAUSE, True), (Request.STOP, False)])
+def test_a_request_before_the_first_decision(tmp_path: Path, wall: Wall, request_: Request, is_kept: bool) -> None:
+    bench = after(held(tmp_path), tmp_path / "2")
+    asks(bench, Asked(request_, LEE))
+    bench.step()
+    assert bool(told(bench)) is is_kept
+    assert (bench.store.past(bench.bay.place).timed is not None) is is_kept
+
+
+def test_the_command_to_type_is_not_mixed_with_a_persons_words(tmp_path: Path, wall: Wall) -> None:
+    bench = held(tmp_path)
+    kim = Asker(behind="kim", uid=0, unix_s=ASKED_S, because="night tariff")
+    asks(bench, Asked(Request.START, kim, start_unix_s=AT_S))
+    wall.now_s = AT_S + 3700
+    bench.step(2)
+    assert told(bench).endswith("62 min late: night tariff; to start it now: orchestrator start bay-1")
 
 
 def test_after_a_restart_it_waits_for_the_battery(tmp_path: Path, wall: Wall) -> None:

@@ -98,8 +98,8 @@ TEXTS: Mapping[str, str] = {
     "started_later_to_by": "started at {start_at}, as {who} asked at {asked_at}, once to {target_pct:g} %",
     "starts_at": "starts at {start_at} (asked by {who} at {asked_at})",
     "starts_at_to": "starts at {start_at} and charges once to {target_pct:g} % (asked by {who} at {asked_at})",
-    "start_not_made": "the start at {start_at}, asked by {who} at {asked_at}, was not made: {why}; to start it now: "
-    "orchestrator start {bay}",
+    "start_not_made": "the start at {start_at}, asked by {who} at {asked_at}, was not made: {why}",
+    "start_it_now": "to start it now: orchestrator start {bay}",
     "start_too_late": "it could only be made {late_min:.0f} min late",
     "starts_in": "it starts at {start_at}, in {lasts}{doubt:after}",
     "at_twice": "the clock shows that time twice, the one in {offset} is meant",

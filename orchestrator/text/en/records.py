@@ -9,6 +9,7 @@ TEXTS: Mapping[str, str] = {
     # the charges on record
     "charge_open": "not ended",
     "charges_none": "no charge on record",
+    "charges_none_such": "there are charges on record, but none of these",
     "charges_more": "the newest {shown}; there are more: --limit 0 lists all",
     "charges_unreadable": "{folder} cannot be read: {error}",
     "charge_unknown": "no charge on record has an id that ends with {id}",

@@ -99,8 +99,8 @@ TEXTS: Mapping[str, str] = {
     "충전합니다",
     "starts_at": "{start_at}에 시작합니다({who}, {asked_at} 요청)",
     "starts_at_to": "{start_at}에 시작하여 한 번 {target_pct:g} %까지 충전합니다({who}, {asked_at} 요청)",
-    "start_not_made": "{who}이(가) {asked_at}에 요청한 {start_at} 시작을 실행하지 않았습니다: {why}. 지금 시작하려면: "
-    "orchestrator start {bay}",
+    "start_not_made": "{who}이(가) {asked_at}에 요청한 {start_at} 시작을 실행하지 않았습니다: {why}",
+    "start_it_now": "지금 시작하려면: orchestrator start {bay}",
     "start_too_late": "{late_min:.0f}분 늦게야 실행할 수 있었습니다",
     "starts_in": "{start_at}에 시작합니다. 남은 시간: {lasts}{doubt:after}",
     "at_twice": "그 시각은 두 번 있으며, {offset} 쪽을 뜻합니다",

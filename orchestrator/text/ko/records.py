@@ -9,6 +9,7 @@ TEXTS: Mapping[str, str] = {
     # the charges on record
     "charge_open": "종료되지 않음",
     "charges_none": "충전 기록이 없습니다",
+    "charges_none_such": "해당하는 충전 기록이 없습니다. 다른 기록은 있습니다",
     "charges_more": "최근 {shown}건입니다. 모두 보려면 --limit 0",
     "charges_unreadable": "{folder}을(를) 읽을 수 없습니다: {error}",
     "charge_unknown": "ID가 {id}(으)로 끝나는 충전 기록이 없습니다",
