@@ -5,7 +5,7 @@ it comes earlier. A start that is due is made by the next decision, as if its pe
 minute while it is refused: right after a restart no BMU has been heard yet. What refuses it then is kept, for the
 status. It is not made where something has happened since that a person must look at first: who asked did not know of
 it. After `MOST_LATE_S` nobody counts on it any more, whether the service was down or the clock
-was set: it is missed, and not made. A stop, or another start, cancels it.
+was set: it is missed, and not made. A stop, a pause, or another start, cancels it.
 """
 
 from collections.abc import Callable, Sequence
@@ -82,6 +82,8 @@ class StartTimer:
             self._first_s, self._again_s = self._first_s or clock.now_s, clock.now_s + AGAIN_S
             if clock.now_s - self._first_s >= PATIENCE_S:
                 self._fails(taken.timed, why, clock)
+        elif taken.request is Request.PAUSE and why is None:
+            self._timed = None  # whoever pauses it now knows more than whoever asked for the start
         elif taken.request is Request.START and why is None:
             self._timed = None
             if taken.timed is not None and taken.by is not None:

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.core import decide as decide_module
-from orchestrator.core.finish import DAY_S
+from orchestrator.core.finish import DAY_S, once
+from orchestrator.core.memory import Operator
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Cause, Request, State
 from tests.core.said import reason_of, say
@@ -187,3 +188,12 @@ def test_reached_before_it_began_it_waits_for_nothing_more() -> None:
     world.run(5)
     assert world.is_in(S.IDLE)
     assert reason_of(world.decision) == "SOC 99.5 % is not below 99.5 %: charges once to 99.5 %, asked by kim at 7 s"
+
+
+def test_a_target_is_told_with_whoever_asked_for_it() -> None:
+    """A service that knew nobody may have kept one."""
+    assert once(Operator()) is None
+    assert once(Operator(target_pct=60.0)) == Cause.of("charges_once", target_pct=60.0)
+    told = once(Operator(target_pct=60.0, target_by=KIM))
+    assert told is not None
+    assert (told.id, told.param("target_pct"), told.param("who")) == ("charges_once_by", 60.0, "kim")

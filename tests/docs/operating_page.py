@@ -91,7 +91,7 @@ ANSWERS = (
     ),
     Answer(
         "Let it start at 22:00",
-        "It stays as it is until then. `stop`, or another start, cancels it, and it is not made where somebody must "
+        "It stays as it is until then. `stop`, `pause`, or another start, cancels it, and it is not made where somebody must "
         "look first. With `--to`, it also has a target.",
         "start bay-4 --at 22:00",
     ),

@@ -104,6 +104,19 @@ def test_a_stop_or_another_start_cancels_it(tmp_path: Path, wall: Wall, asked: A
     assert bench.store.past(bench.bay.place).timed is None
 
 
+def test_a_pause_since_cancels_it(tmp_path: Path, wall: Wall) -> None:
+    """The floor is wet: who asked for the start did not know."""
+    bench = Bench(tmp_path)
+    bench.charging()
+    asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S))
+    asks(bench, Asked(Request.PAUSE, LEE))
+    bench.until(State.SUSPENDED)
+    assert told(bench) == ""
+    wall.now_s = AT_S
+    assert bench.step(60) is State.SUSPENDED
+    assert bench.store.past(bench.bay.place).timed is None
+
+
 def test_the_newest_time_counts(tmp_path: Path, wall: Wall) -> None:
     bench = held(tmp_path)
     asks(bench, Asked(Request.START, LEE, start_unix_s=AT_S + 600))
@@ -224,9 +237,9 @@ def test_a_pause_by_somebody_else_is_spared_if_the_start_was_for_all(tmp_path: P
     bench = held(tmp_path)
     asks(bench, Asked(Request.START, KIM))
     bench.charging()
-    asks(bench, Asked(Request.START, KIM, spares=True, start_unix_s=AT_S))
     asks(bench, Asked(Request.PAUSE, LEE))
     bench.until(State.SUSPENDED)
+    asks(bench, Asked(Request.START, KIM, spares=True, start_unix_s=AT_S))
     wall.now_s = AT_S
     bench.step(20)
     bench.now_s += 60
