@@ -41,7 +41,6 @@ class TimedStart:
     start_unix_s: float
     by: Cause | None = None  #: who asked for it, and when; None: unknown
     target_pct: float | None = None  #: of its one charge; None: by the policy
-    spares: bool = False  #: a bay that somebody else holds by then is left alone
     outcome: Cause | None = None  #: why it was not made; None: it is to come
 
 

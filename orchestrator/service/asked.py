@@ -8,7 +8,7 @@ from threading import Event, Lock
 from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import TimedStart
 from orchestrator.model import Cause, Request
-from orchestrator.service.asker import NOBODY, Asker, held_by_others, person_of, started_later
+from orchestrator.service.asker import NOBODY, Asker, held_by_others, started_later
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 
 
@@ -36,7 +36,7 @@ class Asked:
     @classmethod
     def of(cls, timed: TimedStart) -> "Asked":
         """A start whose time has come."""
-        return cls(Request.START, spares=timed.spares, target_pct=timed.target_pct, timed=timed)
+        return cls(Request.START, target_pct=timed.target_pct, timed=timed)
 
     @property
     def by(self) -> Cause | None:
@@ -51,8 +51,7 @@ class Asked:
 
     def spared(self, memory: Memory | None, bay: str) -> Cause | None:
         """Why the bay is left alone, if it is."""
-        person = self.asker.person if self.timed is None else person_of(self.timed.by)
-        what = held_by_others(memory.operator, person) if self.spares and memory is not None else None
+        what = held_by_others(memory.operator, self.asker.person) if self.spares and memory is not None else None
         return Cause.of("held_by_others", what=what, bay=bay) if what is not None else None
 
     @property
@@ -81,7 +80,7 @@ class Taken:
         if (spared := one.spared(memory, bay)) is not None:
             return cls(timed=one.timed, refusal=spared)
         if one.start_unix_s is not None:
-            later = TimedStart(one.start_unix_s, one.asker.cause(one.request), one.target_pct, one.spares)
+            later = TimedStart(one.start_unix_s, one.asker.cause(one.request), one.target_pct)
             return cls(noted=later)
         return cls(one.request, one.by, one.target_pct, timed=one.timed)
 

@@ -89,11 +89,6 @@ def started_later(timed: TimedStart) -> Cause | None:
     return replace(told.with_(target_pct=timed.target_pct), id="started_later_to_by")
 
 
-def person_of(by: Cause | None) -> str:
-    """The name of the person who has made a request; "" if unknown."""
-    return str(_person(by.param("who")) or "") if by is not None else ""
-
-
 def held_by_others(operator: Operator, person: str) -> Cause | None:
     """The stops and pauses of others than this person that hold a bay; None if there are none."""
     holds = [one for hold in (operator.hold, operator.paused_by) if hold is not None for one in parts(hold)]

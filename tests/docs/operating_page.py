@@ -91,8 +91,8 @@ ANSWERS = (
     ),
     Answer(
         "Let it start at 22:00",
-        "It stays as it is until then. `stop`, `pause`, or another start, cancels it, and it is not made where somebody must "
-        "look first. With `--to`, it also has a target.",
+        "It stays as it is until then. `stop`, `pause`, or another start, cancels it, and it is not made where "
+        "somebody must look first. With `--to`, it also has a target.",
         "start bay-4 --at 22:00",
     ),
     Answer(

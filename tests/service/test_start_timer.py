@@ -233,18 +233,14 @@ def test_after_a_restart_it_waits_for_the_battery(tmp_path: Path, wall: Wall) ->
     assert "charges once to 60 %, asked by root for kim at 18:10" in str(bench.bay.status()["target"])
 
 
-def test_a_pause_by_somebody_else_is_spared_if_the_start_was_for_all(tmp_path: Path, wall: Wall) -> None:
-    bench = held(tmp_path)
-    asks(bench, Asked(Request.START, KIM))
+def test_what_somebody_else_has_paused_is_spared_by_a_start_of_all_for_later(tmp_path: Path, wall: Wall) -> None:
+    bench = Bench(tmp_path)
     bench.charging()
     asks(bench, Asked(Request.PAUSE, LEE))
     bench.until(State.SUSPENDED)
-    asks(bench, Asked(Request.START, KIM, spares=True, start_unix_s=AT_S))
-    wall.now_s = AT_S
-    bench.step(20)
-    bench.now_s += 60
-    assert bench.step(20) is State.SUSPENDED
-    assert "was not made: left alone: paused by root for lee at 18:10" in told(bench)
+    answer = asks(bench, Asked(Request.START, KIM, spares=True, start_unix_s=AT_S))
+    assert answer.startswith("left alone: paused by root for lee at 18:10")
+    assert told(bench) == ""
 
 
 def test_what_the_disk_does_not_take_is_forgotten(tmp_path: Path, wall: Wall) -> None:
