@@ -177,6 +177,8 @@ def _update(db: sqlite3.Connection, folder: Path, say: Say) -> None:
 
 
 def _connected(path: Path, mode: str) -> sqlite3.Connection:
+    if path.is_fifo():  # which nobody could open without waiting
+        raise UselessError
     uri = f"{path.absolute().as_uri()}?mode={mode}"
     db = sqlite3.connect(uri, uri=True, isolation_level=None, timeout=TRIES * PAUSE_S)
     try:

@@ -268,6 +268,13 @@ def test_a_damaged_index_is_moved_away_and_built_again(folder: Folder) -> None:
     assert folder.said == ["index_damaged"] * 2
 
 
+def test_an_index_that_is_a_fifo_keeps_nobody_waiting(folder: Folder) -> None:
+    folder.add(NOVEMBER, end(1, 1))
+    os.mkfifo(folder.path / index.NAME)
+    assert len(folder.listed()) == 1
+    assert (folder.path / index.NAME).is_file()
+
+
 def test_an_index_of_another_version_is_built_anew(folder: Folder) -> None:
     folder.add(NOVEMBER, begin(1))
     folder.charges()

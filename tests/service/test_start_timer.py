@@ -299,6 +299,14 @@ def test_a_wrong_target_is_wrong_use(target: str, capsys: pytest.CaptureFixture[
     assert f"start: --to {target}: it is a SOC in percent, above 0 and at most 100" in capsys.readouterr().err
 
 
+def test_a_target_may_be_written_as_it_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["start", "bay-1", "--to", "101%"]) == 2
+    assert "start: --to 101: it is a SOC in percent" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["start", "bay-1", "--to", "full"])
+    assert "argument --to: full is no SOC in percent, such as 95" in capsys.readouterr().err
+
+
 # --- which time is meant ----------------------------------------------------------------------------------------------
 
 
