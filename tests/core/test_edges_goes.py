@@ -115,8 +115,7 @@ RESTS = (
 )  # fmt: skip
 
 #: The pack was too cold, down to -4 °C; that ended a second ago, and it has 20 °C now.
-COLD_KEY = "pack.temperature_c"
-WAS_COLD = by_policy("under_temperature", COLD_KEY, pack_c=-3.0, limit_c=0.0, again_c=3.0)
+WAS_COLD = by_policy("under_temperature", "pack.temperature_c", pack_c=-3.0, limit_c=0.0, again_c=3.0)
 COLD = FaultMemory(raised_s=ago(60), clean_s=ago(1), cause=WAS_COLD, worst=-4.0)
 
 

