@@ -66,7 +66,6 @@ QUALIFYING = (
 )  # fmt: skip
 
 WANTS = by_policy("soc_below", "start.soc_below_pct", soc_pct=50.0, threshold_pct=98.0)
-UNFINISHED = by_policy("soc_below", "finish.target_soc_pct", soc_pct=50.0, threshold_pct=100.0)
 NOT_HEARD = Cause.of("battery_not_heard", charger_v=48.0, what=Cause.of("bmu_does_not_answer", node_id=0x10))
 
 
