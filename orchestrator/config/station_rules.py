@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 
+from orchestrator.config.amperes import DIGITS
 from orchestrator.config.can_rules import bus_problems, filter_problems, shared_port_problems
 from orchestrator.config.names import name_problem
 from orchestrator.config.policy import Policy
@@ -148,6 +149,17 @@ def lowest_step_problems(steps_a: tuple[float, ...], current_a: float) -> Proble
         )
 
 
+def _tolerance(steps_a: tuple[float, ...], tolerance_pct: float, current_a: float) -> Problems:
+    """At least one of them may be used whatever flows on it."""
+    most_a = round(steps_a[0] * (1 + tolerance_pct / 100), DIGITS)
+    if steps_a[0] <= current_a < most_a:
+        yield (
+            "charger.tolerance_pct",
+            f"even on the lowest step, {steps_a[0]:g} A, {most_a:g} A may flow, above limits.current_a, {current_a:g} A: "
+            "no step would be allowed",
+        )
+
+
 def _voltage(policy: Policy, voltage_v: float) -> Problems:
     if policy.pack.voltage_v.high > voltage_v:
         yield (
@@ -180,6 +192,7 @@ _BAY_RULES: tuple[Rule, ...] = (
     Rule(_bay_name, ("name",)),
     Rule(step_problems, ("charger.steps_a",)),
     Rule(lowest_step_problems, ("charger.steps_a", "limits.current_a")),
+    Rule(_tolerance, ("charger.steps_a", "charger.tolerance_pct", "limits.current_a")),
     Rule(_voltage, ("policy", "limits.voltage_v")),
     Rule(_temperature, ("policy", "limits.temperature_c")),
     Rule(_tpdos, ("battery.map", "battery.tpdo_s")),
