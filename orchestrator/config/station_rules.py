@@ -155,8 +155,8 @@ def _tolerance(steps_a: tuple[float, ...], tolerance_pct: float, current_a: floa
     if steps_a[0] <= current_a < most_a:
         yield (
             "charger.tolerance_pct",
-            f"even on the lowest step, {steps_a[0]:g} A, {most_a:g} A may flow, above limits.current_a, {current_a:g} A: "
-            "no step would be allowed",
+            f"even on the lowest step, {steps_a[0]:g} A, {most_a:g} A may flow, above limits.current_a, "
+            f"{current_a:g} A: no step would be allowed",
         )
 
 

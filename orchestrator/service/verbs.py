@@ -56,16 +56,14 @@ def add_service_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser
     _add_reload(verbs)
 
 
-def _percent(text: str) -> float:
-    try:
-        return float(text.removesuffix("%"))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text:.40} is no SOC in percent, such as 95") from None
+def percent(text: str) -> float:
+    """A SOC as people write it, with its sign or without; ValueError if it is no number."""
+    return float(text.removesuffix("%"))
 
 
 def _add_terms(start: argparse.ArgumentParser) -> None:
     start.add_argument(
-        "--to", type=_percent, metavar="PCT", help="charge once to this SOC, whatever the policy's target says"
+        "--to", type=percent, metavar="PCT", help="charge once to this SOC, whatever the policy's target says"
     )
     start.add_argument("--at", metavar="TIME", help="start then: 22:00 (today or tomorrow), or 2026-11-28T22:00")
     start.add_argument(

@@ -304,7 +304,7 @@ def test_a_target_may_be_written_as_it_is_shown(capsys: pytest.CaptureFixture[st
     assert "start: --to 101: it is a SOC in percent" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main(["start", "bay-1", "--to", "full"])
-    assert "argument --to: full is no SOC in percent, such as 95" in capsys.readouterr().err
+    assert "argument --to: invalid percent value: 'full'" in capsys.readouterr().err
 
 
 # --- which time is meant ----------------------------------------------------------------------------------------------
