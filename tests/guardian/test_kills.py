@@ -122,16 +122,18 @@ class Services:
         for near in names[names.index(name) :][:AHEAD]:
             if near not in self._started:
                 self._started[near] = self._start(near)
-        one = self._started[name]
+        if (one := self._started[name]).service.has_ended:  # starved on a busy machine, before it was its turn
+            one.service.close()
+            one = self._started[name] = self._start(name, again=True)
         one.service.wait("CHARGING")
         wait_until(lambda: one.runs, what="current")
         return one
 
-    def _start(self, name: str) -> Charging:
+    def _start(self, name: str, *, again: bool = False) -> Charging:
         number = BAYS[name]
         document = station_document(self._directory, [self._cans[number - 1]], 1)
         document["bays"][0]["charger"]["port"] = self._plant.bays[number - 1]["port"]
-        own = self._directory / str(number)
+        own = self._directory / (f"{number}-again" if again else str(number))
         own.mkdir()
         service = Service(own, document, RUNS.get(name, ("-m", "orchestrator", "run")))
         return Charging(self._plant, service.start(), number)

@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.errors import ServiceError
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
 from tests.whole.station import LOOK_S, RUN, Document, Service, whole_station
@@ -80,10 +81,13 @@ class Ahead:
     @contextmanager
     def take(self, name: str) -> Iterator[Station]:
         """The station of this test; those of the next ones are begun."""
-        at = self._names.index(name)
+        at, was_ahead = self._names.index(name), name in self._begun
         self._begin(name)
         for near in self._names[at + 1 : at + 1 + AHEAD]:
             self.begin(near)
+        if was_ahead and self._is_lost(name):
+            del self._begun[name]
+            self._begin(name)
         made = self._begun[name].result()
         with made.stack:
             if self._recipes[name].ready is charge:
@@ -98,6 +102,16 @@ class Ahead:
     def _begin(self, name: str) -> None:
         if name not in self._begun:
             self._begun[name] = self._pool.submit(self._make, self._recipes[name], self._directory())
+
+    def _is_lost(self, name: str) -> bool:
+        """Whether a busy machine has starved it before it was its test's turn."""
+        begun = self._begun[name]
+        if isinstance(begun.exception(), AssertionError | ServiceError):
+            return True
+        made = begun.result()
+        if made.station[1].has_ended:
+            made.stack.close()
+        return made.station[1].has_ended
 
     def close(self) -> None:
         """Take down those that no test has taken."""

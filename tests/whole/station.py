@@ -122,6 +122,11 @@ class Service:
         self._process.send_signal(number)
 
     @property
+    def has_ended(self) -> bool:
+        """Whether the process that was started is gone."""
+        return self._process is not None and self._process.poll() is not None
+
+    @property
     def guardian(self) -> int:
         """The started process."""
         assert self._process is not None
