@@ -13,7 +13,9 @@ from typing import Any
 
 import pytest
 
-from orchestrator.lastresort import inhand
+from orchestrator.errors import ServiceError
+from orchestrator.lastresort import inhand, running_service
+from orchestrator.lastresort.asking import ask
 from orchestrator.lastresort.estop import LOST, UNTOLD
 from orchestrator.lastresort.inhand import ports_in_hand, stations
 from orchestrator.lastresort.running_service import NOBODY, Service
@@ -293,6 +295,27 @@ def test_both_witnesses_have_to_agree(
         assert (seen[1] if seen else None) == why
         assert service.said == "the service holds bay-1 until an operator starts it"
         assert service.sees("/dev/other", 1.0) is None
+
+
+def test_a_service_that_ends_afterwards_has_taken_the_stop_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unanswered: list[ServiceError] = []
+
+    def noted(*request: Any) -> dict[str, Any]:
+        try:
+            return ask(*request)
+        except ServiceError as error:
+            unanswered.append(error)
+            raise
+
+    monkeypatch.setattr(running_service, "ask", noted)
+    with answering(tmp_path / "s", {"bays": []}):
+        service = Service([], str(tmp_path / "s"), every_bay=True)
+        service.start()
+        assert service.told.wait(5.0)
+    wait_until(lambda: len(unanswered) >= 2)
+    assert service.said == "the service holds bay-1 until an operator starts it"
 
 
 def test_a_current_that_only_the_bmu_sees_is_told_first(tmp_path: Path) -> None:

@@ -13,15 +13,9 @@ from orchestrator.lastresort.port_owner import control_sockets
 from orchestrator.protocol.standby import STOP_FRAME
 from tests.guardian.chargers import running_chargers
 from tests.waiting import wait_until
-from tests.whole.ahead import Ahead, Recipe, Station, stations_ahead
+from tests.whole.recipe import Recipe, Station, made
 from tests.whole.station import orchestrator, whole_station
 
-#: Tests that need all bays, or the whole service.
-LAST = (
-    "test_with_its_station_file_every_bay_is_held",
-    "test_a_controller_that_hangs",
-    "test_a_service_that_is_frozen_as_a_whole_and_then_dead",
-)
 NOBODY = "no service is running\n"
 DONE = "every charger stands by, verified\n"
 
@@ -30,26 +24,19 @@ def estop(*args: str, **env: str) -> "subprocess.CompletedProcess[str]":
     return orchestrator("estop", *args, env={"ORCHESTRATOR_SOCKET": "", **env})
 
 
-@pytest.fixture(name="ahead", scope="module")
-def _ahead(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ahead]:
-    """Stations of four charging bays for the last tests, made ready while the others run."""
-    with stations_ahead(dict.fromkeys(LAST, Recipe(4)), lambda: tmp_path_factory.mktemp("fresh")) as ahead:
-        yield ahead
-
-
 @pytest.fixture(name="fresh")
-def _fresh(ahead: Ahead, request: pytest.FixtureRequest) -> Iterator[Station]:
-    with ahead.take(request.function.__name__) as station:
+def _fresh(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+    """Four charging bays of its own, for a test that needs them all, or the whole service."""
+    with made(Recipe(4), tmp_path_factory.mktemp("fresh")) as station:
         yield station
 
 
 @pytest.fixture(name="station", scope="module")
-def _station(ahead: Ahead, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
+def _station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     """Four charging bays. The tests run in order, and each starts with its own bay."""
     with whole_station(tmp_path_factory.mktemp("estop"), 4) as (plant, service):
         service.start()
         charging((plant, service))
-        ahead.begin(LAST[0])
         yield plant, service
 
 

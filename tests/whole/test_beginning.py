@@ -11,7 +11,7 @@ import pytest
 from orchestrator.lastresort.guardian import ACTED
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.ahead import Station, charge
+from tests.whole.recipe import Station, charge
 from tests.whole.station import Service
 
 #: The controller with a limit on its threads; a limit of the system (TasksMax=, ulimit -u) fails in the same way.

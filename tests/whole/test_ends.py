@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.ahead import Station, only_started
+from tests.whole.recipe import Station, only_started
 from tests.whole.station import Document, Service, die_with_parent, orchestrator, station_document, unnamed
 
 

@@ -15,7 +15,7 @@ from orchestrator.sim.client import PlantProcess
 from orchestrator.sim.forger import Forger, Lie, When
 from orchestrator.sim.second_master import SecondMaster
 from tests.waiting import wait_until
-from tests.whole.ahead import Station, only_the_plant
+from tests.whole.recipe import Station, only_the_plant
 from tests.whole.station import Document, Service
 
 #: Faults that only report somebody else's presence.

@@ -15,7 +15,7 @@ import pytest
 from orchestrator.errors import ServiceError
 from orchestrator.sim.client import PlantProcess
 from tests.waiting import wait_until
-from tests.whole.ahead import Station, charge, only_started, only_the_plant
+from tests.whole.recipe import Station, charge, only_started, only_the_plant
 from tests.whole.station import RUN, Document, Service, unnamed
 
 HELD = "stopped by the operator; to go on: orchestrator start bay-1"
