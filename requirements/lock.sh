@@ -15,8 +15,7 @@ lock() { # OUTPUT SOURCE [OPTION]...
     # No option of pip's configuration, no index and no path of this machine goes into the list.
     CUSTOM_COMPILE_COMMAND='make lock' "$tools/bin/pip-compile" --quiet --no-config --rebuild \
         --generate-hashes --allow-unsafe --no-strip-extras --no-annotate \
-        --no-emit-options --no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-        --output-file "$output" "$@"
+        --no-emit-options --output-file "$output" "$@"
     sed -i 's/^# The following packages are considered.*/# builds the package/' "$output"
 }
 

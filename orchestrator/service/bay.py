@@ -15,7 +15,6 @@ from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
 from orchestrator.service.asked import Answers, Asked, Requests, Taken
-from orchestrator.service.bay_document import described
 from orchestrator.service.bayjournal import BayJournal
 from orchestrator.service.bayrecord import BayRecord
 from orchestrator.service.contactor import Contactor
@@ -23,12 +22,13 @@ from orchestrator.service.devices import BatteryDevice, ChargerDevice
 from orchestrator.service.identified import Identified
 from orchestrator.service.journal import Journal
 from orchestrator.service.news import TICK_S, due_s
+from orchestrator.service.outlook import outlook
 from orchestrator.service.past import Place
 from orchestrator.service.policy_in_force import PolicyInForce, name_of
 from orchestrator.service.records import transition
 from orchestrator.service.start_timer import StartTimer
 from orchestrator.service.starts import Starts
-from orchestrator.service.status import contactor_fields
+from orchestrator.service.status import bay_status, contactor_fields, told
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
 
@@ -234,11 +234,12 @@ class BayRunner:
 
     def status(self, *, closely: bool = False) -> dict[str, object]:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
-        decision = self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER)
         known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
+        decision = told(self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER), *known)
         contactor = self._contactor
         return {
-            **described(self.name, decision, *known, clock, self._language, closely=closely),
+            **bay_status(self.name, self._snapshot, decision, clock.now_s, clock.wall_s, self._language),
+            **outlook(decision, *known, clock, self._language, closely=closely),
             **self._timer.next(decision, clock),
             "identity": self.identified.status(),
             "timed_start": self._timer.status(clock),

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from orchestrator.core.facts import Facts
-from orchestrator.core.finish import goes_full, target
+from orchestrator.core.finish import goes_full, once, target
 from orchestrator.core.limits import bounds, limit, lowest
 from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
@@ -50,9 +50,11 @@ def outlook(
     coming = next_of(decision, rules)
     told, at_s = fields(clock.told(coming), language) or {}, _moment(coming, clock)
     since_s = memory.since_s if memory is not None else None
+    asked = once(memory.operator) if memory is not None else None
     found: dict[str, object] = {
         "since": round(clock.unix_s(since_s), 3) if since_s is not None else None,
         "next": {**told, "by_itself": by_itself(decision), "at": at_s},
+        "target": asked and {"soc_pct": asked.param("target_pct"), **(fields(clock.told(asked), language) or {})},
     }
     if not closely or memory is None or memory.last_s is None:
         return found

@@ -48,6 +48,10 @@ def ago(seconds: float) -> float:
     return NOW_S - seconds
 
 
+#: Of a charger: the newest reply is too old to count; it is in standby, at the end of a charge.
+UNHEARD: dict[str, Any] = {"t_s": ago(9)}
+STANDS_BY: dict[str, Any] = {"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL, "current_a": 0.0}
+
 #: What a rule returns, for a test's name, if that is no sentence.
 ANSWERS: dict[object, str] = {None: "silent", True: "yes", False: "no"}
 

@@ -20,11 +20,9 @@ from orchestrator.model import (
     Session,
     State,
 )
-from tests.core.edges import PULSE, Edge, ago, by_policy, witnessed
+from tests.core.edges import PULSE, STANDS_BY, UNHEARD, Edge, ago, by_policy, witnessed
 from tests.core.said import cause
 
-UNHEARD = {"t_s": ago(9)}
-STANDS_BY = {"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL, "current_a": 0.0}
 STOPPED_FULL = {"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL}
 
 # --- the battery ------------------------------------------------------------------------------------------------------

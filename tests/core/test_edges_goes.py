@@ -14,21 +14,17 @@ from orchestrator.core.next_transition import next_transition
 from orchestrator.core.resting import resting_place
 from orchestrator.model import (
     Cause,
-    ChargeMode,
     CurrentStep,
     Decision,
-    Operation,
     Request,
     Session,
     State,
 )
 from tests.core.bays import POLICY
-from tests.core.edges import NOW_S, Edge, ago, by_policy, witnessed
+from tests.core.edges import NOW_S, STANDS_BY, UNHEARD, Edge, ago, by_policy, witnessed
 from tests.core.said import cause
 
 S = State
-UNHEARD = {"t_s": ago(9)}
-STANDS_BY = {"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL, "current_a": 0.0}
 OPEN = {"session": Session(0.0)}
 EARLIER = cause("the reason before")
 

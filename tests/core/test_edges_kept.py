@@ -19,16 +19,13 @@ from orchestrator.model import (
     ControlMode,
     CurrentStep,
     Measurement,
-    Operation,
     Session,
     State,
 )
-from tests.core.edges import BMU, CONTINUOUS, NOW_S, PULSE, Edge, ago
+from tests.core.edges import BMU, CONTINUOUS, NOW_S, PULSE, STANDS_BY, UNHEARD, Edge, ago
 from tests.core.said import cause
 
 S = State
-UNHEARD = {"t_s": ago(9)}
-STANDS_BY = {"operation": Operation.STOPPED, "charge_mode": ChargeMode.FULL, "current_a": 0.0}
 WHY = cause("the reason")
 
 # --- a state that begins ----------------------------------------------------------------------------------------------

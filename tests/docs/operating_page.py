@@ -26,6 +26,7 @@ from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.presets import PACKS
 from tests.proof.virtual_rig import Nature
 from tests.proof.virtual_service import World, station, world
+from tests.waiting import wait_until
 from tests.whole.terminal import Terminal
 
 LINES, COLUMNS = 90, 100
@@ -213,7 +214,8 @@ def living(
 
 def ask(made: World, directory: Path, questions: Callable[[], list[str]]) -> list[str]:
     """The answers of real commands, while virtual time stands still, but for the bay of which something is asked."""
-    time.sleep(max(vars(bay_module)["time"]() - time.time(), 0.0))
+    told_s = vars(bay_module)["time"]()
+    wait_until(lambda: time.time() >= told_s, 2 * LEAD_S, "the time that the station tells", every_s=0.1)
 
     def answer(request: Mapping[str, object]) -> object:
         found = made.supervisor._handler.answer(request)

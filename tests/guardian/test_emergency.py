@@ -349,11 +349,11 @@ def test_a_file_of_the_working_directory_is_not_imported_by_the_controller(tmp_p
 def test_one_port_whose_open_hangs_delays_no_other(tmp_path: Path) -> None:
     """The whole program, with a kernel that never returns from one open()."""
     program = """
-import os, sys, time
+import os, sys, threading
 good, stuck = os.open, os.path.realpath(sys.argv[1])
 def opens(path, *rest):
-    while os.path.realpath(path) == stuck:
-        time.sleep(100)
+    if os.path.realpath(path) == stuck:
+        threading.Event().wait()
     return good(path, *rest)
 os.open = opens
 from orchestrator.lastresort.estop import main

@@ -23,7 +23,7 @@ from tests.whole.station import die_with_parent
 #: END_S=0.3. Most machines have no GPIO line: a test passes a pipe, and the guardian's requests to the kernel come out
 #: at its other end.
 LAUNCH = """
-import json, os, socket, struct, sys, termios, time
+import json, os, socket, struct, sys, termios, threading, time
 from orchestrator.lastresort import guardian, lastopen
 ioctl = lastopen.fcntl.ioctl
 def drive(fd, number, asked=0):
@@ -40,8 +40,7 @@ def hang(call, port):
         except OSError:
             name = ""
         if os.path.realpath(name) == device:
-            while True:
-                time.sleep(100)
+            threading.Event().wait()
         return good(which, *rest, **named)
     setattr(module, call, stuck)
 for call, port in json.loads(sys.argv[3]).items():

@@ -126,14 +126,14 @@ def test_every_state_says_what_comes_next_and_whether_by_itself(state: State) ->
     assert state in NEXT or state is State.CHARGING
     assert coming["text"] and "{" not in coming["text"]
     assert coming["by_itself"] is (state not in BY_PERSON)
-    assert looked.keys() == {"since", "next"} and looked["since"] is None
+    assert looked.keys() == {"since", "next", "target"} and looked["since"] is None
 
 
 def test_what_costs_most_is_told_of_a_bay_that_is_asked_for_by_name() -> None:
     world = charging()
     clock, snapshot = WallClock(world.now_s, NOW_S), world.snapshot(None, "")
     looked = outlook(world.decision, snapshot, world.memory, world.rules, clock, "en", closely=False)
-    assert looked.keys() == {"since", "next"}
+    assert looked.keys() == {"since", "next", "target"}
     assert document(world).keys() >= {"since", "next", "limits", "forecast"}
 
 
