@@ -29,4 +29,13 @@ TEXTS: Mapping[str, str] = {
     "limit_temperature": "no current outside {low:g} … {high:g} °C, {place}",
     "limit_ah": "a charge of more than {most:.3g} Ah is a fault, {place}",
     "limit_h": "a charge of more than {most:.3g} h is a fault, {place}",
+    # what a supply leaves
+    "supply_full": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are promised{at}",
+    "supply_turn": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are promised{at}; waits for {other}, in turn at {turn_at}",
+    "supply_line": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are promised{at}; waits in line for a place",
+    "supply_never": "supply {supply} has {limit_w:,.0f} W{at}, too little for the lowest step: that needs {need_w:,.0f} W",
+    "supply_unproved": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are still counted{at}; waits until less is seen at {others:and}",
+    "supply_raise": "supply {supply} has room; the next step comes at {raise_at}",
+    "supply_not_in_hand": "its charger is not in hand, so it counts with {counts_w:,.0f} W in supply {supply} until its standby is seen",
+    "supply_unknown_bays": "counted with their highest steps, their chargers not being in hand: {bays}",
 }
