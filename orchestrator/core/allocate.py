@@ -17,7 +17,7 @@ from orchestrator.core.order import class_of, keeps_its_place, place_in_line, ra
 from orchestrator.core.supply import Grant, Held, Supplies, Want
 from orchestrator.core.why import Round, why
 
-__all__ = ["allocate"]
+__all__ = ["allocate", "moved"]
 
 
 def allocate(supplies: Supplies, wants: Sequence[Want], held: Sequence[Held], now_s: float) -> tuple[Grant, ...]:
@@ -26,22 +26,32 @@ def allocate(supplies: Supplies, wants: Sequence[Want], held: Sequence[Held], no
     used, after = ledger.used_w(supplies, held), list(held)
     refused: list[int | None] = [None] * len(held)
     for bay in plan.order:  # whoever comes first in the plan gets the room first
-        one, level = _placed(held[bay], wants[bay], plan.levels[bay], now_s), plan.levels[bay]
-        if level < one.granted:
-            one = ledger.lowered(one, level, now_s)
-        elif level > one.granted:
-            one = one if one.room_s is not None else replace(one, room_s=now_s)
-            path, more_w = supplies.paths[bay], ledger.more_w(supplies.loads[bay].draw_w, one.counted, one.granted + 1)
-            refused[bay] = ledger.no_room(used, supplies.limits_w, path, more_w)
-            if refused[bay] is None and now_s >= raises_at_s(one):
-                one = ledger.raised(one, one.granted + 1, now_s)
-                ledger.add(used, path, more_w)
-        elif one.room_s is not None:
-            one = replace(one, room_s=None)
-        after[bay] = one
+        level = plan.levels[bay]
+        placed = _placed(held[bay], wants[bay], level, now_s)
+        after[bay], refused[bay] = moved(supplies, used, bay, placed, level, now_s)
     now = Round(supplies, wants, after, plan.levels, plan.bound, refused, used, now_s)
     causes = {bay: why(now, bay) for bay in plan.order}
     return tuple(Grant(one.granted, causes[bay], one) for bay, one in enumerate(after))
+
+
+def moved(
+    supplies: Supplies, used: list[int], bay: int, held: Held, level: int, now_s: float
+) -> tuple[Held, int | None]:
+    """What a bay has after one move towards this level, and the supply that has no room for it yet.
+
+    This alone raises a grant, and counts it in `used` at once.
+    """
+    if level < held.granted:
+        return ledger.lowered(held, level, now_s), None
+    if level == held.granted:
+        return (held if held.room_s is None else replace(held, room_s=None)), None
+    one = held if held.room_s is not None else replace(held, room_s=now_s)
+    path, more_w = supplies.paths[bay], ledger.more_w(supplies.loads[bay].draw_w, one.counted, one.granted + 1)
+    refused = ledger.no_room(used, supplies.limits_w, path, more_w)
+    if refused is not None or now_s < raises_at_s(one):
+        return one, refused
+    ledger.add(used, path, more_w)
+    return ledger.raised(one, one.granted + 1, now_s), None
 
 
 def _placed(held: Held, want: Want, level: int, now_s: float) -> Held:

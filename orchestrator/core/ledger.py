@@ -49,11 +49,13 @@ def used_w(supplies: Supplies, held: Sequence[Held]) -> list[int]:
 
 
 def no_room(used: Sequence[int], limits_w: Sequence[int], path: Sequence[int], more_w: int) -> int | None:
-    """The first supply on the path in which so much more does not fit; None if it fits in all. Nothing always fits."""
-    if more_w > 0:
-        for number in path:
-            if used[number] + more_w > limits_w[number]:
-                return number
+    """The first supply on the path in which so much more does not fit; None if it fits in all.
+
+    Above its limit a supply has no room even for what counts already: that may be more than what really flows.
+    """
+    for number in path:
+        if used[number] + more_w > limits_w[number]:
+            return number
     return None
 
 

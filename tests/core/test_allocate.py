@@ -107,7 +107,8 @@ def test_room_is_what_is_left_up_to_the_last_watt() -> None:
     assert ledger.no_room([900, 300], [1000, 400], (1, 0), 100) is None
     assert ledger.no_room([900, 300], [1000, 400], (1, 0), 101) == 1
     assert ledger.no_room([901, 300], [1000, 400], (1, 0), 100) == 0
-    assert ledger.no_room([2000], [1000], (0,), 0) is None
+    assert ledger.no_room([1000], [1000], (0,), 0) is None
+    assert ledger.no_room([1001], [1000], (0,), 0) == 0
     assert ledger.more_w(DRAW_W, 2, 3) == 100
     assert ledger.more_w(DRAW_W, 4, 3) == 0
 
@@ -154,6 +155,13 @@ def test_a_charger_not_in_hand_counts_with_its_highest_step_and_the_others_go_do
 
 def test_a_level_that_still_counts_may_be_granted_again_without_more_room() -> None:
     assert levels(site(2, 600), (FULL, Want()), (has(2, 5, room_s=NOW_S - RAISE_HOLD_S), has(0))) == [3, 0]
+
+
+def test_a_level_that_counts_for_want_of_knowledge_is_no_room() -> None:
+    """A late status says that the first one runs: it counts, and must not be told to run for that reason."""
+    counts = ledger.observed(replace(READY, lowered_s=NOW_S), 5, ledger.Seen(1, NOW_S - 1))
+    assert levels(site(2, 190), (FULL, Want()), (counts, has(0, 1))) == [0, 0]
+    assert levels(site(2, 200), (FULL, Want()), (counts, has(0, 1))) == [1, 0]
 
 
 # --- who gets it ------------------------------------------------------------------------------------------------------
