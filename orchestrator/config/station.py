@@ -27,7 +27,11 @@ class Language(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChargerConfig:
-    """One charger on one serial port (its address is always 0x90)."""
+    """One charger on one serial port (its address is always 0x90).
+
+    Its documents give neither `efficiency` nor `idle_w`. The defaults are on the safe side of what a large charger may
+    have by California's appliance efficiency rules (Title 20): 0.89 or better, and 10 W without a battery.
+    """
 
     port: str = key("the serial port, best a stable name below /dev/serial/by-path", is_path=True)
     control: ControlMode = key("manual (rotary switch on 1) or automatic (2 … 5: only stop and resume)")
@@ -39,6 +43,14 @@ class ChargerConfig:
         unit="%", ge=0, le=20, default=0.0,
     )  # fmt: skip
     rs485: Rs485 = key("off, or kernel for a driver that switches the direction", default=Rs485.OFF)
+    draw_w: tuple[float, ...] | None = key(
+        "what the charger draws from the mains at most on each of its steps, lowest first; left out: computed",
+        unit="W", gt=0, default=None,
+    )  # fmt: skip
+    efficiency: float = key(
+        "to compute draw_w: the share of it that reaches the battery, at worst", ge=0.5, le=1, default=0.8
+    )
+    idle_w: float = key("what the charger draws in standby, and for itself on each step", unit="W", ge=0, default=30.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,6 +127,17 @@ class JournalConfig:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SupplyConfig:
+    """A fuse or feed that bays share. What they may draw together, at worst, never exceeds its limit."""
+
+    limit_w: float = key(
+        "the most that may be drawn; of a fuse: volts × amperes × the chargers' power factor", unit="W", gt=0
+    )
+    within: str | None = key("the supply that feeds this one; null: none", default=None)
+    bays: tuple[str, ...] = key("the bays on it; those of a supply within it count anyway", default=())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Station:
     """One station file."""
 
@@ -130,6 +153,9 @@ class Station:
         default=3.0,
     )
     language: Language = key("what status, log, journal and answers are written in: en or ko", default=Language.EN)
+    supplies: Mapping[str, SupplyConfig] | None = key(
+        "what the bays are fed from, by name; null: each takes what its policy allows", default=None
+    )
     control: Control = key("the control socket")
     journal: JournalConfig = key("the journal")
     source: Source = field(default=Source("<station>"), compare=False)

@@ -11,6 +11,7 @@ from orchestrator.config.can_rules import bus_problems, filter_problems, shared_
 from orchestrator.config.names import name_problem
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems, Rule, problems
+from orchestrator.config.supply_rules import supply_problems
 from orchestrator.config.yaml.scalars import did_you_mean
 from orchestrator.keys import Range
 from orchestrator.protocol.objects import ObjectMap
@@ -30,6 +31,7 @@ def station_problems(values: Values) -> Problems:
             yield f"{path}.{at}", text
     if len(bays) > MAX_BAYS:
         yield "bays", f"{len(bays)} bays; one gateway serves at most {MAX_BAYS}"
+    yield from supply_problems(values, [str(name) for bay in bays.values() if (name := bay.get("name")) is not None])
     for name, identity, text in _UNIQUE:
         yield from _unique(bays, name, identity, text)
     if isinstance(buses := values.get("can"), Mapping):
@@ -160,6 +162,18 @@ def _tolerance(steps_a: tuple[float, ...], tolerance_pct: float, current_a: floa
         )
 
 
+def _draw(draw_w: tuple[float, ...], idle_w: float) -> Problems:
+    """What a charger draws on its steps, below the key `charger`."""
+    if len(draw_w) != STEPS:
+        yield "charger.draw_w", f"{len(draw_w)} values; the charger has {STEPS} current-limit steps, lowest first"
+    if draw_w[0] < idle_w:
+        yield "charger.draw_w[0]", f"{draw_w[0]:g} W are less than it draws in standby, {idle_w:g} W (idle_w)"
+    for number, (lower, upper) in enumerate(pairwise(draw_w), start=1):
+        if upper < lower:
+            yield f"charger.draw_w[{number}]", f"{upper:g} W are less than on the step before, {lower:g} W"
+            return
+
+
 def _voltage(policy: Policy, voltage_v: float) -> Problems:
     if policy.pack.voltage_v.high > voltage_v:
         yield (
@@ -191,6 +205,7 @@ def _tpdos(object_map: ObjectMap, _tpdo_s: float) -> Problems:
 _BAY_RULES: tuple[Rule, ...] = (
     Rule(_bay_name, ("name",)),
     Rule(step_problems, ("charger.steps_a",)),
+    Rule(_draw, ("charger.draw_w", "charger.idle_w")),
     Rule(lowest_step_problems, ("charger.steps_a", "limits.current_a")),
     Rule(_tolerance, ("charger.steps_a", "charger.tolerance_pct", "limits.current_a")),
     Rule(_voltage, ("policy", "limits.voltage_v")),

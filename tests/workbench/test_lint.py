@@ -12,7 +12,9 @@ from orchestrator.workbench.prove.lint import LINT
 ODD = Path(__file__).parent / "odd"
 
 
-@pytest.mark.parametrize("name", ["policy", "quick", "narrow", "cells", "physics", "station", "wiring", "places"])
+@pytest.mark.parametrize(
+    "name", ["policy", "quick", "narrow", "cells", "physics", "station", "wiring", "places", "supplies"]
+)
 def test_each_is_told_at_its_key(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -34,6 +36,7 @@ def test_the_files_have_every_warning() -> None:
         "honest instruments",
         "are few for nmc", "is no deep discharge", "refuses packs that are not empty", "% everywhere", "V everywhere",
         "none of CANopen's", "after the next plug", "placeholder", "example's steps", "no BMU has the id",
+        "in no supply", "no charge ever begins", "they share these", "no bay is on it",
         "V is wider", "A is wider", "°C is wider", "switch the line's direction", "there is no",
     ):  # fmt: skip
         assert words in said, words

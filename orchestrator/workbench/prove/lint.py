@@ -16,6 +16,7 @@ from orchestrator.keys import Range, Source
 from orchestrator.workbench.baylint import bay_lint
 from orchestrator.workbench.disklint import disk_lint
 from orchestrator.workbench.prove.physics import physics_lint
+from orchestrator.workbench.supplylint import supply_lint
 from orchestrator.workbench.wiringlint import wiring_lint
 
 Rows = tuple[Band, ...]
@@ -172,8 +173,8 @@ def policy_lint(values: Mapping[str, object], _written: Source) -> Problems:
 
 
 def station_lint(values: Mapping[str, object], written: Source) -> Problems:
-    """Probably unintended entries of a station: its policies at its chargers, its wiring, its places on the disk."""
-    for lint in (bay_lint, wiring_lint, disk_lint):
+    """Probably unintended entries of a station: policies at its chargers, wiring, supplies, places on the disk."""
+    for lint in (bay_lint, wiring_lint, supply_lint, disk_lint):
         yield from lint(values, written)
 
 
