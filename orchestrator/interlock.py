@@ -38,6 +38,7 @@ class Grant:
     temperature_c: float  #: of the pack
     current_step: int | None  #: the current step that the charger last reported
     kept: bool = True  #: the disk records that this charger may be running, so a restart would know
+    level: int | None = None  #: what the bay's supply grants: 0 none, 1 the lowest step …; None: it has no supply
 
 
 def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
@@ -56,7 +57,8 @@ def grant(snapshot: Snapshot, now_s: float) -> Grant | None:
         return None
     expires_s = min(end_s for _, end_s in lifetimes)
     highest_v = max(charger.voltage_v, volts.value)
-    return Grant(expires_s, highest_v, temperature.value, charger.current_step, kept=snapshot.running_persisted)
+    kept, level = snapshot.running_persisted, snapshot.granted
+    return Grant(expires_s, highest_v, temperature.value, charger.current_step, kept, level)
 
 
 def permit(command: Command, grant: Grant | None, now_s: float, charger: ChargerConfig, limits: Limits) -> Cause | None:
@@ -80,10 +82,11 @@ def permit(command: Command, grant: Grant | None, now_s: float, charger: Charger
     if grant.temperature_c not in limits.temperature_c:
         low_c, high_c = limits.temperature_c.low, limits.temperature_c.high
         return _beyond("outside_station_c", action, pack_c=grant.temperature_c, low_c=low_c, high_c=high_c)
-    if action is Action.SET_LIMIT:
-        return _too_much(action, value, charger, limits)
-    if action is Action.RUN:
-        return _too_much(action, grant.current_step, charger, limits)
+    step = {Action.SET_LIMIT: value, Action.RUN: grant.current_step}.get(action)
+    if action in (Action.SET_LIMIT, Action.RUN) and (problem := _too_much(action, step, charger, limits)) is not None:
+        return problem
+    if grant.level is not None and (step or 0) >= grant.level:
+        return Cause.of("above_supply", command=action.value, step=(step or 0) + 1, granted=grant.level)
     return None
 
 

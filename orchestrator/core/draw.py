@@ -4,17 +4,21 @@ from collections.abc import Mapping
 from math import ceil, floor
 
 from orchestrator.config.amperes import DIGITS
+from orchestrator.config.policy import Thresholds
 from orchestrator.config.station import BayConfig, Station, SupplyConfig
 from orchestrator.core.rules import OVER_CURRENT_OFFSET_A
 from orchestrator.core.supply import Load, Supplies, Supply
 from orchestrator.model import ControlMode
 
+#: Of each threshold the loosest value that a policy may have.
+LOOSEST = Thresholds()
+
 
 def draw_w(bay: BayConfig) -> tuple[int, ...]:
     """What the bay's charger may draw in standby and on each level.
 
-    What its policy's over-current fault does not yet stop may flow, at the highest voltage that the station permits. A
-    charger that follows its own program has one level, its highest step.
+    What no policy's over-current fault need stop yet may flow, at the highest voltage that the station permits: another
+    policy can come into force at any time. A charger that follows its own program has one level, its highest step.
     """
     charger = bay.charger
     stated = charger.draw_w if charger.draw_w is not None else tuple(_computed_w(bay, amps) for amps in charger.steps_a)
@@ -24,7 +28,7 @@ def draw_w(bay: BayConfig) -> tuple[int, ...]:
 
 def _computed_w(bay: BayConfig, step_a: float) -> float:
     charger = bay.charger
-    worst_a = step_a * (1 + charger.tolerance_pct / 100) * bay.policy.faults.over_current_pct / 100
+    worst_a = step_a * (1 + charger.tolerance_pct / 100) * LOOSEST.over_current_pct / 100
     return bay.limits.voltage_v * (worst_a + OVER_CURRENT_OFFSET_A) / charger.efficiency + charger.idle_w
 
 

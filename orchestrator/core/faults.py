@@ -194,6 +194,7 @@ FAULTS: tuple[FaultRow, ...] = (
     FaultRow("overrun", "G6", E.STOP, Clear.BACKOFF, ourselves.overrun, AT_WORK, moment=True),
     FaultRow("suspended", "G7", E.STOP, Clear.BACKOFF, ourselves.suspended, AT_WORK, moment=True),
     FaultRow("not_persisted", "G8, P9", E.NO_START, Clear.AUTO, ourselves.not_persisted, ALWAYS, clean_s=10),
+    FaultRow("supply_failed", "G11", E.WARN, Clear.AUTO, ourselves.supply_failed, ALWAYS, clean_s=10),
     # Last, because it reports rows above that could not be judged.
     FaultRow("internal", "G5, P11", E.TRIP, Clear.RESET, ourselves.internal, ALWAYS),
 )  # fmt: skip

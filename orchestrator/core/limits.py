@@ -50,6 +50,15 @@ def lowest(f: Facts, worst: ActiveFault | None = None) -> Bound:
     return least
 
 
+def supplied(f: Facts, bound: Bound) -> Bound:
+    """What the bay's supply grants, if that is less."""
+    level, why, worst_a = f.snapshot.granted, f.snapshot.granted_why, f.rules.worst_a
+    if level is None or why is None or level >= len(worst_a):
+        return bound
+    granted = Bound(worst_a[level - 1] if level else 0.0, why.key)
+    return granted if granted.allowed_a < bound.allowed_a else bound
+
+
 def none_allowed(f: Facts) -> Cause | None:
     """Why not even the lowest step is allowed; None if it is. Unknown values are handled by another rule."""
     bound = lowest(f)
@@ -63,8 +72,8 @@ def none_allowed(f: Facts) -> Cause | None:
 
 def choose(f: Facts, worst: ActiveFault | None) -> tuple[CurrentStep, float | None]:
     """The step for now, and since when a higher one has been allowed (None: none is)."""
-    bound = lowest(f, worst)
-    index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # if none is allowed, a fault has ended the charge
+    bound = supplied(f, lowest(f, worst))
+    index = highest_step(bound.allowed_a, f.rules.worst_a) or 0  # if none is allowed, the charge has been ended
     top = index == len(f.rules.steps_a) - 1
     before, raise_s = f.memory.stage.step, f.memory.stage.raise_s
     if before is not None and index == before.index and before.key == ("" if top else bound.key):
@@ -93,6 +102,9 @@ WORDS = {"temperature_c": "temperature", "soc_pct": "soc", "soh_pct": "soh", "vo
 
 def limit(f: Facts, bound: Bound) -> Cause:
     """What limits the current: the row or key, with the evidence and its place in the file."""
+    why = f.snapshot.granted_why
+    if why is not None and bound.key == why.key:
+        return why
     id_, params = _what(f, bound)
     return Cause(id_, params, bound.key, _place(f, bound.key))
 

@@ -14,7 +14,7 @@ from orchestrator.core.history import session as sessions
 from orchestrator.core.machine import Trigger
 from orchestrator.core.operator import RESET, over, pause
 from orchestrator.core.outofcontrol import out_of_control
-from orchestrator.core.resting import absent, ending, held, offline, resting_place
+from orchestrator.core.resting import absent, ending, held, offline, resting_place, unsupplied
 from orchestrator.core.safestop import LOST_S, gives_up, verified
 from orchestrator.core.states import ENERGISED, SETTLED, STARTABLE
 from orchestrator.core.witnesses.standby import current_without_order
@@ -62,6 +62,8 @@ def _energised(f: Facts, faults: Faults) -> Next:
     asked = f.memory.operator.hold or ending(f) or pause(f.memory.operator)
     if asked is not None:
         return Next(Trigger.STOP, asked)
+    if (waits := unsupplied(f)) is not None:
+        return Next(Trigger.STOP, waits[1])
     if f.memory.state is State.CHARGING:
         full = finished(f)
         if full is not None:

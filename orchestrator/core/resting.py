@@ -109,6 +109,14 @@ def _barred(f: Facts, faults: Faults) -> Found:
     return Trigger.SUSPEND, worst.told
 
 
+def unsupplied(f: Facts, _faults: Faults = ()) -> Found:
+    """Where a bay belongs that is granted no level."""
+    why = f.snapshot.granted_why
+    if f.snapshot.granted != 0 or why is None:
+        return None
+    return Trigger.SUSPEND, Cause.of("waits_for_supply", key=why.key, place=why.place, what=why)
+
+
 def _remains(f: Facts, _faults: Faults) -> Found:
     wanted, why = _wanted(f)
     return (Trigger.QUALIFY if wanted else Trigger.REST), why
@@ -125,6 +133,7 @@ PLACES: tuple[Callable[[Facts, Faults], Found], ...] = (
     absent,  # nothing below can be judged without a battery
     _charged,  # a battery that wants nothing waits for nothing, faults or not
     _barred,  # it goes on by itself once nothing prevents a charge
+    unsupplied,  # a fault that prevents a charge matters more: it may be waiting for a person
     _remains,  # what the battery wants
 )
 

@@ -74,7 +74,8 @@ def _not_in_hand(now: Round, bay: int) -> Cause | None:
     if now.held[bay].known:
         return None
     load = now.supplies.loads[bay]
-    return Cause.of("supply_not_in_hand", supply=load.supply, counts_w=load.draw_w[now.held[bay].counted])
+    counts_w, key = load.draw_w[now.held[bay].counted], f"supplies.{load.supply}.limit_w"
+    return Cause.of("supply_not_in_hand", key=key, supply=load.supply, counts_w=counts_w)
 
 
 def _never(now: Round, bay: int) -> Cause | None:
@@ -109,7 +110,8 @@ def _hold(now: Round, bay: int) -> Cause | None:
     """There is room: it goes up when that has lasted."""
     if now.held[bay].granted >= now.levels[bay]:
         return None
-    return Cause.of("supply_raise", supply=now.supplies.loads[bay].supply, raise_t_s=raises_at_s(now.held[bay]))
+    supply, raise_t_s = now.supplies.loads[bay].supply, raises_at_s(now.held[bay])
+    return Cause.of("supply_raise", key=f"supplies.{supply}.limit_w", supply=supply, raise_t_s=raise_t_s)
 
 
 def _full(now: Round, bay: int) -> Cause | None:

@@ -44,6 +44,11 @@ class Snapshot:
     running_persisted: bool = True  #: the disk records that this bay's charger may be running
     asked_by: Cause | None = None  #: who made the request, when and why, as the cause that it becomes
     target_pct: float | None = None  #: to which SOC a requested start shall charge once; None: by the policy
+    granted: int | None = (
+        None  #: the level that the bay's supply grants: 0 none, 1 the lowest step …; None: no supply …
+    )
+    granted_why: Cause | None = None  #: … what binds that; always said where a level is
+    supply_problem: Cause | None = None  #: why the supplies cannot be divided
 
 
 class State(StrEnum):

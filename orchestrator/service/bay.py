@@ -30,6 +30,7 @@ from orchestrator.service.start_timer import StartTimer
 from orchestrator.service.starts import Starts
 from orchestrator.service.status import bay_status, contactor_fields, told
 from orchestrator.service.store import Store
+from orchestrator.service.supply import Feed
 from orchestrator.service.wallclock import WallClock
 
 
@@ -47,6 +48,7 @@ class BayRunner:
         *,
         contactor: Contactor | None = None,
         starts: Starts | None = None,
+        feed: Feed | None = None,
         record: BayRecord | None = None,
         snapshots: bool = True,
         language: str = "en",
@@ -67,9 +69,8 @@ class BayRunner:
         self._asleep_s, self._closely = 0.0, True  # the BMU is read closely until the first decision
         self._charger, self._battery = charger, battery
         self._journal = BayJournal(bay, journal, language, snapshots=snapshots)
-        self._contactor, self._record = contactor, record
-        self._starts = starts or Starts(0.0, "")  # no other bay to wait for
-        self._snapshot = Snapshot()
+        self._contactor, self._record, self._feed = contactor, record, feed or Feed()
+        self._starts, self._snapshot = starts or Starts(0.0, ""), Snapshot()  # no other bay to wait for
         self._requests, self._taken, self._internal = Requests(), Taken(), ""
 
     @property
@@ -170,6 +171,7 @@ class BayRunner:
         memory = self._memory or self._store.past(self.place).memory(now_s)
         decision, self._memory = decide(now_s, snapshot, memory, self.policy.rules)
         self._charger.command(decision.command, grant(snapshot, now_s) if decision.command else None)
+        self._feed.decided(now_s, snapshot, self._memory, decision, self.policy.rules)
         self._drive(now_s, closed=decision.closed)
         self._starts.follow(self.name, now_s, self._memory, snapshot)
         # In a quiet state no current flows and none is about to: what a BMU reports changes slowly.
@@ -209,8 +211,8 @@ class BayRunner:
             target_pct=self._taken.target_pct,
         )  # fmt: skip
         if (fitted := self._contactor) is not None:
-            return replace(snapshot, connected=fitted.connects(reading), contactor_problem=fitted.problem)
-        return snapshot
+            snapshot = replace(snapshot, connected=fitted.connects(reading), contactor_problem=fitted.problem)
+        return self._feed.into(snapshot)
 
     def _drive(self, now_s: float, *, closed: bool) -> None:
         """Drive the contactor, if any, as decided: after the command, so that a stop goes first."""
@@ -219,14 +221,12 @@ class BayRunner:
             self._journal.contactor(self._contactor)
 
     def _take_over(self) -> None:
-        bay = self.policy.take_over()
-        if bay is not None:
+        if (bay := self.policy.take_over()) is not None:
             self._journal.begin(bay)
             self._say(Cause.of("policy_in_force", bay=self.name, policy=name_of(bay)))
 
     def _keep(self, memory: Memory, now_s: float) -> None:
-        persisted = self.identified.kept(Persisted.of(memory, now_s))
-        persisted = self._timer.kept(persisted)
+        persisted = self._timer.kept(self.identified.kept(Persisted.of(memory, now_s)))
         if self._waits and not persisted.hold:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)
@@ -236,14 +236,14 @@ class BayRunner:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
         decision = told(self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER), *known)
-        contactor = self._contactor
         return {
             **bay_status(self.name, self._snapshot, decision, clock.now_s, clock.wall_s, self._language),
             **outlook(decision, *known, clock, self._language, closely=closely),
             **self._timer.next(decision, clock),
+            **self._feed.status(clock, self._language),
             "identity": self.identified.status(),
             "timed_start": self._timer.status(clock),
-            "contactor": contactor and contactor_fields(contactor, self._language),
+            "contactor": self._contactor and contactor_fields(self._contactor, self._language),
             "port": self.place.port,
             "bmu": {"can": self.place.can, "node_id": self.place.node_id},
             "policy": self.policy.status(),

@@ -20,6 +20,7 @@ from orchestrator.service.request_log import RequestLog
 from orchestrator.service.status import station_status
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.service.strays import Strays
+from orchestrator.service.supply import Feeds
 from orchestrator.service.terms import START_WITH, Terms
 from orchestrator.text.catalogue import say
 
@@ -47,10 +48,12 @@ class RequestHandler:
         clock: Callable[[], float],
         wall: Callable[[], float],
         wake: Callable[[int], None],
+        feeds: Feeds,
     ) -> None:
         self._station, self._bays, self._language = station, bays, station.language.value
         self._journal, self._store, self._strays, self._reload = journal, store, strays, reload
         self._clock, self._wall, self._wake = clock, wall, wake
+        self._feeds = feeds
         self._log = RequestLog(journal, clock, self._language)
         user_name(os.getuid())  # the only one who is let in, besides root
 
@@ -64,7 +67,8 @@ class RequestHandler:
             problem, not_persisted = self._journal.problem(now_s), self._store.not_persisted(now_s)
             alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
             strays = self._strays.status(self._language)
-            return station_status(self._station, alarm, shown, problem, not_persisted, strays)
+            document = station_status(self._station, alarm, shown, problem, not_persisted, strays)
+            return {**document, **self._feeds.status(self._language)}
         if verb == RELOAD:
             return self._reread(Asker.of(request, self._wall()))
         if isinstance(verb, str) and verb in {*Request, START_WITH}:

@@ -35,6 +35,7 @@ from orchestrator.service.request_handler import RequestHandler
 from orchestrator.service.starts import Starts
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
+from orchestrator.service.supply import Feeds
 from orchestrator.service.wiring import can_buses, open_contactor, recorder, stray_port
 from orchestrator.text.catalogue import say
 
@@ -58,8 +59,7 @@ class Supervisor:
 
     def __init__(self, station: Station, guardian: GuardianLink, ports: ChargerPorts) -> None:
         self._station, self._language = station, station.language.value
-        self._guardian = guardian
-        self._beat_s = 0.0
+        self._guardian, self._beat_s = guardian, 0.0
         self._lost: Cause | None = None  # why the guardian cannot be relied on any more
         self._unable: Cause | None = None  # why it could not begin
         self._ports, self._wake = ports.all, ports.news
@@ -72,24 +72,22 @@ class Supervisor:
         self._recorder = recorder(kept, boot, self._say)
         self._bays: list[BayRunner] = []
         self._build(ports)
-        self._strays = Strays(
-            self._store, partial(stray_port, self._guardian, partial(self._wake.put, None)), self._say
-        )
-        self._reload = Reload(station, self._bays, self._say)
-        self._reload_asked = False
+        stray = partial(stray_port, self._guardian, partial(self._wake.put, None))
+        self._strays = Strays(self._store, stray, self._say)
+        self._reload, self._reload_asked = Reload(station, self._bays, self._say), False
         self._handler = RequestHandler(
-            station, self._bays, self._journal, self._store, self._strays, self._reload, monotonic, time, self._wake.put
-        )
-        self._control = ControlSocket(
-            station.control.socket, self._handler.answer, monotonic, self._say, self._language, self._handler.refused
-        )
+            station, self._bays, self._journal, self._store, self._strays, self._reload, monotonic, time,
+            self._wake.put, self._feeds,
+        )  # fmt: skip
+        answer, refused = self._handler.answer, self._handler.refused
+        self._control = ControlSocket(station.control.socket, answer, monotonic, self._say, self._language, refused)
 
     def _build(self, ports: ChargerPorts) -> None:
         """Create the devices for every bay; nothing is opened yet."""
         nodes: dict[str, list[BatteryNode]] = {name: [] for name in self._station.can}
         buses = can_buses(self._station)
         budgets = {name: BusBudget(bus.bitrate) for name, bus in buses.items()}
-        alone = len(self._station.bays) == 1
+        alone, self._feeds = len(self._station.bays) == 1, Feeds.of(self._station, self._say)
         starts = Starts(0.0 if alone else self._station.stagger_s, self._station.source.at("stagger_s"))
         for number, (bay, port) in enumerate(zip(self._station.bays, self._ports, strict=True)):
             poke: Callable[[], None] = partial(self._changed, number)
@@ -99,7 +97,7 @@ class Supervisor:
             runner = BayRunner(
                 bay, port, node, self._journal, self._store, self._say,
                 contactor=contactor, starts=starts, snapshots=snapshots, language=self._language,
-                record=BayRecord(self._recorder, self._station.station, bay),
+                feed=self._feeds.feeds[number], record=BayRecord(self._recorder, self._station.station, bay),
             )  # fmt: skip
             self._bays.append(runner)
         ports.changed = self._changed
@@ -186,6 +184,8 @@ class Supervisor:
             if bay.is_due(now_s):
                 self._run(bay)
                 self._decide(self._news())
+        for number in self._feeds.turn(now_s):
+            self._run(self._bays[number])
         if now_s - self._beat_s >= BEAT_S:
             self._strays.look(now_s)
             self._beat(now_s)
@@ -238,8 +238,8 @@ class Supervisor:
         not_persisted = self._store.close(KEEP_S)
         for bay in self._bays:
             bay.answer()
-        ports = (*self._ports, *self._strays.ports)
-        close_all([*(port.close for port in ports), *(bus.close for bus in self._buses)], CLOSE_S)
+        devices: tuple[ChargerPort | BatteryBus, ...] = (*self._ports, *self._strays.ports, *self._buses)
+        close_all([one.close for one in devices], CLOSE_S)
         verdicts = [Cause.of("not_verified", chargers=tuple(unverified))] if unverified else []
         verdicts += [Cause.of("not_written", problem=not_persisted)] if not_persisted is not None else []
         self._say(Cause.of("ended", verdicts=tuple(verdicts)) if verdicts else Cause("ended_well"))

@@ -490,4 +490,6 @@ SCENES: tuple[Scene, ...] = (
     Scene("not_persisted", world_has(ours={"not_persisted": cause("kept.json: No space left")}), world_has(ours={}),
           ("No space left",),
           S.CHARGING),
+    Scene("supply_failed", world_has(ours={"supply_problem": cause("KeyError('hall')")}),
+          world_has(ours={}), ("KeyError('hall')",), S.CHARGING),
 )  # fmt: skip

@@ -220,7 +220,9 @@ def test_up_after_a_hold_and_one_step_a_minute() -> None:
         if grant.level > held[0].granted:
             raises.append(second)
         if second == 0:
-            assert grant.cause == Cause("supply_raise", (("supply", "hall"), ("raise_t_s", NOW_S + RAISE_HOLD_S)))
+            assert grant.cause == Cause(
+                "supply_raise", (("supply", "hall"), ("raise_t_s", NOW_S + RAISE_HOLD_S)), "supplies.hall.limit_w"
+            )
         held = [ledger.observed(grant.held, 5, ledger.Seen(grant.level, t_s + 0.5))]
     assert raises == [10 + 60 * n for n in range(5)]
     assert RAISE_EVERY_S == 60

@@ -98,6 +98,7 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("G9", "two services", "`service/rivals.py` (lock of the port), `service/socketfile.py` (socket), "
           "`service/store.py` (state): the second ends; a port lost to one later, `core/shared.py`: HELD"),
     Entry("G10", "power lost in mid-charge", "`core/persisted.py`: an interrupted charge is not resumed"),
+    Entry("G11", "division of the supplies fails", "`service/supply.py`: bays keep what is verified, nothing rises"),
     Entry("P1", "bad policy", "`config/`: refused with every error's line; `run` does not start"),
     Entry("P2", "policy changed while charging", "reread on `reload` or SIGHUP, adopted by a bay in standby"),
     Entry("P3", "policy of another battery or charger", "`config/station_rules.py`: station and policy must agree"),

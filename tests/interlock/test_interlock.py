@@ -58,6 +58,28 @@ def passing(
 # --- permit ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("level", range(6))
+def test_no_step_passes_above_what_the_supply_grants(level: int) -> None:
+    lower = {command for command in SETS if command.action is not Action.SET_LIMIT or command.value < level}
+    runs = {RUN} if level > 2 else set()  # the charger last reported step 3
+    expected = STOPS | ({RESUME} | lower | runs if level else set())
+    assert passing(replace(GOOD, level=level)) == expected
+    assert passing(replace(GOOD, level=level), AUTOMATIC) == STOPS | ({RESUME} if level else set())
+
+
+def test_what_is_above_the_supply_is_told() -> None:
+    refused = permit(Command(Action.SET_LIMIT, 2), replace(GOOD, level=2), NOW_S, MANUAL, LIMITS)
+    assert say(refused) == "set_limit: step 3 is above what the supply grants, 2"
+    assert permit(RUN, replace(GOOD, current_step=None, level=5), NOW_S, MANUAL, LIMITS) is not None
+
+
+def test_the_level_of_a_grant_is_the_snapshots() -> None:
+    for level in (None, 0, 3):
+        found = grant(replace(FRESH, granted=level), NOW_S)
+        assert found is not None
+        assert found.level == level
+
+
 def test_in_manual_mode_only_the_listed_orders_pass() -> None:
     assert passing(GOOD) == STOPS | SETS | {RESUME, RUN}
 

@@ -42,6 +42,7 @@ from orchestrator.service import asked as asked_module
 from orchestrator.service import ports as ports_module
 from orchestrator.service import reload as reload_module
 from orchestrator.service import supervisor as supervisor_module
+from orchestrator.service import supply as supply_module
 from orchestrator.service import wiring as wiring_module
 from orchestrator.service.asked import Asked
 from orchestrator.service.bay import BayRunner
@@ -314,6 +315,7 @@ class World:
                 "signal": SIGNALS,
             },
             asked_module: {"Event": event},
+            supply_module: {"monotonic": time.clock},
             reload_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
             charger_module: {"Event": event, "Thread": thread},
             bus_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},

@@ -13,6 +13,7 @@ from orchestrator.service import request_handler
 from orchestrator.service.reception import Answer
 from orchestrator.service.request_handler import RequestHandler
 from orchestrator.service.strays import Strays
+from orchestrator.service.supply import Feeds
 from tests.service.bench import fields_of
 from tests.service.control_bench import listening
 from tests.service.test_reload import Site
@@ -29,7 +30,7 @@ class Asking:
         station = load_station(site.station_file)
         self.handler = RequestHandler(
             station, [bench.bay], bench.journal, bench.store, cast("Strays", None), site.reload,
-            lambda: bench.now_s, lambda: 1.8e9, lambda _: None,
+            lambda: bench.now_s, lambda: 1.8e9, lambda _: None, Feeds.of(station, lambda _: None),
         )  # fmt: skip
 
     def ask(self, request: Mapping[str, object] = ASK) -> dict[str, Any]:

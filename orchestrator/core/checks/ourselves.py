@@ -41,3 +41,8 @@ def suspended(f: Facts) -> Cause | None:
 def not_persisted(f: Facts) -> Cause | None:
     """FAULTS G8: a charge continues, but none begins while a restart would forget its latched faults."""
     return f.snapshot.not_persisted
+
+
+def supply_failed(f: Facts) -> Cause | None:
+    """FAULTS G11: what was granted and verified stays, and nothing more is granted."""
+    return f.snapshot.supply_problem

@@ -89,6 +89,7 @@ ADVICE: Mapping[str, str] = {
     "overrun": "find out what keeps this machine busy",
     "suspended": "a gateway must not be suspended: switch that off in its operating system",
     "not_persisted": "make space, or mend the disk of the journal's directory",
+    "supply_failed": "this is a defect of the software: report it with the journal",
     "internal": "this is a defect of the software: report it with the journal, then reset",
     # once the charger is in standby
     "stands_by_now": "the charger stands by now: have the cause repaired, then reset",

@@ -84,6 +84,7 @@ TEXTS: Mapping[str, str] = {
     "waits_for_contactor": "waiting for the contactor, behind which charger and battery cannot be compared",
     "waits_for_turn": "waits for its turn: {other} begins its charge",
     "waits_for_stagger": "waits for its turn: charges of this station begin {stagger_s:g} s apart{at}",
+    "waits_for_supply": "granted no step yet: {what}",
     # requests
     "operator_stop": "stopped by the operator",
     "operator_pause": "paused by the operator",

@@ -123,6 +123,7 @@ TEXTS: Mapping[str, str] = {
     "late": "this bay was looked at {late_s:.2f} s late",
     "overrun": "nobody looked at this bay for {late_s:.1f} s: the machine stood still",
     "suspended": "the machine was suspended for {slept_s:.0f} s: nothing that is known of this bay {holds|held} any more",
+    "supply_failed": "the supplies cannot be divided, so nothing more is granted: {error}",
     "internal": "{whats}",
     "internal_error": "{error}",
     "not_judged": "{fault} {cannot|could not} be judged: {error}",

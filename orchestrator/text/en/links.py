@@ -49,6 +49,7 @@ TEXTS: Mapping[str, str] = {
     "outside_station_c": "{command:word}: {pack_c:g} °C is outside the station's {low_c:g} … {high_c:g} °C",
     "step_unknown": "{command:word}: what the charger's current limit {step:d} means is not known",
     "above_station_a": "{command:word}: step {step} is {step_a:g} A, above the station's {limit_a:g} A",
+    "above_supply": "{command:word}: step {step} is above what the supply grants, {granted}",
     # a contactor's GPIO line
     "gpio_missing": "{chip} line {line}: no such GPIO chip: check the name in the station file (gpiodetect lists them)",
     "gpio_forbidden": "{chip} line {line}: permission denied: add the user that runs this to the chip's group (ls -l "

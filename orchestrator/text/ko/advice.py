@@ -89,6 +89,7 @@ ADVICE: Mapping[str, str] = {
     "overrun": "이 컴퓨터를 바쁘게 하는 것을 찾으십시오",
     "suspended": "게이트웨이는 절전 상태가 되면 안 됩니다. 운영체제에서 절전을 끄십시오",
     "not_persisted": "저널 디렉터리가 있는 디스크의 공간을 확보하거나 디스크를 수리하십시오",
+    "supply_failed": "소프트웨어 결함입니다. 저널과 함께 보고하십시오",
     "internal": "소프트웨어 결함입니다. 저널과 함께 신고한 뒤 리셋하십시오",
     # once the charger is in standby
     "stands_by_now": "이제 충전기가 대기 중입니다. 원인을 수리한 뒤 리셋하십시오",

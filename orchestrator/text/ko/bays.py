@@ -84,6 +84,7 @@ TEXTS: Mapping[str, str] = {
     "waits_for_contactor": "접촉기를 기다리고 있습니다. 닫히기 전에는 충전기와 배터리를 비교할 수 없습니다",
     "waits_for_turn": "차례를 기다리고 있습니다: {other}이(가) 충전을 시작하고 있습니다",
     "waits_for_stagger": "차례를 기다리고 있습니다: 이 스테이션의 충전은 {stagger_s:g}초 간격으로 시작합니다{at}",
+    "waits_for_supply": "아직 단계가 배정되지 않았습니다: {what}",
     # requests
     "operator_stop": "작업자가 정지했습니다",
     "operator_pause": "작업자가 일시 정지했습니다",

@@ -117,6 +117,7 @@ TEXTS: Mapping[str, str] = {
     "late": "이 베이의 점검이 {late_s:.2f}초 늦었습니다",
     "overrun": "이 베이가 {late_s:.1f}초 동안 점검되지 않았습니다: 컴퓨터가 멈추어 있었습니다",
     "suspended": "컴퓨터가 {slept_s:.0f}초 동안 절전 상태였습니다: 이 베이에 대해 알던 것은 더 이상 유효하지 {않습니다|않았습니다}",
+    "supply_failed": "전원을 나눌 수 없어 더 이상 배정하지 않습니다: {error}",
     "internal": "{whats}",
     "internal_error": "{error}",
     "not_judged": "{fault} 장애를 판정할 수 {없습니다|없었습니다}: {error}",

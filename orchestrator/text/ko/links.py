@@ -45,6 +45,7 @@ TEXTS: Mapping[str, str] = {
     "outside_station_c": "{command:word}: {pack_c:g} °C는 스테이션의 범위 {low_c:g} … {high_c:g} °C를 벗어납니다",
     "step_unknown": "{command:word}: 충전기의 전류 제한 {step:d}의 의미를 알 수 없습니다",
     "above_station_a": "{command:word}: 단계 {step}은(는) {step_a:g} A로 스테이션의 한계 {limit_a:g} A를 넘습니다",
+    "above_supply": "{command:word}: 단계 {step}은(는) 전원이 배정한 {granted}을(를) 넘습니다",
     # a contactor's GPIO line
     "gpio_missing": "{chip} 라인 {line}: GPIO 칩이 없습니다: 스테이션 파일의 이름을 확인하십시오(gpiodetect로 확인)",
     "gpio_forbidden": "{chip} 라인 {line}: 권한이 없습니다: 실행 사용자를 칩의 그룹(ls -l로 확인)에 추가한 뒤 다시 "
