@@ -2,8 +2,9 @@
 
 Theory of operation. After each decision a bay tells what it would use and what its charger shows (`decided`). `turn`
 divides the supplies and names the bays that must decide at once, because another level is granted to them. A lower
-level is in force once the bay has decided on it: the interlock refuses more from then on, and only a status that was
-requested later proves anything. Until that, and after a start, a charger counts with what it may have been told.
+level is in force once the bay has decided on it: from then on the interlock refuses more, and only two statuses in a
+row that were requested later prove anything. Until that, and after a start, a charger counts with what it may have been
+told.
 
 If the allocation itself fails, every bay keeps what was verified, nothing rises, and each bay has a fault.
 """
@@ -29,6 +30,8 @@ from orchestrator.text.catalogue import fields, say
 EVERY_S = 0.5
 #: A bay that has told nothing for this long is not in hand. It is decided twice a second.
 QUIET_S = 3.0
+#: Readings are timed in whole milliseconds.
+ROUNDED_S = 0.001
 #: The figures of a cause are renewed when one of these moments changes, or with another cause or level.
 MOMENTS = ("turn_t_s", "raise_t_s")
 
@@ -43,6 +46,7 @@ class Feed:
     shown: int | None = None  #: the level that its charger was last verified to be at
     told_s: float = -inf  #: when it last told something
     in_force_s: float = inf  #: since when the interlock holds the present level; inf: it does not yet
+    last: tuple[int, float] | None = None  #: the level and time of the status before, if it was requested since then
     why: Cause | None = None
     problem: Cause | None = None
 
@@ -61,9 +65,17 @@ class Feed:
         if self.shown is None:
             self.held = ledger.observed(self.held, self.load.top, None)
         elif f.reading is not None and f.reading.t_s > self.in_force_s:
-            self.held = ledger.observed(self.held, self.load.top, ledger.Seen(self.shown, f.reading.t_s))
+            self._seen(self.shown, f.reading.t_s, self.load.top)
         if self.in_force_s == inf and snapshot.granted == self.held.granted:
-            self.in_force_s = monotonic()
+            self.in_force_s, self.last = monotonic() + ROUNDED_S, None
+
+    def _seen(self, shown: int, t_s: float, top: int) -> None:
+        """Two statuses in a row prove a level, the higher one of both: a charger may follow a command late."""
+        last, self.last = self.last, (shown, t_s)
+        if last is not None and last[1] < t_s:
+            self.held = ledger.observed(self.held, top, ledger.Seen(max(shown, last[0]), t_s))
+        elif last is not None:
+            self.last = last
 
     def grant(self, held: Held, why: Cause) -> bool:
         """Take a new grant; True if its level is another one."""

@@ -7,10 +7,11 @@ import pytest
 
 from orchestrator.core import demand, limits, rows
 from orchestrator.core.facts import Facts
-from orchestrator.core.limits import Bound, choose, supplied
+from orchestrator.core.limits import choose, supplied
 from orchestrator.core.machine import Trigger
 from orchestrator.core.next_transition import next_transition
 from orchestrator.core.resting import resting_place, unsupplied
+from orchestrator.core.rules import Bound
 from orchestrator.core.supply import Want
 from orchestrator.model import ActiveFault, Cause, ControlMode, Decision, Effect, State
 from tests.core.bays import POLICY

@@ -44,7 +44,7 @@ def test_each_command_of_the_operating_page_is_one() -> None:
 NUMBERS = [
     *(f"C{number}" for number in range(1, 32)),
     *(f"B{number}" for number in range(1, 29)),
-    *(f"G{number}" for number in range(1, 11)),
+    *(f"G{number}" for number in range(1, 12)),
     *(f"P{number}" for number in range(1, 13)),
 ]
 
