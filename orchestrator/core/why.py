@@ -107,11 +107,14 @@ def _unproved(now: Round, bay: int) -> Cause | None:
 
 
 def _hold(now: Round, bay: int) -> Cause | None:
-    """There is room: it goes up when that has lasted."""
-    if now.held[bay].granted >= now.levels[bay]:
+    """There is room: it goes up when that has lasted. A bay that charges is told no moment: its rule is kept."""
+    held, supply = now.held[bay], now.supplies.loads[bay].supply
+    if held.granted >= now.levels[bay]:
         return None
-    supply, raise_t_s = now.supplies.loads[bay].supply, raises_at_s(now.held[bay])
-    return Cause.of("supply_raise", key=f"supplies.{supply}.limit_w", supply=supply, raise_t_s=raise_t_s)
+    key = f"supplies.{supply}.limit_w"
+    if held.granted:
+        return Cause.of("supply_rises", key=key, supply=supply)
+    return Cause.of("supply_raise", key=key, supply=supply, raise_t_s=raises_at_s(held))
 
 
 def _full(now: Round, bay: int) -> Cause | None:

@@ -219,6 +219,8 @@ def test_up_after_a_hold_and_one_step_a_minute() -> None:
         (grant,) = allocate(hall, (FULL,), held, t_s)
         if grant.level > held[0].granted:
             raises.append(second)
+            told = grant.cause.id if grant.cause is not None else None
+            assert told == {0: "supply_raise", 5: None}.get(grant.level, "supply_rises")
         if second == 0:
             assert grant.cause == Cause(
                 "supply_raise", (("supply", "hall"), ("raise_t_s", NOW_S + RAISE_HOLD_S)), "supplies.hall.limit_w"

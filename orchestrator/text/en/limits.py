@@ -36,7 +36,8 @@ TEXTS: Mapping[str, str] = {
     "supply_never": "supply {supply} has {limit_w:,.0f} W{at}, too little for the lowest step: that needs {need_w:,.0f} W",
     "supply_unproved": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are still counted{at}; waits until less is seen at {others:and}",
     "supply_asks": "supply {supply} has not been asked for more until now",
-    "supply_raise": "supply {supply} has room; the next step comes at {raise_at}",
+    "supply_raise": "supply {supply} has room; the first step comes at {raise_at}",
+    "supply_rises": "supply {supply} has room; the step rises within a minute",
     "supply_not_in_hand": "its charger is not in hand, so it counts with {counts_w:,.0f} W in supply {supply} until its standby is seen",
     "supply_unknown_bays": "counted with their highest steps, their chargers not being in hand: {bays}",
 }

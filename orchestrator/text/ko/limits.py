@@ -36,7 +36,8 @@ TEXTS: Mapping[str, str] = {
     "supply_never": "전원 {supply}의 한도 {limit_w:,.0f} W{at}로는 가장 낮은 단계도 쓸 수 없습니다. {need_w:,.0f} W가 필요합니다",
     "supply_unproved": "전원 {supply}: 아직 {limit_w:,.0f} W 중 {used_w:,.0f} W로 계산됩니다{at}. 출력 감소가 확인되기를 기다립니다: {others:and}",
     "supply_asks": "지금까지 전원 {supply}에 더 요청된 것이 없습니다",
-    "supply_raise": "전원 {supply}에 여유가 있어 {raise_at}에 다음 단계로 올립니다",
+    "supply_raise": "전원 {supply}에 여유가 있어 {raise_at}에 첫 단계를 시작합니다",
+    "supply_rises": "전원 {supply}에 여유가 있어 1분 안에 단계를 올립니다",
     "supply_not_in_hand": "충전기를 제어할 수 없어, 대기 상태가 확인될 때까지 전원 {supply}에서 {counts_w:,.0f} W로 계산합니다",
     "supply_unknown_bays": "충전기를 제어할 수 없어 가장 높은 단계로 계산하는 베이: {bays}",
 }

@@ -10,8 +10,9 @@ WITNESSES: tuple[Seed, ...] = (
         ("stopped while it ends",),
         (
             f"{SERVICE}bay.py",
-            "        persisted = self.identified.kept(Persisted.of(memory, now_s))\n",
-            "        persisted = self.identified.kept(Persisted.of(memory, now_s))\n        if self._ending:\n"
+            "        persisted = self._timer.kept(self.identified.kept(Persisted.of(memory, now_s)))\n",
+            "        persisted = self._timer.kept(self.identified.kept(Persisted.of(memory, now_s)))\n"
+            "        if self._ending:\n"
             '            persisted = replace(persisted, hold="")\n',
         ),
     ),
