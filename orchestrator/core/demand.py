@@ -4,12 +4,10 @@ from orchestrator.config.amperes import highest_step
 from orchestrator.core import limits
 from orchestrator.core.facts import Facts
 from orchestrator.core.safestop import stands_by
-from orchestrator.core.states import AT_WORK, PRECHARGING
+from orchestrator.core.states import AT_WORK, OUT_OF_HAND, PRECHARGING
 from orchestrator.core.supply import Want
-from orchestrator.model import Decision, State
+from orchestrator.model import Decision
 
-#: A charger in these is not in hand: nobody has seen it stop, or it does not obey.
-NOT_IN_HAND = frozenset({State.STARTING, State.UNCONTROLLABLE})
 WAITS = "waits_for_supply"
 NOTHING = Want()
 
@@ -33,7 +31,7 @@ def level(f: Facts) -> int | None:
     Its step and both measured currents count, the highest of them; standby only as far as it is proved.
     """
     reading = f.reading
-    if reading is None or not f.charger.online or f.memory.state in NOT_IN_HAND:
+    if reading is None or not f.charger.online or f.memory.state in OUT_OF_HAND:
         return None
     if not f.energised and stands_by(f):
         return 0

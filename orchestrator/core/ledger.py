@@ -77,4 +77,4 @@ def lowered(held: Held, level: int, now_s: float) -> Held:
 
 def raised(held: Held, level: int, now_s: float) -> Held:
     """The grant goes up, and counts at once."""
-    return replace(held, granted=level, counted=max(held.counted, level), raised_s=now_s, room_s=None)
+    return replace(held, granted=level, counted=max(held.counted, level), rose_s=now_s, room_s=None)

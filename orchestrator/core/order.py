@@ -61,4 +61,4 @@ def starves(held: Held, now_s: float) -> bool:
 def raises_at_s(held: Held) -> float:
     """When a bay for which there is room may go up."""
     since_s = held.room_s if held.room_s is not None else inf
-    return max(since_s + RAISE_HOLD_S, held.raised_s + RAISE_EVERY_S)
+    return max(since_s + RAISE_HOLD_S, held.rose_s + RAISE_EVERY_S)

@@ -17,6 +17,7 @@ class Kind(Enum):
     PRECHARGING = auto()  #: … gently, on the lowest step, to wake a deeply discharged pack
     AT_WORK = auto()  #: a charge has been started: energised, or about to be
     UNVERIFIED = auto()  #: a stop is under way and not yet proved
+    OUT_OF_HAND = auto()  #: nobody has seen the charger stop yet, or it does not obey
     UNSEEN = auto()  #: the charger is heard for the first time, or again: nobody saw what it did before
     AT_REST = auto()  #: the charger was verified in standby and has not been told to run since
     RESTING = auto()  #: a bay goes from here to where the facts lead, without a stop first
@@ -36,7 +37,7 @@ class Kind(Enum):
 S, K = State, Kind
 
 TABLE: Mapping[State, frozenset[Kind]] = {
-    S.STARTING: frozenset({K.UNVERIFIED, K.UNSEEN, K.PASSING}),
+    S.STARTING: frozenset({K.UNVERIFIED, K.OUT_OF_HAND, K.UNSEEN, K.PASSING}),
     S.OFFLINE: frozenset({K.UNSEEN, K.RESTING, K.SETTLED, K.QUIET}),
     S.IDLE: frozenset({
         K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS, K.SESSION_ENDS, K.ALIKE, K.DONE,
@@ -55,7 +56,7 @@ TABLE: Mapping[State, frozenset[Kind]] = {
     S.SUSPENDED: frozenset({K.AT_REST, K.RESTING, K.SETTLED, K.QUIET, K.STARTABLE, K.READY, K.OBEYS}),
     S.STOPPING: frozenset({K.UNVERIFIED, K.MAY_RUN, K.PASSING}),
     S.TRIPPED: frozenset({K.AT_REST, K.SETTLED, K.QUIET, K.SESSION_ENDS, K.BY_PERSON}),
-    S.UNCONTROLLABLE: frozenset({K.UNVERIFIED, K.MAY_RUN, K.BY_PERSON}),
+    S.UNCONTROLLABLE: frozenset({K.UNVERIFIED, K.OUT_OF_HAND, K.MAY_RUN, K.BY_PERSON}),
 }  # fmt: skip
 
 
@@ -69,7 +70,7 @@ def ordered(states: frozenset[State]) -> tuple[State, ...]:
 
 
 ENERGISED, PRECHARGING, AT_WORK = _of(K.ENERGISED), _of(K.PRECHARGING), _of(K.AT_WORK)
-UNVERIFIED, UNSEEN = _of(K.UNVERIFIED), _of(K.UNSEEN)
+UNVERIFIED, OUT_OF_HAND, UNSEEN = _of(K.UNVERIFIED), _of(K.OUT_OF_HAND), _of(K.UNSEEN)
 AT_REST, RESTING, SETTLED, QUIET = _of(K.AT_REST), _of(K.RESTING), _of(K.SETTLED), _of(K.QUIET)
 STARTABLE, READY, OBEYS, MAY_RUN = _of(K.STARTABLE), _of(K.READY), _of(K.OBEYS), _of(K.MAY_RUN)
 SESSION_ENDS, ALIKE, DONE, PASSING = _of(K.SESSION_ENDS), _of(K.ALIKE), _of(K.DONE), _of(K.PASSING)

@@ -89,7 +89,7 @@ class Held:
     granted: int = 0
     known: bool = False  #: its charger answers and is in hand; otherwise it counts with its highest level
     lowered_s: float = -inf  #: when the grant was last lowered: only a later status disproves a level
-    raised_s: float = -inf  #: when it was last raised
+    rose_s: float = -inf  #: when it was last raised
     room_s: float | None = None  #: since when a higher level has been planned
     turn_s: float | None = None  #: since when it has its place, with its lowest level
     waits_s: float | None = None  #: since when it waits for one

@@ -27,7 +27,7 @@ def site(count: int, limit_w: int, *supplies: Supply, on: Sequence[str] = ()) ->
 def has(level: int = 0, counted: int | None = None, **more: object) -> Held:
     """A charger in hand, settled on this level for long."""
     long_s = NOW_S - 2 * TURN_S
-    placed: dict[str, object] = {"turn_s": long_s, "raised_s": long_s} if level else {}
+    placed: dict[str, object] = {"turn_s": long_s, "rose_s": long_s} if level else {}
     most = level if counted is None else counted
     return replace(Held(most, level, known=True, **placed), **more)  # type: ignore[arg-type]  # its fields
 
@@ -99,7 +99,7 @@ def test_what_changes_nothing_is_the_same_object() -> None:
 
 def test_a_lower_grant_frees_nothing_and_a_higher_one_counts_at_once() -> None:
     assert ledger.lowered(has(3, room_s=1.0), 1, NOW_S) == has(1, 3, lowered_s=NOW_S)
-    assert ledger.raised(has(1, room_s=1.0), 2, NOW_S) == has(2, turn_s=has(1).turn_s, raised_s=NOW_S)
+    assert ledger.raised(has(1, room_s=1.0), 2, NOW_S) == has(2, turn_s=has(1).turn_s, rose_s=NOW_S)
     assert ledger.raised(has(1, 4), 2, NOW_S).counted == 4
 
 
@@ -239,7 +239,7 @@ def test_room_that_goes_again_is_no_room() -> None:
 
 def test_a_lower_want_lowers_at_once() -> None:
     (grant,) = allocate(site(1, 1000), (Want(top=2),), (has(5),), NOW_S)
-    assert grant.held == has(2, 5, turn_s=has(5).turn_s, raised_s=has(5).raised_s, lowered_s=NOW_S)
+    assert grant.held == has(2, 5, turn_s=has(5).turn_s, rose_s=has(5).rose_s, lowered_s=NOW_S)
     assert grant.cause is None
 
 

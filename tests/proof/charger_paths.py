@@ -72,4 +72,4 @@ def _next(path: Path, levels: int) -> Iterator[Path]:
 
 def _plain(held: Held) -> Held:
     """Without the times that only say when something may be raised."""
-    return replace(held, lowered_s=LOWERED_S, raised_s=0.0, room_s=None)
+    return replace(held, lowered_s=LOWERED_S, rose_s=0.0, room_s=None)

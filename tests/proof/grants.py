@@ -108,7 +108,7 @@ class World:
             if grant.level > was.granted:
                 self.raised += 1
                 assert was.known, f"bay {bay}: raised without being known"
-                assert self.now_s - was.raised_s >= RAISE_EVERY_S, f"bay {bay}: raised twice in a minute"
+                assert self.now_s - was.rose_s >= RAISE_EVERY_S, f"bay {bay}: raised twice in a minute"
                 assert grant.level == was.granted + 1, f"bay {bay}: raised by more than one"
             if grant.level != was.granted or self.chance.random() < 0.02:
                 one.told(self.chance.choice((grant.level, grant.level, max(grant.level - 1, 0))), self.chance)
@@ -196,9 +196,9 @@ def states() -> Iterator[Held]:
     for counted in range(TOP + 1):
         for granted in range(counted + 1):
             placed = {"turn_s": long_s} if granted else {}
-            yield Held(counted, granted, known=True, raised_s=long_s, room_s=long_s, **placed)
+            yield Held(counted, granted, known=True, rose_s=long_s, room_s=long_s, **placed)
             if counted == TOP:
-                yield Held(counted, granted, known=False, raised_s=long_s, room_s=long_s, **placed)
+                yield Held(counted, granted, known=False, rose_s=long_s, room_s=long_s, **placed)
 
 
 def three(

@@ -117,9 +117,7 @@ def what_counts_may_rise(patch: Patch) -> None:
 
 
 def a_grant_counts_later(patch: Patch) -> None:
-    patch.setattr(
-        ledger, "raised", lambda held, level, now_s: replace(held, granted=level, raised_s=now_s, room_s=None)
-    )
+    patch.setattr(ledger, "raised", lambda held, level, now_s: replace(held, granted=level, rose_s=now_s, room_s=None))
 
 
 def down_is_free_at_once(patch: Patch) -> None:
