@@ -19,7 +19,7 @@ Patch = pytest.MonkeyPatch
 
 def test_a_hundred_thousand_events_and_not_a_watt_over() -> None:
     """`python -m tests.proof grants` plays ten million."""
-    worlds = [play(seed, 128, 24_000, 60) for seed in range(3)] + [play(seed, 5, 1_500, 8) for seed in range(20)]
+    worlds = [play(seed, 128, 30_000, 90) for seed in range(3)] + [play(seed, 5, 1_000, 8) for seed in range(12)]
     assert sum(world.events for world in worlds) >= 100_000
     assert sum(world.raised for world in worlds) > 1_000
 
@@ -27,10 +27,10 @@ def test_a_hundred_thousand_events_and_not_a_watt_over() -> None:
 def test_every_state_of_three_bays() -> None:
     """The long form has every combination of them, more wants and more limits."""
     looked = 0
-    for one in three(((TOP, TOP, TOP), (1, TOP, 0)), (1000,), ordered=True):
+    for one in three(((TOP, 1, TOP),), (1000,), ordered=True):
         one_allocation(*one)
         looked += 1
-    assert looked == 2 * 27 * 28 * 29 // 6
+    assert looked == 27 * 28 * 29 // 6
 
 
 def test_every_path_of_a_charger_under_any_grants() -> None:
