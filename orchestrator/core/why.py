@@ -73,9 +73,7 @@ def _not_in_hand(now: Round, bay: int) -> Cause | None:
     """Its charger may be running: it counts with its highest step, and is granted nothing."""
     if now.held[bay].known:
         return None
-    load = now.supplies.loads[bay]
-    counts_w, key = load.draw_w[now.held[bay].counted], f"supplies.{load.supply}.limit_w"
-    return Cause.of("supply_not_in_hand", key=key, supply=load.supply, counts_w=counts_w)
+    return _of_own(now, "supply_not_in_hand", bay, counts_w=now.supplies.loads[bay].draw_w[now.held[bay].counted])
 
 
 def _never(now: Round, bay: int) -> Cause | None:
@@ -108,13 +106,19 @@ def _unproved(now: Round, bay: int) -> Cause | None:
 
 def _hold(now: Round, bay: int) -> Cause | None:
     """There is room: it goes up when that has lasted. A bay that charges is told no moment: its rule is kept."""
-    held, supply = now.held[bay], now.supplies.loads[bay].supply
+    held = now.held[bay]
     if held.granted >= now.levels[bay]:
         return None
-    key = f"supplies.{supply}.limit_w"
     if held.granted:
-        return Cause.of("supply_rises", key=key, supply=supply)
-    return Cause.of("supply_raise", key=key, supply=supply, raise_t_s=raises_at_s(held))
+        return _of_own(now, "supply_rises", bay)
+    return _of_own(now, "supply_raise", bay, raise_t_s=raises_at_s(held))
+
+
+def _of_own(now: Round, id_: str, bay: int, **params: Any) -> Cause:  # noqa: ANN401 - as those of a cause
+    """A cause with the supply that the bay is directly on."""
+    supply = now.supplies.supplies[now.supplies.paths[bay][0]]
+    pairs = (("supply", supply.name), *params.items())
+    return Cause(id_, pairs, f"supplies.{supply.name}.limit_w", supply.place)
 
 
 def _full(now: Round, bay: int) -> Cause | None:

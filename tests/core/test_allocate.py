@@ -223,7 +223,10 @@ def test_up_after_a_hold_and_one_step_a_minute() -> None:
             assert told == {0: "supply_raise", 5: None}.get(grant.level, "supply_rises")
         if second == 0:
             assert grant.cause == Cause(
-                "supply_raise", (("supply", "hall"), ("raise_t_s", NOW_S + RAISE_HOLD_S)), "supplies.hall.limit_w"
+                "supply_raise",
+                (("supply", "hall"), ("raise_t_s", NOW_S + RAISE_HOLD_S)),
+                "supplies.hall.limit_w",
+                "s.yaml:3",
             )
         held = [ledger.observed(grant.held, 5, ledger.Seen(grant.level, t_s + 0.5))]
     assert raises == [10 + 60 * n for n in range(5)]
