@@ -2,11 +2,12 @@
 
     python -m tests.proof                 grid, scripts, calls, environment
     python -m tests.proof grants          only this one: ten million events for 128 bays on one supply, in five minutes
+    python -m tests.proof feeds           only this one: a meter on the supply of the whole service, in some minutes
     python -m tests.proof core            only this one, which takes longer than those four together
     python -m tests.proof seeds           only this one: which proof finds which bug, into docs/proofs.md
 
 Each has its own main with more options: `tests.proof.whole_grid`, `campaign`, `nth_call`, `environment`, `grants`,
-`exploring`, `seeds`.
+`feeds`, `exploring`, `seeds`.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 
-from tests.proof import campaign, environment, exploring, grants, nth_call, seeds, whole_grid
+from tests.proof import campaign, environment, exploring, feeds, grants, nth_call, seeds, whole_grid
 from tests.proof.report import say
 
 PARTS: Mapping[str, tuple[str, Callable[[Sequence[str]], int]]] = {
@@ -24,6 +25,7 @@ PARTS: Mapping[str, tuple[str, Callable[[Sequence[str]], int]]] = {
     "calls": ("every call of a charge made to fail in turn, with each of its errors, once and lasting", nth_call.main),
     "environment": ("random trouble with lines, disk, bus, people, over lives of the gateway", environment.main),
     "grants": ("many bays on one supply: random events, and every state of three", grants.main),
+    "feeds": ("bays on a supply in the whole service, with a meter on the feed", feeds.main),
     "core": ("everything that the core can come to", exploring.main),
     "seeds": ("the proofs themselves: every hole that was closed, opened again", seeds.main),
 }
