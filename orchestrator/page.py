@@ -52,7 +52,14 @@ def blocks(
     found = [*([Block(folded(say(gist(bays, clock), language), width))] if bays and clock else [])]
     found += loud(document, shown, language, width)
     found += _table(shown, language, width) if shown or not problems else [Block(say(Cause("no_problems"), language))]
+    if not problems:
+        found += [Block(folded(text, width)) for text in promised(document)]
     return all_cut(found, width)
+
+
+def promised(document: Mapping[str, object]) -> list[str]:
+    """What each supply has promised, if bays share any."""
+    return [str(supply["text"]) for supply in cast("Sequence[Mapping[str, object]]", document.get("supplies", ()))]
 
 
 def loud(document: Mapping[str, object], bays: Sequence[Bay], language: str, width: int) -> Iterator[Block]:

@@ -168,19 +168,18 @@ class Feeds:
         feeds = [self.feeds[number] for number in self.fed]
         used_w = ledger.used_w(self.supplies, [feed.held for feed in feeds])
         members = list(zip(self.supplies.loads, self.supplies.paths, feeds, strict=True))
-        shown = [
-            {
-                "name": supply.name,
-                "within": supply.within,
-                "limit_w": self.supplies.limits_w[number],
-                "promised_w": used_w[number],
-                "waiting": [
-                    load.bay
-                    for load, path, feed in members
-                    if number in path and feed.want.top and not feed.held.granted
-                ],
-                "problem": say(self.problem, language),
-            }
-            for number, supply in enumerate(self.supplies.supplies)
-        ]
+        shown = []
+        for number, (supply, limit_w) in enumerate(zip(self.supplies.supplies, self.supplies.limits_w, strict=True)):
+            waiting = tuple(
+                load.bay for load, path, feed in members if number in path and feed.want.top and not feed.held.granted
+            )
+            promises = Cause.of(
+                "supply_promises", key=f"supplies.{supply.name}.limit_w", place=supply.place,
+                supply=supply.name, used_w=used_w[number], limit_w=limit_w,
+            )  # fmt: skip
+            promises = promises.with_(then=Cause.of("supply_waiting", bays=waiting)) if waiting else promises
+            shown.append({
+                "name": supply.name, "within": supply.within, "limit_w": limit_w, "promised_w": used_w[number],
+                "waiting": list(waiting), "cause": fields(promises, language), "text": say(promises, language),
+            })  # fmt: skip
         return {"supplies": shown} if shown else {}

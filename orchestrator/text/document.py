@@ -19,6 +19,8 @@ def in_language(document: Mapping[str, Any], language: str) -> dict[str, Any]:
     }
     if "strays" in document:
         parts["strays"] = [_problem(stray, language) for stray in document["strays"]]
+    if "supplies" in document:
+        parts["supplies"] = [_text(supply, supply["cause"], language) for supply in document["supplies"]]
     return {**document, **parts, "bays": [_bay(bay, language) for bay in document["bays"]]}
 
 
@@ -51,7 +53,7 @@ def _problem(part: Mapping[str, Any], language: str) -> dict[str, Any]:
 
 
 def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
-    parts, told = ("charger", "battery", "contactor"), ("timed_start", "target")
+    parts, told, why = ("charger", "battery", "contactor"), ("timed_start", "target"), ("identity", "supply")
     return {
         **bay,
         **{name: _problem(bay[name], language) for name in parts if bay.get(name)},
@@ -61,7 +63,7 @@ def _bay(bay: Mapping[str, Any], language: str) -> dict[str, Any]:
         **({"limits": [_text(one, one["cause"], language) for one in bay["limits"]]} if "limits" in bay else {}),
         **({"next": _text(bay["next"], bay["next"], language)} if bay.get("next") else {}),
         **{name: _text(bay[name], bay[name], language) for name in told if bay.get(name)},
-        **({"identity": _text(bay["identity"], bay["identity"]["cause"], language)} if "identity" in bay else {}),
+        **{name: _text(bay[name], bay[name]["cause"], language) for name in why if name in bay},
     }
 
 

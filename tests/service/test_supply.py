@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any, cast
 
 import pytest
 
@@ -11,7 +12,9 @@ from orchestrator.core import ledger, order
 from orchestrator.core.allocate import allocate
 from orchestrator.core.draw import draw_w
 from orchestrator.core.states import ENERGISED
+from orchestrator.core.supply import Want
 from orchestrator.model import Cause, ControlMode, Decision, Snapshot, State
+from orchestrator.page import page
 from orchestrator.service import supply as supply_module
 from orchestrator.service.supply import Feeds
 from orchestrator.sim.presets import PACKS
@@ -132,14 +135,20 @@ def test_without_supplies_nothing_changes() -> None:
 def test_at_a_start_every_charger_counts_with_the_most() -> None:
     hall = feeds(replace(three(), supplies={"hall": SupplyConfig(limit_w=9000, bays=NAMES[:2])}))
     assert hall.turn(1000.0) == []
-    assert hall.status("en") == {
-        "supplies": [
-            {"name": "hall", "within": None, "limit_w": 9000, "promised_w": 2 * 1177, "waiting": [], "problem": ""}
-        ]
-    }
+    (shown,) = cast("list[dict[str, Any]]", hall.status("en")["supplies"])
+    assert (shown["name"], shown["limit_w"], shown["promised_w"], shown["waiting"]) == ("hall", 9000, 2 * 1177, [])
+    assert shown["text"] == "supply hall: 2,354 of 9,000 W are promised"
     snapshot = hall.feeds[0].into(Snapshot())
     assert (snapshot.granted, snapshot.supply_problem) == (0, None)
     assert hall.feeds[2].into(Snapshot()).granted is None
+
+
+def test_who_waits_is_on_the_page_in_the_readers_language() -> None:
+    hall = feeds(three())
+    hall.feeds[1].want = Want(5)
+    document = {"language": "en", "bays": [], **hall.status("en")}
+    assert page(document).splitlines()[-1] == "supply hall: 3,531 of 460 W are promised; waiting for it: bay-2"
+    assert page(document, "ko").splitlines()[-1] == "전원 hall: 460 W 중 3,531 W 배정. 기다리는 베이: bay-2"
 
 
 def test_a_bay_that_tells_nothing_any_more_is_not_in_hand() -> None:

@@ -30,6 +30,8 @@ TEXTS: Mapping[str, str] = {
     "limit_ah": "a charge of more than {most:.3g} Ah is a fault, {place}",
     "limit_h": "a charge of more than {most:.3g} h is a fault, {place}",
     # what a supply leaves
+    "supply_promises": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are promised",
+    "supply_waiting": "waiting for it: {bays}",
     "supply_full": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are promised{at}",
     "supply_turn": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are promised{at}; waits for {other}, in turn at {turn_at}",
     "supply_line": "supply {supply}: {used_w:,.0f} of {limit_w:,.0f} W are promised{at}; waits in line for a place",

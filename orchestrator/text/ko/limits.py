@@ -30,6 +30,8 @@ TEXTS: Mapping[str, str] = {
     "limit_ah": "한 번의 충전이 {most:.3g} Ah를 넘으면 장애입니다({place})",
     "limit_h": "한 번의 충전이 {most:.3g}시간을 넘으면 장애입니다({place})",
     # what a supply leaves
+    "supply_promises": "전원 {supply}: {limit_w:,.0f} W 중 {used_w:,.0f} W 배정",
+    "supply_waiting": "기다리는 베이: {bays}",
     "supply_full": "전원 {supply}: {limit_w:,.0f} W 중 {used_w:,.0f} W가 배정되었습니다{at}",
     "supply_turn": "전원 {supply}: {limit_w:,.0f} W 중 {used_w:,.0f} W가 배정되었습니다{at}. {other}의 차례가 끝나기를 기다리며 {turn_at}에 차례가 됩니다",
     "supply_line": "전원 {supply}: {limit_w:,.0f} W 중 {used_w:,.0f} W가 배정되었습니다{at}. 순서를 기다립니다",
