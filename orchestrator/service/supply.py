@@ -152,11 +152,12 @@ class Feeds:
         if problem != self.problem:
             self.say(problem)
         self.problem = problem
-        for feed in feeds:
+        for feed, load in zip(feeds, self.supplies.loads, strict=True):
             feed.problem = problem
             verified = feed.shown if feed.held.known and feed.shown is not None else 0
             if verified < feed.held.granted:
-                feed.grant(ledger.lowered(feed.held, verified, now_s), problem)
+                at = self._asks(load.supply)  # a limit says where it stands
+                feed.grant(ledger.lowered(feed.held, verified, now_s), replace(problem, key=at.key, place=at.place))
 
     def _asks(self, name: str) -> Cause:
         """Why no more is granted to a bay that has all that it has asked for."""

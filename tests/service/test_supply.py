@@ -12,7 +12,7 @@ from orchestrator.core import ledger, order
 from orchestrator.core.allocate import allocate
 from orchestrator.core.draw import draw_w
 from orchestrator.core.states import ENERGISED
-from orchestrator.core.supply import Want
+from orchestrator.core.supply import Held, Want
 from orchestrator.model import Cause, ControlMode, Decision, Snapshot, State
 from orchestrator.page import page
 from orchestrator.service import supply as supply_module
@@ -26,6 +26,7 @@ from tests.proof.virtual_service import World, station, world
 NAMES = ("bay-1", "bay-2", "bay-3")
 #: 30 W in standby, 213 W on the lowest step: enough for two of the three.
 LIMIT_W = 460
+NOTHING: dict[str, object] = {}
 
 
 def three(limit_w: float = LIMIT_W) -> Station:
@@ -122,6 +123,21 @@ def test_a_failing_allocation_keeps_what_is_verified_and_is_a_fault(monkeypatch:
 
 def feeds(the_station: Station, say: Callable[[object], None] = lambda _: None) -> Feeds:
     return Feeds.of(the_station, say)
+
+
+def test_a_failure_lowers_to_what_is_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[object] = []
+    hall = feeds(three(), said.append)
+    for feed, shown, known in zip(hall.feeds, (1, None, 4), (True, True, False), strict=True):
+        feed.held, feed.shown, feed.told_s = Held(5, 2, known=known), shown, 1000.0
+    monkeypatch.setattr(supply_module, "allocate", lambda *_: NOTHING["hall"])
+    assert hall.turn(1000.0) == [1, 2, 0]  # the most lowered first
+    assert hall.turn(1000.5) == []
+    assert [feed.held.granted for feed in hall.feeds] == [1, 0, 0]
+    assert said == [Cause.of("supply_failed", error="KeyError('hall')")]
+    assert {(feed.why.id, feed.why.key) for feed in hall.feeds if feed.why} == {
+        ("supply_failed", "supplies.hall.limit_w")
+    }
 
 
 def test_without_supplies_nothing_changes() -> None:
