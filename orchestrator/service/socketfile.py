@@ -72,7 +72,28 @@ def identity(path: Path) -> Identity | None:
     return found.st_dev, found.st_ino
 
 
-def remove(path: Path, ours: Identity | None) -> None:
-    """Remove the name, unless it belongs to another socket by now."""
-    if ours is not None and identity(path) == ours:
-        path.unlink(missing_ok=True)
+class SocketName:
+    """A listening socket under its name, which somebody else may remove or take."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self.listener = path, listen(path)
+        self._identity = identity(path)
+
+    def look(self) -> Cause | None:
+        """What has become of the name: None if nothing. If it was removed, there is a new `listener` under it."""
+        found, socket_ = identity(self._path), str(self._path)
+        if found == self._identity:
+            return None
+        if found is not None:
+            return Cause.of("socket_taken", socket=socket_)
+        try:
+            self.listener = listen(self._path)
+        except StartError as error:
+            return Cause.of("socket_lost", socket=socket_, error=error.cause)
+        self._identity = identity(self._path)
+        return Cause.of("socket_again", socket=socket_)
+
+    def remove(self) -> None:
+        """Remove the name, unless it belongs to another socket by now."""
+        if self._identity is not None and identity(self._path) == self._identity:
+            self._path.unlink(missing_ok=True)

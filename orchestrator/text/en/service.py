@@ -94,6 +94,8 @@ TEXTS: Mapping[str, str] = {
     "no_bay_left": "--except leaves no bay",
     "done_nowhere": "{verb} was carried out at no bay",
     "verb_unknown": "unknown verb {verb}: {verbs}",
+    "watch_version": "this service has version {known} of watch, not {version}",
+    "too_many_readers": "{limit} readers are watching already: end one, or ask for the status",
     "bays_no_list": "'bays' is a list of names, or null for all",
     "request_too_long": "a request is one line of at most {limit} bytes",
     "request_no_object": "a request is one JSON object on one line",
