@@ -1,9 +1,8 @@
 """The control socket: accepts clients and their requests. One JSON object per line, in and out.
 
-Only the owner of the service (and root) can open the socket. One thread serves all clients at once and waits for none:
-each has limits on time and bytes, and a slow client delays only itself. Stops go first (`reception.py`). After each
-turn the thread rests, so that no number of clients takes more than a fixed share of the CPU; the control loop never
-waits for a client.
+One thread serves all clients at once and waits for none: each has limits on time and bytes, and a slow client delays
+only itself. Stops go first (`reception.py`). After each turn the thread rests, so that no number of clients takes more
+than a fixed share of the CPU; the control loop never waits for a client.
 """
 
 import errno
@@ -20,7 +19,7 @@ from time import sleep, thread_time
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause
 from orchestrator.service.client import Client, parse_request
-from orchestrator.service.doorkeeper import Doorkeeper
+from orchestrator.service.doorkeeper import Doorkeeper, group_id
 from orchestrator.service.reception import WATCH, Handler, OnRefused, Reception, encode, refused
 from orchestrator.service.socketfile import SocketName
 
@@ -51,16 +50,17 @@ class ControlSocket:
         language: str = "en",
         on_refused: OnRefused = lambda _request, _why: None,
         watch: Callable[[Client], Cause | None] | None = None,
+        group: str | None = None,
     ) -> None:
         self._clock, self._say, self._language, self._take_reader = clock, say, language, watch
-        self._doorkeeper = Doorkeeper(say)
+        self._doorkeeper = Doorkeeper(say, group)
         self._turn_s: float | None = None  # when the present turn began
         self._closing, self._clients = False, set[Client]()
         self._receive = partial(Reception, handler, self._reply, language, on_refused)
         self._reception = self._receive()
         self._accept_s = -inf  # nobody is accepted before this
         self._selector = selectors.DefaultSelector()
-        self._name, self._name_s = SocketName(path), clock()
+        self._name, self._name_s = SocketName(path, None if group is None else group_id(group)), clock()
         self._listener = self._name.listener
         self._lost: Cause | None = None
         self._thread = threading.Thread(target=self._run, name="control", daemon=True)

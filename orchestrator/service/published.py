@@ -11,6 +11,7 @@ import json
 import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil, inf
+from operator import attrgetter
 from typing import Protocol
 
 from orchestrator.model import Decision
@@ -121,15 +122,15 @@ class _Entry:
         return changed
 
 
+GIST = attrgetter("state", "alarm", "faults", "setpoint", "command")
+
+
 def _gist(decision: Decision | None) -> object:
     """What people must see at once if it changes; figures can wait."""
     if decision is None:
         return None
     cause, step = decision.cause, decision.step
-    return (
-        decision.state, cause.id, cause.key, decision.alarm, decision.faults, step and (step.index, step.key),
-        decision.setpoint, decision.command, decision.session is None,
-    )  # fmt: skip
+    return GIST(decision), cause.id, cause.key, step and (step.index, step.key), decision.session is None
 
 
 #: What only grows older, in these parts of an entry.
@@ -147,6 +148,9 @@ def _lasting(status: Mapping[str, object]) -> object:
     return {**status, **without}
 
 
+JSON = json.JSONEncoder(ensure_ascii=False)
+
+
 def encoded(value: object) -> bytes:
     """As JSON."""
-    return json.dumps(value, ensure_ascii=False).encode(errors="backslashreplace")
+    return JSON.encode(value).encode(errors="backslashreplace")

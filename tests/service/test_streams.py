@@ -238,7 +238,7 @@ def test_while_nobody_reads_no_bay_is_looked_at(site: Site) -> None:
 def test_a_long_look_is_done_in_parts_and_the_next_ones_are_short() -> None:
     site = Site(bays=128)
     with reading(site) as (reader,):
-        lines = []
+        lines: list[dict[str, Any]] = []
         for _ in range(128 // MOST + 1):
             assert not lines  # nobody is told half of a document
             site.turn(seconds=0.01)

@@ -96,6 +96,8 @@ TEXTS: Mapping[str, str] = {
     "verb_unknown": "unknown verb {verb}: {verbs}",
     "watch_version": "this service has version {known} of watch, not {version}",
     "too_many_readers": "{limit} readers are watching already: end one, or ask for the status",
+    "view_only": "this socket tells the status and takes no commands: {verb} belongs to the control socket; here: {verbs}",
+    "group_unknown": "there is no group {group} here: create it (groupadd), or name another for the socket in the station file",
     "bays_no_list": "'bays' is a list of names, or null for all",
     "request_too_long": "a request is one line of at most {limit} bytes",
     "request_no_object": "a request is one JSON object on one line",

@@ -97,6 +97,8 @@ TEXTS: Mapping[str, str] = {
     "verb_unknown": "알 수 없는 명령입니다: {verb}. 가능한 명령: {verbs}",
     "watch_version": "이 서비스의 watch 버전은 {known}이며, {version} 버전은 지원하지 않습니다",
     "too_many_readers": "이미 {limit}개의 프로그램이 watch로 상태를 읽고 있습니다: 하나를 종료하거나 status로 조회하십시오",
+    "view_only": "이 소켓은 상태만 알려 주며 명령을 받지 않습니다. {verb} 명령은 제어 소켓으로 보내십시오. 여기서 가능한 명령: {verbs}",
+    "group_unknown": "이 시스템에 {group} 그룹이 없습니다: 그룹을 만들거나(groupadd) 스테이션 파일에서 소켓의 그룹을 다른 그룹으로 지정하십시오",
     "bays_no_list": "'bays'는 이름의 목록이거나, 전체를 뜻하는 null이어야 합니다",
     "request_too_long": "요청은 최대 {limit}바이트의 한 줄이어야 합니다",
     "request_no_object": "요청은 한 줄의 JSON 객체 하나여야 합니다",
