@@ -2,9 +2,9 @@
 
 Theory of operation. At each look a bay whose state, cause, faults, step, command or alarm have changed is described
 anew. All others are described anew once a second, spread over that second, so that no look takes long. What has only
-grown older is no change. A changed entry replaces the one before and gets the next revision; a reader that has been
-told everything up to some revision is told all entries above it, however many changes it has missed. So there is one
-slot for each bay and no queue, whatever a reader does.
+grown older is no change, unless it is too old. A changed entry replaces the one before and gets the next revision; a
+reader that has been told everything up to some revision is told all entries above it, however many changes it has
+missed. So there is one slot for each bay and no queue, whatever a reader does.
 """
 
 import json
@@ -12,12 +12,13 @@ import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil, inf
 from operator import attrgetter
-from typing import Protocol
+from typing import Any, Protocol
 
 from orchestrator.model import Decision
 
 #: How often an entry is described anew at least, and after how long at the earliest if no more than values may differ.
 PERIOD_S, LEAST_S = 1.0, 0.9
+MINUTE_S = 60.0
 #: The maximum number of entries described at one look.
 MOST = 24
 
@@ -133,19 +134,18 @@ def _gist(decision: Decision | None) -> object:
     return GIST(decision), cause.id, cause.key, step and (step.index, step.key), decision.session is None
 
 
-#: What only grows older, in these parts of an entry.
-AGES = {"charger": ("t_s", "age_s"), "battery": ("age_s",)}
+def _lasting(status: Mapping[str, Any]) -> object:
+    """What counts of an entry: not the ages, except those of values that are too old, as people read them."""
+    charger, battery = dict(status["charger"]), dict(status["battery"])
+    del charger["t_s"]
+    age_s, ages_s = charger.pop("age_s"), battery.pop("age_s")
+    old = {name: _age(ages_s[name]) for name in battery["old"]}
+    return {**status, "charger": charger, "battery": battery, "age": charger["old"] and _age(age_s), "ages": old}
 
 
-def _lasting(status: Mapping[str, object]) -> object:
-    """The entry without its ages."""
-    parts = {part: status.get(part) for part in AGES}
-    without = {
-        part: {name: value for name, value in fields.items() if name not in AGES[part]}
-        for part, fields in parts.items()
-        if isinstance(fields, Mapping)
-    }
-    return {**status, **without}
+def _age(age_s: float) -> float:
+    """In seconds, later in minutes."""
+    return age_s // 1 if age_s < 2 * MINUTE_S else age_s // MINUTE_S * MINUTE_S
 
 
 JSON = json.JSONEncoder(ensure_ascii=False)

@@ -32,14 +32,16 @@ class Bay:
     decision: Decision | None = IDLE
     volts: float = 50.0
     age_s: float = 0.0
+    old: bool = False
     more: dict[str, object] = field(default_factory=dict)
     described: int = 0
 
     def status(self) -> dict[str, object]:
         self.described += 1
         state = self.decision.state if self.decision else "STARTING"
-        charger = {"voltage_v": self.volts, "age_s": self.age_s, "t_s": self.age_s}
-        return {"name": self.name, "state": state, "charger": charger, "battery": {"age_s": {}}, **self.more}
+        charger = {"voltage_v": self.volts, "age_s": self.age_s, "t_s": self.age_s, "old": self.old}
+        battery = {"age_s": {"soc_pct": self.age_s}, "old": ["soc_pct"] if self.old else []}
+        return {"name": self.name, "state": state, "charger": charger, "battery": battery, **self.more}
 
 
 class Site:
@@ -146,6 +148,19 @@ def test_what_only_grows_older_is_no_change(site: Site) -> None:
         assert reader.lines() == []
         site.turn(2, KEEP_ALIVE_S)
         assert reader.lines()[0] == {"revision": first["revision"]}
+
+
+def test_how_old_a_value_is_that_is_too_old_is_told_by_the_second_and_then_by_the_minute(site: Site) -> None:
+    with reading(site) as (reader,):
+        site.bays[0].old = True
+        told = []
+        for _ in range(3):
+            for _ in range(int(5 / TURN_S)):
+                site.bays[0].age_s += TURN_S
+                site.turn()
+                told += [line for line in reader.lines() if "bays" in line]
+            site.bays[0].age_s += 60
+        assert len(told) in range(4 + 2 + 0, 5 + 3 + 3)
 
 
 def test_a_reader_is_told_something_every_five_seconds(site: Site) -> None:
