@@ -94,7 +94,9 @@ def runnable(unit: Path, directory: Path) -> Path:
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("analyze", ANALYZE)
 def test_systemd_knows_every_key(analyze: str, unit: Path, tmp_path: Path) -> None:
-    done = subprocess.run([analyze, "verify", str(runnable(unit, tmp_path))], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [analyze, "verify", str(runnable(unit, tmp_path))], capture_output=True, text=True, check=True
+    )
     assert done.stderr == ""
 
 

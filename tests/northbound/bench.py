@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
-from typing import Any
+from typing import Any, cast
 
 from orchestrator.config.load import load_northbound
 from orchestrator.config.northbound_rules import Listen
@@ -59,7 +59,7 @@ class Controller:
         if request["verb"] == "watch":
             raise RequestError(Cause.of("verb_unknown", verb="watch", verbs=()))
         self.asked.append(request)
-        (name,) = request["bays"]  # type: ignore[misc]
+        (name,) = cast("list[str]", request["bays"])
         refused = name == "bay-9"
         causes = {name: {**HOT, "advice": ""}} if refused else {}
         return {"language": "en", "results": {name: "too hot" if refused else ""}, "causes": causes}
