@@ -67,7 +67,7 @@ def about(record: type) -> str:
 
 def status_schema() -> Schema:
     """The schema of the whole document. Names that are not in it may come; readers ignore them."""
-    head = {"$schema": "http://json-schema.org/draft-07/schema#", "title": f"status, version {VERSION}"}
+    head = {"$schema": "http://json-schema.org/draft-07/schema#", "title": f"status {VERSION}"}
     return {**head, **_record(Status)}
 
 

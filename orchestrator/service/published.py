@@ -8,7 +8,7 @@ missed. So there is one slot for each bay and no queue, whatever a reader does.
 """
 
 import json
-import secrets
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil, inf
 from operator import attrgetter
@@ -42,9 +42,7 @@ class Published:
 
     def __init__(self, bays: Sequence[Bay], station: Callable[[], Fields], wall: Callable[[], float]) -> None:
         self.revision = 0
-        self.instance = secrets.token_hex(
-            8
-        )  #: another one means another run of the service, whose revisions begin anew
+        self.instance = os.urandom(8).hex()  #: of another run it is another, whose revisions begin anew
         self._entries = [_Entry(bay, number / len(bays) * PERIOD_S) for number, bay in enumerate(bays)]
         self._wall = wall
         self._station, self._station_s = station, -inf  # when they are due
