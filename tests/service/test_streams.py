@@ -4,7 +4,6 @@ import json
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from time import time
@@ -21,35 +20,14 @@ from orchestrator.service.streams import KEEP_ALIVE_S, MOST_READERS, PATIENCE_S,
 from orchestrator.text.catalogue import say
 from tests.service.bench import Bench
 from tests.service.control_bench import answer, client, listening
-
-IDLE, TRIPPED = (Decision(state, Cause(state.lower())) for state in (State.IDLE, State.TRIPPED))
-
-
-@dataclass
-class Bay:
-    """One that counts how often it is described."""
-
-    name: str
-    decision: Decision | None = IDLE
-    volts: float = 50.0
-    age_s: float = 0.0
-    old: bool = False
-    more: dict[str, object] = field(default_factory=dict)
-    described: int = 0
-
-    def status(self) -> dict[str, object]:
-        self.described += 1
-        state = self.decision.state if self.decision else "STARTING"
-        charger = {"voltage_v": self.volts, "age_s": self.age_s, "t_s": self.age_s, "old": self.old}
-        battery = {"age_s": {"soc_pct": self.age_s}, "old": ["soc_pct"] if self.old else []}
-        return {"name": self.name, "state": state, "charger": charger, "battery": battery, **self.more}
+from tests.service.hall import TRIPPED, Hall
 
 
-class Site:
+class Site(Hall):
     """Some bays and their readers. The test is the thread, and time passes when it says so."""
 
     def __init__(self, bays: int = 3) -> None:
-        self.bays = [Bay(f"bay-{number + 1}") for number in range(bays)]
+        super().__init__(bays)
         self.station: dict[str, object] = {"station": "a hall", "alarm": "none"}
         self.now_s = 1000.0
         self.published = Published(self.bays, lambda: {"time": self.now_s, **self.station}, lambda: self.now_s)
