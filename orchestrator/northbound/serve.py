@@ -57,7 +57,7 @@ def assembled(
     station = northbound.station
     users = Users(northbound.users, tell) if northbound.users is not None else None
     link = Link(lambda: sockets(station))
-    accounts = Accounts(users, time.monotonic, secure=context is not None)
+    accounts = Accounts(users, time.monotonic, tell, secure=context is not None)
     records = RecordDoors(lambda: journal(station), tell).doors()
     app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), records)
     door = Door.of(Listen.of(northbound.page.listen).host, northbound.page.hosts)
