@@ -35,6 +35,6 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "too much is asked at once: try again in a few seconds",
     "page_late": "the answer takes too long: try again, or ask for less",
     "page_failed": "the page's server has made an error, which its log has; the station is not affected",
-    "controller_silent": "the controller does not answer ({why}): nobody knows whether this was done; `orchestrator estop` "
+    "controller_silent": "the controller does not answer ({why}): do not rely on this having been done; `orchestrator estop` "
     "on the gateway stops every charger",
 }

@@ -33,6 +33,6 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "요청이 너무 많습니다. 몇 초 후에 다시 시도하십시오",
     "page_late": "응답이 너무 오래 걸립니다. 다시 시도하거나 범위를 줄이십시오",
     "page_failed": "페이지 서버에 오류가 발생했으며 로그에 기록되었습니다. 스테이션에는 영향이 없습니다",
-    "controller_silent": "컨트롤러가 응답하지 않습니다({why}). 요청이 처리되었는지 알 수 없습니다. 게이트웨이에서 `orchestrator estop`을 "
+    "controller_silent": "컨트롤러가 응답하지 않습니다({why}). 요청이 처리되지 않았을 수 있습니다. 게이트웨이에서 `orchestrator estop`을 "
     "실행하면 모든 충전기가 정지합니다",
 }
