@@ -73,6 +73,17 @@ def test_a_stream_begins_with_the_whole_and_goes_on_with_changes(pair: Pair) -> 
         assert list(change["bays"]) == ["bay-2"]
 
 
+def test_a_browser_gets_the_same_packed(pair: Pair) -> None:
+    browser, station = pair
+    with browser.stream("?language=ko", Accept_Encoding="gzip, br") as events:
+        assert b"content-encoding: gzip" in events.head
+        unpacked = events.unpacked()
+        assert unpacked.next("whole")[2]["document"]["bays"][0]["reason"].startswith("팩 온도가")
+        for alarm in ("danger", "none"):
+            station.document = {**station.document, "alarm": alarm}
+            assert unpacked.next("change")[2]["station"] == {"alarm": alarm}
+
+
 def test_the_long_poll_tells_the_same(pair: Pair) -> None:
     browser, station = pair
     wait_until(lambda: browser.get("/api/status").json["document"])
