@@ -1,6 +1,6 @@
 """A gzip stream in pieces that are packed once for many readers.
 
-Each piece is deflate blocks that refer to nothing before them and end on a byte, so pieces can follow one another in any
+Each piece is deflate blocks that refer to nothing before them and end on a byte, so they can follow one another in any
 order behind one header. A live stream has no end, and so no checksum.
 """
 

@@ -19,10 +19,10 @@ MOST = 32
 ALIVE_S = 5.0
 #: How long a reader may be asked to wait by the long poll: the page takes 12 s of silence for a lost connection.
 POLL_S = 8.0
-#: … and while nothing is known of the station.
-UNKNOWN_S = 1.0
 #: Readers that are up to date are told of changes at most so often.
 PACE_S = 0.1
+#: How long the long poll waits while nothing is known of the station.
+UNKNOWN_S = 1.0
 
 #: Who reads; None: somebody who may not, or not any more.
 Who = Callable[[], Mapping[str, str] | None]
