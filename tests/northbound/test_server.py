@@ -107,6 +107,18 @@ def test_a_controller_that_goes_and_comes_back_is_told(tmp_path: Path) -> None:
         assert (answer.status, answer.error) == (503, "controller_silent")
 
 
+@pytest.mark.parametrize(
+    "nonsense", [{}, {"bays": 7}, {"bays": [{}]}, {"bays": [[]]}, {"bays": [{"name": {}}], "time": "x"}]
+)
+def test_what_is_no_status_is_no_connection(tmp_path: Path, nonsense: dict[str, object]) -> None:
+    with page(tmp_path) as (browser, station), browser.stream() as events:
+        events.next("whole")
+        sensible, station.document = station.document, nonsense
+        assert events.next("link")[2]["connected"] is False
+        station.document = sensible
+        assert events.next("link")[2]["connected"] is True
+
+
 def test_a_reader_that_does_not_read_is_dropped_and_the_others_go_on(
     pair: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:
