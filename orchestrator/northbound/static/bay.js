@@ -9,6 +9,8 @@ import { charges, curve, readJson } from "./records.js";
 const HOLD_MS = 1000, AGAIN_MS = 5000;
 /** How far back the curves reach, and how often what has happened is asked for. */
 const CURVE_S = 6 * 3600, EVENTS_MS = 15_000;
+/** Records have a point at least so often. */
+const GAP_S = 660;
 const STARTABLE = ["IDLE", "HELD", "FULL", "SUSPENDED", "OFFLINE"], RESETTABLE = ["TRIPPED", "UNCONTROLLABLE"];
 
 export function bayView(main, name) {
@@ -168,10 +170,9 @@ class Acts {
 function holdButton(act, describedBy, done) {
   const what = word(act), text = h("span", {}, word("hold", { what }));
   const made = h("button", { type: "button", class: "act hold", "aria-describedby": describedBy }, text);
-  let timer = null, armed = null, held = false;
+  let timer = null, armed = null;
   const begin = () => {
     if (timer !== null) return;
-    held = true;
     made.classList.add("held");
     timer = setTimeout(() => { end(); done(); }, HOLD_MS);
   };
@@ -182,8 +183,8 @@ function holdButton(act, describedBy, done) {
   made.addEventListener("contextmenu", (event) => event.preventDefault());
   made.addEventListener("keydown", (event) => { if (isKey(event)) { event.preventDefault(); begin(); } });
   made.addEventListener("keyup", (event) => { if (isKey(event)) { event.preventDefault(); end(); } });
-  made.addEventListener("click", () => { // alone, it comes from assistive technology, which cannot hold: twice, then
-    if (held) { held = false; return; }
+  made.addEventListener("click", (event) => {
+    if (event.detail > 0) return; // of a finger or mouse; others come from assistive technology, which cannot hold: twice, then
     if (armed !== null) { clearTimeout(armed); armed = null; put(text, word("hold", { what })); done(); return; }
     put(text, word("hold_again", { what }));
     armed = setTimeout(() => { armed = null; put(text, word("hold", { what })); }, AGAIN_MS);
@@ -223,12 +224,18 @@ class Curves {
   }
 
   async draw() {
-    const endS = this.from.at(-1)?.[0] ?? 0, points = [...this.from, ...this.points.filter(([atS]) => atS > endS)];
+    const endS = this.from.at(-1)?.[0] ?? 0, beginS = Date.now() / 1000 - CURVE_S;
+    const points = [...this.from, ...this.points.filter(([atS]) => atS > endS)].filter(([atS]) => atS > beginS);
     const { drawCurve } = await import("./curves.js");
-    drawCurve(this.element, points);
+    drawCurve(this.element, withGaps(points));
   }
 
   close() { clearInterval(this.timer); }
+}
+
+/** No line across a time of which nothing is known. */
+function withGaps(points) {
+  return points.flatMap((point, at) => (at && point[0] - points[at - 1][0] > GAP_S ? [[points[at - 1][0] + 1, null, null, null, null], point] : [point]));
 }
 
 function showEvents(element, found) {

@@ -57,7 +57,7 @@ function options({ series, dates = false }, width) {
   return {
     width, height: 200, cursor: { drag: { x: true, y: false } }, legend: { live: true },
     scales: Object.fromEntries([["x", {}], ...series.map(([, , , name]) => [name, name === "soc" ? { range: [0, 100] } : { range }])]),
-    axes: [times, ...sides], series: [{ label: "", value: (_, at) => (at === null ? "–" : moment(at)) }, ...lines],
+    axes: [times, ...sides], series: [{ label: word("time"), value: (_, at) => (at === null ? "–" : moment(at)) }, ...lines],
   };
 }
 

@@ -48,7 +48,7 @@ export const WORDS = {
   SUSPENDED: ["Suspended", "일시 중단"],
   STOPPING: ["Stopping", "정지 중"],
   TRIPPED: ["Tripped", "트립"],
-  UNCONTROLLABLE: ["Uncontrollable", "제어 불능"],
+  UNCONTROLLABLE: ["Uncontrol\u00adlable", "제어 불능"],
   // groups of bays
   all: ["All", "전체"],
   needs: ["Needs a person", "사람이 필요함"],
@@ -121,6 +121,7 @@ export const WORDS = {
   energy: ["Energy", "에너지"],
   lasted: ["Lasted", "경과 시간"],
   step: ["Step", "전류 제한 단계"],
+  time: ["Time", "시각"],
   voltage: ["Voltage", "전압"],
   current: ["Current", "전류"],
   temperature: ["Temperature", "온도"],
@@ -339,7 +340,7 @@ export function readyAt(bay) {
 
 // --- the live link: one stream for all tabs of a browser -------------------------------------------------------------
 
-const QUIET_S = 12, STEAL_S = 5, LOCK = "station stream";
+const QUIET_S = 12, STEAL_S = 8, LOCK = "station stream";
 const nowS = () => Date.now() / 1000;
 const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
 
@@ -358,6 +359,7 @@ class Link {
     this.connected = false;
     this.lostS = nowS(); // since when there is no connection
     this.polls = false; // something between here and the station holds streams back
+    this.stealS = 0; // not before this
     this.leading = null; // aborts what this tab's lead is doing
     this.waiting = null; // aborts its waiting for the lock
     if (!navigator.locks || !window.BroadcastChannel) { this.lead(); return; }
@@ -388,8 +390,8 @@ class Link {
   }
 
   watch() {
-    if (this.leading || document.hidden || nowS() - this.heardS < STEAL_S) return;
-    this.heardS = nowS() - 1; // give the theft a moment
+    if (this.leading || document.hidden || nowS() - this.heardS < STEAL_S || nowS() < this.stealS) return;
+    this.stealS = nowS() + STEAL_S;
     this.contend({ steal: true });
   }
 
