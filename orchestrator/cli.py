@@ -22,6 +22,7 @@ from orchestrator.errors import (
     ServiceError,
     UsageError,
 )
+from orchestrator.northbound.verbs import add_northbound_verbs
 from orchestrator.service.verbs import add_service_verbs
 from orchestrator.shell.commands import with_examples
 from orchestrator.shell.verbs import add_shell_verbs
@@ -78,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
     add_service_verbs(verbs, replay_charge)
     _add_estop(verbs)
+    add_northbound_verbs(verbs)
     _add_tool_verbs(verbs)
     add_shell_verbs(verbs, _parser)
     return with_examples(parser)
@@ -93,7 +95,9 @@ def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
 
 
 def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    check = verbs.add_parser("check", help="report every error in policies, stations, object maps and scenarios")
+    check = verbs.add_parser(
+        "check", help="report every error in policies, stations, object maps, scenarios and northbound files"
+    )
     check.add_argument("file", nargs="+", help="files of any kind; a key in each identifies its kind")
     check.add_argument(
         "--exhaustive", action="store_true", help="also explore all that can happen under a policy: a minute for each"
@@ -121,7 +125,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     demo.set_defaults(run=_demo)
 
 
-SCHEMAS = ("policy", "station", "map", "scenario")
+SCHEMAS = ("policy", "station", "map", "scenario", "northbound")
 NMT = ("start", "stop", "reset-node", "reset-communication")
 
 

@@ -1,0 +1,57 @@
+"""What a reader is told of the station, in the reader's language; the same for all who have seen the same."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from orchestrator import __version__
+from orchestrator.northbound.picture import Change, Picture
+from orchestrator.text.catalogue import LANGUAGES
+from orchestrator.text.document import in_language
+
+#: So many different texts of one revision are kept: readers that are up to date share one for each language.
+MOST_TEXTS = 8
+#: What the page needs to know of this program.
+PAGE = {"version": __version__}
+
+
+def encoded(value: object) -> str:
+    """JSON in one line. What no browser can read, such as NaN, is a ValueError here."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+
+
+def asked_language(value: str | None) -> str:
+    """A language that we have texts in; "" means the service's own."""
+    return value if value is not None and value in LANGUAGES else ""
+
+
+class Teller:
+    """Puts changes of the picture into words."""
+
+    def __init__(self, picture: Picture) -> None:
+        self._picture = picture
+        self._revision = 0
+        self._texts: dict[tuple[bool, int | None, str], tuple[Change, str]] = {}
+
+    def since(self, seen: int | None, language: str) -> tuple[Change, str]:
+        """What has changed since, and its JSON members, without the braces: the reader's own are put beside them."""
+        picture = self._picture
+        if picture.revision != self._revision:
+            self._texts, self._revision = {}, picture.revision
+        key = (picture.known, seen, language)
+        if key not in self._texts:
+            if len(self._texts) >= MOST_TEXTS:
+                self._texts.clear()
+            change = picture.since(seen)
+            self._texts[key] = change, encoded(fields(change, language))[1:-1]
+        return self._texts[key]
+
+
+def fields(change: Change, language: str) -> dict[str, Any]:
+    """A change as JSON: a whole document has its bays in a list, what changed has them by name."""
+    document = in_language({**change.station, "bays": list(change.bays)}, language)
+    if change.whole:
+        return {"revision": change.revision, "document": {**document, "revision": change.revision}}
+    bays: list[Mapping[str, Any]] = document.pop("bays")
+    told = {str(bay["name"]): bay for bay in bays}
+    return {"revision": change.revision, "bays": told, "station": document, "gone": list(change.gone)}
