@@ -17,6 +17,7 @@ from orchestrator.model import Cause
 from orchestrator.northbound.accounts import Accounts
 from orchestrator.northbound.app import App
 from orchestrator.northbound.asking import Asking
+from orchestrator.northbound.closely import Closely
 from orchestrator.northbound.door import Door
 from orchestrator.northbound.guard import Guard
 from orchestrator.northbound.link import Link
@@ -46,7 +47,8 @@ async def _serve(
     users = Users(northbound.users, tell) if northbound.users is not None else None
     link = Link(lambda: sockets(station))
     accounts = Accounts(users, time.monotonic, secure=context is not None)
-    app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static())
+    closely = Closely(lambda: sockets(station)[0])
+    app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), (closely.door(),))
     guard = Guard(app.router(), Door.of(listen.host, northbound.page.hosts), tell)
     scheme, port = "https" if context is not None else "http", listener.getsockname()[1]
     host = f"[{listen.host}]" if ":" in listen.host else listen.host

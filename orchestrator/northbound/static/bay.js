@@ -7,8 +7,8 @@ import {
 import { charges, curve, readJson } from "./records.js";
 
 const HOLD_MS = 1000, AGAIN_MS = 5000;
-/** How far back the curves reach, and how often what has happened is asked for. */
-const CURVE_S = 6 * 3600, EVENTS_MS = 15_000;
+/** How far back the curves reach, and how often what has happened, and the limits, are asked for. */
+const CURVE_S = 6 * 3600, EVENTS_MS = 15_000, CLOSELY_MS = 2000;
 /** Records have a point at least so often. */
 const GAP_S = 660;
 const STARTABLE = ["IDLE", "HELD", "FULL", "SUSPENDED", "OFFLINE"], RESETTABLE = ["TRIPPED", "UNCONTROLLABLE"];
@@ -29,6 +29,16 @@ export function bayView(main, name) {
     h("div", { class: "foot" }, asked, mayAsk() ? [h("p", { class: "hint" }, word("stop_does")), stopButton(name, "large")] : h("p", {}, word("only_viewer"))),
   );
 
+  let closely = {}; // limits and forecast: the stream of all bays does not have them
+  async function lookClosely() {
+    if (document.hidden) return;
+    try {
+      const { limits, forecast } = await readJson(`/api/bay?bay=${encodeURIComponent(name)}`);
+      closely = { limits, forecast };
+      view.update();
+    } catch { /* what the stream tells is shown, and this the next time */ }
+  }
+
   async function readEvents() {
     try {
       showEvents(events, await readJson(`/api/events?bay=${encodeURIComponent(name)}`));
@@ -36,16 +46,15 @@ export function bayView(main, name) {
       put(events, word("failed", { why: error.message }));
     }
   }
-  readEvents();
-  const timer = setInterval(readEvents, EVENTS_MS);
+  const timers = [setInterval(readEvents, EVENTS_MS), setInterval(lookClosely, CLOSELY_MS)];
 
-  return {
+  const view = {
     title: name,
-    close() { clearInterval(timer); curves.close(); },
+    close() { timers.forEach(clearInterval); curves.close(); },
     update(names) {
       if (names && !names.includes(name)) return;
-      const bay = store.bays.get(name);
-      if (!bay) { put(parts.head, word("no_bay", { bay: name })); return; }
+      if (!store.bays.has(name)) { put(parts.head, word("no_bay", { bay: name })); return; }
+      const bay = { ...store.bays.get(name), ...closely };
       changed(parts.head, [bay.state, bay.reason, bay.since, bay.alarm, bay.next], () => head(bay));
       changed(parts.now, [bay.battery, bay.charger, bay.forecast, bay.identity], () => nowLines(bay));
       changed(parts.limits, [bay.limits, bay.faults], () => limits(bay));
@@ -58,6 +67,9 @@ export function bayView(main, name) {
       showRequest(asked, bay);
     },
   };
+  readEvents();
+  lookClosely();
+  return view;
 }
 
 /** Fills an element anew if what it shows has changed. */

@@ -106,9 +106,7 @@ export const WORDS = {
   next: ["Next", "다음"],
   faults: ["Faults", "장애"],
   since: ["since {at}", "{at}부터"],
-  at_about: ["at {at}", "{at}"],
   limits: ["Limits", "제한"],
-  allowed: ["Allows", "허용 전류"],
   binds: ["binds", "현재 적용"],
   blocking: ["blocking", "차단"],
   active: ["active", "제한 중"],
@@ -132,12 +130,8 @@ export const WORDS = {
   forecast_bmu: ["Ready, by the BMU", "완료 예정(BMU)"],
   forecast_own: ["Ready, by our estimate", "완료 예정(자체 추정)"],
   target: ["Target", "목표"],
-  mode: ["Control mode", "제어 모드"],
-  manual: ["manual", "수동"],
-  automatic: ["automatic", "자동"],
   // history and batteries
   began: ["Began", "시작"],
-  ended: ["Ended", "종료"],
   goes_on: ["goes on", "진행 중"],
   result: ["Result", "결과"],
   from_day: ["From", "시작일"],
@@ -149,14 +143,10 @@ export const WORDS = {
   charge: ["Charge", "충전"],
   charges: ["Charges", "충전 횟수"],
   last_charge: ["Last charge", "마지막 충전"],
-  total: ["Total", "합계"],
   health: ["Health", "건강 상태"],
   health_time: ["Health over time", "건강 상태 추이"],
-  capacity: ["Capacity", "용량"],
-  resistance: ["Resistance", "저항"],
   soh_own: ["SOH, by our estimate", "SOH(자체 추정)"],
   soh_bmu: ["SOH, by the BMU", "SOH(BMU)"],
-  interval: ["{low} – {high}", "{low} – {high}"],
   // station
   versions: ["Versions", "버전"],
   policies: ["Policies", "정책"],
@@ -326,7 +316,7 @@ function standsBy(bay) {
 function readyTimes(bay) {
   if (!ENERGISED.includes(bay.state)) return [];
   const { forecast, battery } = bay, minutes = battery.old?.includes("time_to_full_min") ? null : battery.time_to_full_min;
-  const bmuS = typeof minutes === "number" ? Date.now() / 1000 + 60 * minutes : null; // without a forecast, as the BMU says
+  const bmuS = typeof minutes === "number" && bay.state === "CHARGING" ? Date.now() / 1000 + 60 * minutes : null; // without a forecast, as the BMU says
   const known = forecast ? [forecast.bmu_at, forecast.own_at] : [bmuS];
   const at = known.filter((one) => typeof one === "number").sort((one, other) => one - other).map((one) => moment(one));
   return at[0] === at.at(-1) ? at.slice(0, 1) : at;
