@@ -73,7 +73,9 @@ class Browser:
         tab = Tab(self, target, session)
         for domain in ("Page", "Runtime", "Network", "Log"):
             tab.ask(f"{domain}.enable")
-        tab.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+        tab.ask(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
         tab.ask("Emulation.setLocaleOverride", locale=language)
         tab.ask("Network.setUserAgentOverride", userAgent="test", acceptLanguage=language)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
@@ -83,7 +85,9 @@ class Browser:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         os.close(self._out)  # Chromium ends with its pipe
         try:
             self._process.wait(END_S)
@@ -108,7 +112,7 @@ class Tab:
         self.wait(until)
         return self
 
-    def value(self, expression: str) -> Any:  # noqa: ANN401 - JSON
+    def value(self, expression: str) -> Any:
         """The value of an expression; a promise is waited for."""
         found = self.ask("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in found, f"{expression}: {found['exceptionDetails']}"

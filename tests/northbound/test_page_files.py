@@ -62,7 +62,11 @@ def test_the_first_state_costs_little() -> None:
     assert packed(*first) < MOST_BYTES / 3
     everything = [path for path in STATIC.rglob("*") if path.suffix in {".html", ".css", ".js", ".svg"}]
     assert packed(*everything) < MOST_BYTES
-    asked = ["index.html", *re.findall(r'<(?:script|link rel="stylesheet")[^>]*(?:src|href)="([^"]+)"', INDEX), "the stream"]
+    asked = [
+        "index.html",
+        *re.findall(r'<(?:script|link rel="stylesheet")[^>]*(?:src|href)="([^"]+)"', INDEX),
+        "the stream",
+    ]
     assert len(asked) <= MOST_REQUESTS
     assert not re.findall(r"^import ", PAGE, re.MULTILINE)  # one more request each
     assert "@import" not in STYLE
