@@ -1,7 +1,7 @@
 // The view of one bay: what it does and why, every limit, its curves, what a person may ask of it, what happened.
 
 import {
-  ENERGISED, ask, bayPath, figure, h, isUrgent, lasting, link, mayAsk, moment, put, readyAt, shape, showRequest, shown, stateMark,
+  ENERGISED, ask, bayPath, figure, go, h, isUrgent, lasting, link, mayAsk, moment, put, readyAt, shape, showRequest, shown, stateMark,
   stopButton, store, word,
 } from "./page.js";
 import { charges, curve, readJson } from "./records.js";
@@ -14,6 +14,10 @@ const GAP_S = 660;
 const STARTABLE = ["IDLE", "HELD", "FULL", "SUSPENDED", "OFFLINE"], RESETTABLE = ["TRIPPED", "UNCONTROLLABLE"];
 
 export function bayView(main, name) {
+  if (!store.bays.has(name)) {
+    main.append(h("h1", {}, word("no_bay", { bay: name })), h("p", { class: "way" }, link("/", `← ${word("back")}`)));
+    return { title: name };
+  }
   const parts = Object.fromEntries(["head", "now", "faults", "limits", "session", "policy"].map((one) => [one, h("div")]));
   const section = (title, ...inside) => h("section", { class: "card" }, h("h2", {}, word(title)), inside);
   const faults = section("faults", parts.faults), acts = new Acts(name), curves = new Curves(name), events = h("div", { class: "roll", tabindex: "0", role: "region", "aria-label": word("events") });
@@ -53,7 +57,7 @@ export function bayView(main, name) {
     close() { timers.forEach(clearInterval); curves.close(); },
     update(names) {
       if (names && !names.includes(name)) return;
-      if (!store.bays.has(name)) { put(parts.head, word("no_bay", { bay: name })); return; }
+      if (!store.bays.has(name)) { go(location.pathname); return; } // it is gone: say so
       const bay = { ...store.bays.get(name), ...closely };
       changed(parts.head, [bay.state, bay.reason, bay.since, bay.alarm, bay.next], () => head(bay));
       changed(parts.now, [bay.battery, bay.charger, bay.forecast, bay.identity], () => nowLines(bay));

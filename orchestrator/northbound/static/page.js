@@ -695,6 +695,8 @@ export const signedIn = () => live.restartAll();
 
 /** From so many bays on there is a filter, and from so many on the tiles are small. */
 const MANY = 20, DENSE = 33;
+/** More alarms than this have a line each. */
+const MANY_ALARMS = 8;
 
 function baysView(main) {
   const tiles = new Map();
@@ -772,7 +774,7 @@ function showAlarms(section, bays) {
   if (section.dataset.shown === key) return;
   section.dataset.shown = key;
   section.hidden = !lines.length;
-  section.replaceChildren(h("h2", { id: "alarms" }, word("alarms")), h("ul", {}, lines.map(({ level, of, path, text }) =>
+  section.replaceChildren(h("h2", { id: "alarms" }, word("alarms")), h("ul", { class: lines.length > MANY_ALARMS ? "many" : null }, lines.map(({ level, of, path, text }) =>
     h("li", { class: level }, shape(level === "danger" ? "octagon" : "triangle"),
       h("p", {}, h("b", {}, word(level), " · ", link(path, of)), " ", text)))));
 }
