@@ -54,7 +54,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     # A process of its own, which knows the controller by its sockets and the record by its files.
     "northbound": (
-        "config", "errors", "extras", "lastresort.asking", "model", "record", "show", "text",
+        "config", "errors", "extras", "lastresort.asking", "model", "record", "service.history_verb", "show", "text",
     ),
     "cli": (
         "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",

@@ -44,6 +44,8 @@ class Asking:
         }
         try:
             answer = await self._workers.do(ask, self._socket(), request, ANSWER_S)
+        except OSError as error:  # the station file cannot be read
+            raise RefusalError(503, Cause.of("controller_silent", why=error.strerror or str(error))) from None
         except NoServiceError as error:
             told = error.told.get("params") if isinstance(error.told, Mapping) else None
             why = told.get("reason") if isinstance(told, Mapping) else None

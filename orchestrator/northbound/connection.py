@@ -1,6 +1,7 @@
 """One browser's connection: uvicorn's with h11, and limits that it lacks on time and number."""
 
 import asyncio
+import socket
 
 from h11 import Data, EndOfMessage, LocalProtocolError, Response
 from uvicorn import Config
@@ -16,6 +17,8 @@ MOST_HEAD_BYTES = 16 * 1024
 HEAD_S = 10.0
 #: How long a reader may leave what was sent to it unread.
 UNREAD_S = 20.0
+#: The kernel's buffer for what is sent: more would be old news for a slow reader.
+BUFFER = 128 * 1024
 #: The most connections; one more displaces the one that has waited longest without a request.
 MOST = 256
 
@@ -37,6 +40,7 @@ class Connection(H11Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Take part, if there is room."""
         super().connection_made(transport)
+        transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
         if len(self._crowd) >= MOST:
             oldest = next((one for one in self._crowd if one.waits), self)
             oldest.transport.abort()

@@ -54,7 +54,7 @@ def _check_origin(told: Mapping[bytes, bytes], host: str) -> None:
     origin = told.get(b"origin")
     foreign = origin is not None and _netloc(origin) != host
     if foreign or told.get(b"sec-fetch-site", b"none") not in SAME_SITE:
-        said = (origin or told[b"sec-fetch-site"]).decode("latin-1")
+        said = (origin or told.get(b"sec-fetch-site") or b"-").decode("latin-1")
         raise RefusalError(403, Cause.of("origin_foreign", origin=f"{said:.80}"))
 
 

@@ -1,6 +1,7 @@
 """The link to the controller: keeps the picture as it is there, and knows when the controller is gone.
 
-A service that knows `watch` sends what changes; an older one is asked for its status once a second.
+A service that knows `watch` sends what changes. One that refuses it, as it is older or has enough readers, is asked for
+its status once a second; `watch` is tried again with the next connection.
 """
 
 import asyncio
@@ -26,8 +27,8 @@ RETRY_S, LONGEST_S = 0.5, 5.0
 Sources = Callable[[], list[Path]]
 
 
-class UnknownVerbError(Exception):
-    """The service is older than `watch`."""
+class NoStreamError(Exception):
+    """The service is older than `watch`, or has no place for one more reader."""
 
 
 class Link:
@@ -58,7 +59,7 @@ class Link:
                     async for line in lines:
                         self._take(line)
                         pause_s = RETRY_S
-            except UnknownVerbError:
+            except NoStreamError:
                 self._polls = True
                 continue
             except (OSError, ServiceError, ValueError, KeyError, TypeError, AttributeError, EOFError):
@@ -100,11 +101,11 @@ def may_open(path: Path) -> bool:
 
 
 async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
-    """The lines of `watch`. OSError, ValueError or EOFError when that is over; UnknownVerbError if there is none."""
+    """The lines of `watch`. OSError, ValueError or EOFError when that is over; NoStreamError if there is none."""
     async with asyncio.timeout(ANSWER_S):
         reader, writer = await asyncio.open_unix_connection(path, limit=MAX_ANSWER)
     try:
-        writer.write(b'{"verb": "watch"}\n')
+        writer.write(b'{"verb": "watch", "version": 1}\n')
         while True:
             async with asyncio.timeout(SILENT_S):
                 text = await reader.readline()
@@ -112,8 +113,7 @@ async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
                 raise EOFError
             line = json.loads(text)
             if line.get("ok") is False:
-                cause = line.get("cause") or {}
-                raise UnknownVerbError if cause.get("id") == "verb_unknown" else ValueError(line.get("error"))
+                raise NoStreamError
             yield line
     finally:
         writer.close()

@@ -46,6 +46,11 @@ class Picture:
         """Whether anything was told yet."""
         return self.first > 0
 
+    @property
+    def language(self) -> str:
+        """The language that the service writes its texts in."""
+        return str(self._station.get("language", ""))
+
     def replace(self, document: Document) -> bool:
         """The whole document as it is now; returns whether anything in it is new."""
         bays = {str(bay["name"]): bay for bay in document["bays"]}

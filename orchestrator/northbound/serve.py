@@ -1,6 +1,7 @@
 """`orchestrator serve`: the page of a station, in a process of its own, which knows the controller by its sockets."""
 
 import asyncio
+import errno
 import os
 import socket
 import ssl
@@ -21,6 +22,7 @@ from orchestrator.northbound.closely import Closely
 from orchestrator.northbound.door import Door
 from orchestrator.northbound.guard import Guard
 from orchestrator.northbound.link import Link
+from orchestrator.northbound.record_doors import RecordDoors
 from orchestrator.northbound.server import BACKLOG, PageServer, run
 from orchestrator.northbound.static import Static
 from orchestrator.northbound.stream import Streams
@@ -32,41 +34,58 @@ from orchestrator.text.catalogue import say
 def serve(file: str) -> int:
     """Serve until told to end; the first line says where."""
     northbound = load_northbound(file)
-    listen = Listen.of(northbound.page.listen)
     context = certificate(northbound.page.tls) if northbound.page.tls is not None else None
-    listener = listening(listen)
-    asyncio.run(_serve(northbound, listen, listener, context))
+    listener = listening(Listen.of(northbound.page.listen))
+    print(say(Cause.of("page_served", address=address_of(listener, context)), own_language()), flush=True)
+
+    def on_hangup() -> None:
+        if northbound.page.tls is not None and context is not None:
+            reload_certificate(context, northbound.page.tls)
+
+    async def go_on() -> None:
+        server, link = assembled(northbound, listener, context)
+        await run(server, link.run(), on_hangup)
+
+    asyncio.run(go_on())
     sys.stdout.flush()
     os._exit(0)  # at once: no thread that still reads the record is waited for
 
 
-async def _serve(
-    northbound: Northbound, listen: Listen, listener: socket.socket, context: ssl.SSLContext | None
-) -> None:
-    station, tls = northbound.station, northbound.page.tls
+def assembled(
+    northbound: Northbound, listener: socket.socket, context: ssl.SSLContext | None
+) -> tuple[PageServer, Link]:
+    """The server, and its link to the controller, which is to run beside it. Belongs to the event loop."""
+    station = northbound.station
     users = Users(northbound.users, tell) if northbound.users is not None else None
     link = Link(lambda: sockets(station))
     accounts = Accounts(users, time.monotonic, secure=context is not None)
-    closely = Closely(lambda: sockets(station)[0])
-    app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), (closely.door(),))
-    guard = Guard(app.router(), Door.of(listen.host, northbound.page.hosts), tell)
-    scheme, port = "https" if context is not None else "http", listener.getsockname()[1]
-    host = f"[{listen.host}]" if ":" in listen.host else listen.host
-    print(say(Cause.of("page_served", address=f"{scheme}://{host}:{port}/"), own_language()), flush=True)
+    records = RecordDoors(lambda: journal(station), tell).doors()
+    closely = Closely(lambda: sockets(station)[0]).door()
+    app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), (*records, closely))
+    door = Door.of(Listen.of(northbound.page.listen).host, northbound.page.hosts)
+    return PageServer(Guard(app.router(), door, tell), listener, context), link
 
-    def on_hangup() -> None:
-        if tls is not None and context is not None:
-            reload_certificate(context, tls)
 
-    await run(PageServer(guard, listener, context), link.run(), on_hangup)
+def address_of(listener: socket.socket, context: ssl.SSLContext | None) -> str:
+    """What is to be typed into a browser."""
+    host, port = listener.getsockname()[:2]
+    return f"{'http' if context is None else 'https'}://{f'[{host}]' if ':' in host else host}:{port}/"
 
 
 def sockets(station: Path) -> list[Path]:
     """The sockets of the station's service: that for looking, if it has one, then that for requests."""
-    found = wiring(station)
-    if not found.socket:
-        raise FileNotFoundError(str(station))
-    return [Path(found.socket)]
+    return [_named(station, wiring(station).socket)]
+
+
+def journal(station: Path) -> Path:
+    """The journal of the station's service."""
+    return _named(station, wiring(station).journal)
+
+
+def _named(station: Path, path: str) -> Path:
+    if not path:  # the file is damaged
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(station))
+    return Path(path)
 
 
 def tell(cause: Cause) -> None:

@@ -50,7 +50,8 @@ class Sessions:
         """A session; returns its id, which nobody has had before."""
         self._drop(now_s)
         own = [key for key, one in self._sessions.items() if one.name == name]
-        for key in own[: max(len(own) + 1 - MOST_OF_ONE, 0)] or list(self._sessions)[: len(self._sessions) + 1 - MOST]:
+        too_many = (own, MOST_OF_ONE), (list(self._sessions), MOST)
+        for key in {key for keys, most in too_many for key in keys[: max(len(keys) + 1 - most, 0)]}:
             del self._sessions[key]
         id_ = secrets.token_urlsafe(32)
         self._sessions[_key(id_)] = Session(name, user.password, now_s + LASTS_S)

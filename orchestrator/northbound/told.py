@@ -1,13 +1,13 @@
 """What a reader is told of the station, in the reader's language; the same for all who have seen the same."""
 
 import json
-from collections.abc import Mapping
 from typing import Any
 
 from orchestrator import __version__
+from orchestrator.model.cause import PARTS
 from orchestrator.northbound.picture import Change, Picture
 from orchestrator.text.catalogue import LANGUAGES
-from orchestrator.text.document import in_language
+from orchestrator.text.document import in_language, said
 
 #: So many different texts of one revision are kept: readers that are up to date share one for each language.
 MOST_TEXTS = 8
@@ -43,15 +43,31 @@ class Teller:
             if len(self._texts) >= MOST_TEXTS:
                 self._texts.clear()
             change = picture.since(seen)
-            self._texts[key] = change, encoded(fields(change, language))[1:-1]
+            own = picture.language == language  # nothing to translate
+            self._texts[key] = change, encoded(fields(change, "" if own else language))[1:-1]
         return self._texts[key]
 
 
 def fields(change: Change, language: str) -> dict[str, Any]:
     """A change as JSON: a whole document has its bays in a list, what changed has them by name."""
-    document = in_language({**change.station, "bays": list(change.bays)}, language)
+    document = {**change.station, "bays": list(change.bays)}
+    if language:
+        document = in_language(document, language)
+        document["bays"] = [_causes(bay, language) for bay in document["bays"]]
     if change.whole:
         return {"revision": change.revision, "document": {**document, "revision": change.revision}}
-    bays: list[Mapping[str, Any]] = document.pop("bays")
-    told = {str(bay["name"]): bay for bay in bays}
+    told = {str(bay["name"]): bay for bay in document.pop("bays")}
     return {"revision": change.revision, "bays": told, "station": document, "gone": list(change.gone)}
+
+
+def _causes(part: Any, language: str) -> Any:  # noqa: ANN401 - a part of the document
+    """The part with the sentence of each cause in it in this language, too."""
+    if isinstance(part, list):
+        return [_causes(one, language) for one in part]
+    if not isinstance(part, dict):
+        return part
+    told = {name: _causes(value, language) for name, value in part.items() if name != "params"}
+    if "params" in part and "id" in part and "text" in part:
+        cause = {name: value for name, value in part.items() if name in PARTS}
+        return {**told, "params": part["params"], "text": said(cause, part["text"], language)}
+    return {**part, **told}

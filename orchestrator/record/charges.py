@@ -52,9 +52,13 @@ class Charges:
         battery: str | None = None,
         since_s: float | None = None,
         began_s: tuple[float, float] | None = None,
+        before: str | None = None,
         limit: int | None = None,
     ) -> Iterator[Record]:
-        """What lists need of each, the newest first; not those over before `since_s`, or begun outside `began_s`."""
+        """What lists need of each, the newest first; not those over before `since_s`, or begun outside `began_s`.
+
+        `before`: only those older than the charge with this id.
+        """
         where, values = ["1"], list[object]()
         if bays is not None:
             where.append(f"bay IN ({', '.join('?' * len(bays))})")
@@ -62,6 +66,7 @@ class Charges:
         from_s, to_s = began_s or (None, None)
         for column, value in (
             ("battery =", battery), ("last_unix_s >=", since_s), ("begin_unix_s >=", from_s), ("begin_unix_s <", to_s),
+            ("id <", before),
         ):  # fmt: skip
             if value is not None:
                 where.append(f"{column} ?")

@@ -41,6 +41,7 @@ class Identified:
         self._serial: int | None = None
         self._typed: str | None = None  # None before the first decision: the persisted state is still being read
         self.identity = Identity.of(bay.battery.can, bay.battery.node_id, None, "")  #: the present one
+        self._status: tuple[Identity | None, dict[str, object]] = (None, {})  # of which identity
         self.asked: deque[Named] = deque()  #: what operators have typed that no decision has taken yet
         self._taken: list[Named] = []  # what one has taken, without its revision yet
 
@@ -52,8 +53,11 @@ class Identified:
 
     def status(self) -> dict[str, object]:
         """The battery's part of the status document. Any thread."""
-        now = self.identity
-        return {**self._fields(now), "text": sentence(now.cause, self._language)}
+        now, (known, status) = self.identity, self._status
+        if now != known:
+            status = {**self._fields(now), "text": sentence(now.cause, self._language)}
+            self._status = (now, status)
+        return status
 
     def follow(self, now_s: float, snapshot: Snapshot, memory: Memory) -> None:
         """Follow a decision: made from `snapshot`, with `memory` as its result."""

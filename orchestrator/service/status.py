@@ -26,7 +26,7 @@ from orchestrator.model import (
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.records import command_fields, session_fields
 from orchestrator.service.wallclock import WallClock
-from orchestrator.text.catalogue import fields, say
+from orchestrator.text.catalogue import fields
 
 #: The parts of a charger's reading in the status; `t_s` is when it was requested, in monotonic seconds of this machine.
 SHOWN = tuple(name for name in ChargerReading.__slots__ if name != "illegal")
@@ -59,16 +59,17 @@ def bay_status(
     Each cause is included as data; `reason`, `text`, `step_rule` and `result` are its texts in `language`.
     """
     step, session, clock = decision.step, decision.session, WallClock(now_s, wall_s)
-    cause = clock.told(decision.cause)
+    cause = fields(clock.told(decision.cause), language)
+    rule = fields(step.rule, language) if step else None
     return {
         "name": name,
         "state": decision.state,
-        "reason": say(cause, language),
-        "cause": fields(cause, language),
+        "reason": _text(cause),
+        "cause": cause,
         "step": step.index if step else None,
         "step_current_a": step.current_a if step else None,
-        "step_rule": say(step.rule, language) if step else "",
-        "step_cause": fields(step.rule, language) if step else None,
+        "step_rule": _text(rule),
+        "step_cause": rule,
         "step_key": step.key if step else "",
         "step_place": step.place if step else "",
         "command": {**_setpoint(decision.setpoint), "order": command_fields(decision.command)},
@@ -90,13 +91,13 @@ def bay_status(
 
 def _fault(fault: ActiveFault, clock: WallClock, language: str) -> dict[str, object]:
     """`since`, `gone_since` and `clears_at` are Unix time; `clears` is what ends it: a command, a time, a condition."""
-    told, ends = clock.told(fault.told), clock.told(fault.next)
+    told, ends = fields(clock.told(fault.told), language), clock.told(fault.next)
     until_s = fault.next.param("until_t_s") if fault.next is not None else None
     return {
         "id": fault.id,
         "effect": fault.effect.name,
-        "cause": fields(told, language),
-        "text": say(told, language),
+        "cause": told,
+        "text": _text(told),
         "since": round(clock.unix_s(fault.since_s), 3),
         "gone_since": round(clock.unix_s(fault.gone_s), 3) if fault.gone_s is not None else None,
         "clears": fields(ends, language),
@@ -137,7 +138,13 @@ def contactor_fields(contactor: Contactor, language: str) -> dict[str, object]:
 
 def _problem(problem: Cause | None, language: str) -> dict[str, object]:
     """What is wrong, in words and as data; "" and None where nothing is."""
-    return {"problem": say(problem, language), "cause": fields(problem, language)}
+    told = fields(problem, language)
+    return {"problem": _text(told), "cause": told}
+
+
+def _text(told: Mapping[str, object] | None) -> object:
+    """The sentence of a cause in this document: making it costs most."""
+    return told["text"] if told is not None else ""
 
 
 def _level(alarm: Alarm) -> str:

@@ -41,6 +41,7 @@ from orchestrator.model import Cause, ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
 from orchestrator.service import ports as ports_module
 from orchestrator.service import reload as reload_module
+from orchestrator.service import sockets as sockets_module
 from orchestrator.service import supervisor as supervisor_module
 from orchestrator.service import wiring as wiring_module
 from orchestrator.service.asked import Asked
@@ -172,7 +173,7 @@ class Shelf:
 class Silence:
     """A control socket that nobody uses."""
 
-    def __init__(self, *_: object) -> None:
+    def __init__(self, *_: object, **__: object) -> None:
         """Any argument."""
 
     def start(self) -> None:
@@ -182,6 +183,13 @@ class Silence:
 
     def stalled(self, _now_s: float) -> bool:
         return False
+
+
+class Watching(Silence):
+    """The readers of its status: there are none."""
+
+    def take(self, client: object) -> None:
+        """Nobody comes here, either."""
 
 
 def station(
@@ -309,10 +317,11 @@ class World:
             ports_module: {"monotonic": time.clock, "SimpleQueue": _Queues(time), "signal": SIGNALS},
             supervisor_module: {
                 "monotonic": time.clock, "boottime": time.clock,
-                "Journal": Notebook, "Console": Notebook, "ControlSocket": Silence,
+                "Journal": Notebook, "Console": Notebook,
                 "Store": partial(Shelf, self._kept), "boot_id": lambda: "virtual", "close_all": _close_all,
                 "signal": SIGNALS,
             },
+            sockets_module: {"monotonic": time.clock, "ControlSocket": Silence, "Streams": Watching},
             asked_module: {"Event": event},
             reload_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},
             charger_module: {"Event": event, "Thread": thread},

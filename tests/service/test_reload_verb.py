@@ -12,6 +12,7 @@ from orchestrator.model import Request
 from orchestrator.service import request_handler
 from orchestrator.service.reception import Answer
 from orchestrator.service.request_handler import RequestHandler
+from orchestrator.service.station_status import StationStatus
 from orchestrator.service.strays import Strays
 from tests.service.bench import fields_of
 from tests.service.control_bench import listening
@@ -27,8 +28,10 @@ class Asking:
         self.site, bench = site, site.bench
         site.reload.start()
         station = load_station(site.station_file)
+        strays = cast("Strays", None)
+        shown = StationStatus(station, [bench.bay], bench.journal, bench.store, strays, lambda: bench.now_s)
         self.handler = RequestHandler(
-            station, [bench.bay], bench.journal, bench.store, cast("Strays", None), site.reload,
+            shown, [bench.bay], bench.journal, bench.store, strays, site.reload,
             lambda: bench.now_s, lambda: 1.8e9, lambda _: None,
         )  # fmt: skip
 

@@ -1,0 +1,156 @@
+"""The status as its readers follow it: each bay's entry with the revision of its last change, made once for all.
+
+Theory of operation. At each look a bay whose state, cause, faults, step, command or alarm have changed is described
+anew. All others are described anew once a second, spread over that second, so that no look takes long. What has only
+grown older is no change, unless it is too old. A changed entry replaces the one before and gets the next revision; a
+reader that has been told everything up to some revision is told all entries above it, however many changes it has
+missed. So there is one slot for each bay and no queue, whatever a reader does.
+"""
+
+import json
+import secrets
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import ceil, inf
+from operator import attrgetter
+from typing import Any, Protocol
+
+from orchestrator.model import Decision
+
+#: How often an entry is described anew at least, and after how long at the earliest if no more than values may differ.
+PERIOD_S, LEAST_S = 1.0, 0.9
+MINUTE_S = 60.0
+#: The maximum number of entries described at one look.
+MOST = 24
+
+Fields = Mapping[str, object]
+
+
+class Bay(Protocol):
+    """What is needed of a bay."""
+
+    name: str
+    decision: Decision | None
+
+    def status(self) -> dict[str, object]:
+        """The bay's part of the status document."""
+
+
+class Published:
+    """The entries, and the lines for their readers. `station` makes the document's other parts. Used by one thread."""
+
+    def __init__(self, bays: Sequence[Bay], station: Callable[[], Fields]) -> None:
+        self.revision = 0
+        self.instance = secrets.token_hex(
+            8
+        )  #: another one means another run of the service, whose revisions begin anew
+        self._entries = [_Entry(bay, number / len(bays) * PERIOD_S) for number, bay in enumerate(bays)]
+        self._station, self._station_s = station, -inf  # when they are due
+        self._parts: dict[str, tuple[int, object]] = {}  # the station's, with the revisions of their last changes
+        self._lines: dict[int, bytes] = {}  # what is new since a revision
+
+    def look(self, now_s: float) -> bool:
+        """Describe what is due, most urgent first; returns whether that was everything."""
+        turned = [entry for entry in self._entries if entry.has_turned()]
+        due = sorted((entry for entry in self._entries if now_s >= entry.due_s), key=lambda entry: entry.due_s)
+        todo = list(dict.fromkeys((*turned, *due)))
+        changed: list[_Entry] = [entry for entry in todo[:MOST] if entry.describe(now_s)]
+        parts: Fields = {}
+        if turned or now_s >= self._station_s:
+            parts, self._station_s = dict(self._changed_parts()), now_s + PERIOD_S
+        if changed or parts:
+            self.revision += 1
+            self._lines.clear()
+        for entry in changed:
+            entry.revision = self.revision
+        self._parts |= {name: (self.revision, part) for name, part in parts.items()}
+        return len(todo) <= MOST
+
+    def _changed_parts(self) -> Iterator[tuple[str, object]]:
+        for name, part in self._station().items():
+            if name not in self._parts or self._parts[name][1] != part:
+                yield name, part
+
+    def document(self) -> bytes:
+        """The first line for a reader: the whole status document."""
+        head = {"ok": True, "revision": self.revision, "instance": self.instance}
+        parts = encoded({name: part for name, (_, part) in self._parts.items()})
+        bays = b", ".join(entry.text for entry in self._entries)
+        return b'%b, "document": {%b, "bays": [%b]}}\n' % (encoded(head)[:-1], parts[1:-1], bays)
+
+    def since(self, revision: int) -> bytes:
+        """The line for a reader that has been told everything up to `revision`: what has changed, if anything."""
+        if revision not in self._lines:
+            line = [b'"revision": %d' % self.revision]
+            if bays := [entry.named for entry in self._entries if entry.revision > revision]:
+                line.append(b'"bays": {%b}' % b", ".join(bays))
+            if parts := {name: part for name, (changed, part) in self._parts.items() if changed > revision}:
+                line.append(b'"station": %b' % encoded(parts))
+            self._lines[revision] = b"{%b}\n" % b", ".join(line)
+        return self._lines[revision]
+
+
+class _Entry:
+    """One bay's entry."""
+
+    def __init__(self, bay: Bay, phase_s: float) -> None:
+        self.revision, self.due_s, self.text = 0, -inf, b""
+        self._bay, self._phase_s, self._key = bay, phase_s, encoded(bay.name)
+        self._seen: Decision | None = None  # the last decision looked at
+        self._gist: object = None  # of the one described last
+        self._lasting: object = None
+
+    @property
+    def named(self) -> bytes:
+        """The entry as a member of an object."""
+        return b"%b: %b" % (self._key, self.text)
+
+    def has_turned(self) -> bool:
+        """Whether the bay has decided anything that people must see at once."""
+        decision = self._bay.decision
+        if decision is not self._seen and _gist(decision) == self._gist:
+            self._seen = decision
+        return decision is not self._seen
+
+    def describe(self, now_s: float) -> bool:
+        """Make the entry; returns whether it differs in more than its age."""
+        seen, status = self._bay.decision, self._bay.status()
+        lasting = _lasting(status)
+        changed = lasting != self._lasting
+        if changed:
+            self.text, self._lasting = encoded(status), lasting
+        self._seen, self._gist = seen, _gist(seen)  # not before: it may have failed
+        self.due_s = self._phase_s + ceil((now_s + LEAST_S - self._phase_s) / PERIOD_S) * PERIOD_S
+        return changed
+
+
+GIST = attrgetter("state", "alarm", "faults", "setpoint", "command")
+
+
+def _gist(decision: Decision | None) -> object:
+    """What people must see at once if it changes; figures can wait."""
+    if decision is None:
+        return None
+    cause, step = decision.cause, decision.step
+    return GIST(decision), cause.id, cause.key, step and (step.index, step.key), decision.session is None
+
+
+def _lasting(status: Mapping[str, Any]) -> object:
+    """What counts of an entry: not the ages, except those of values that are too old, as people read them."""
+    charger, battery = dict(status["charger"]), dict(status["battery"])
+    del charger["t_s"]
+    age_s, ages_s = charger.pop("age_s"), battery.pop("age_s")
+    old = {name: _age(ages_s[name]) for name in battery["old"]}
+    return {**status, "charger": charger, "battery": battery, "age": charger["old"] and _age(age_s), "ages": old}
+
+
+def _age(age_s: float) -> float:
+    """In seconds, later in minutes."""
+    return age_s // 1 if age_s < 2 * MINUTE_S else age_s // MINUTE_S * MINUTE_S
+
+
+JSON = json.JSONEncoder(ensure_ascii=False)
+
+
+def encoded(value: object) -> bytes:
+    """As JSON."""
+    return JSON.encode(value).encode(errors="backslashreplace")

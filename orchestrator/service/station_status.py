@@ -1,0 +1,41 @@
+"""The status document of the running station, for everything that shows it."""
+
+from collections.abc import Callable, Sequence
+
+from orchestrator.config.station import Station
+from orchestrator.service.bay import BayRunner
+from orchestrator.service.journal import Journal
+from orchestrator.service.status import station_status
+from orchestrator.service.store import Store
+from orchestrator.service.strays import Strays
+
+
+class StationStatus:
+    """Describes the station. Any thread."""
+
+    def __init__(
+        self,
+        station: Station,
+        bays: Sequence[BayRunner],
+        journal: Journal,
+        store: Store,
+        strays: Strays,
+        clock: Callable[[], float],
+    ) -> None:
+        self.language = station.language.value  #: of its texts
+        self._station, self._bays = station, bays
+        self._journal, self._store, self._strays, self._clock = journal, store, strays, clock
+
+    def document(self, bays: Sequence[BayRunner], *, closely: bool = False) -> dict[str, object]:
+        """With these bays; `closely`: with what costs too much for every bay of every answer."""
+        now_s, shown = self._clock(), [bay.status(closely=closely) for bay in bays]
+        problem, not_persisted = self._journal.problem(now_s), self._store.not_persisted(now_s)
+        alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
+        strays = self._strays.status(self.language)
+        return station_status(self._station, alarm, shown, problem, not_persisted, strays)
+
+    def parts(self) -> dict[str, object]:
+        """Everything but the bays."""
+        whole = self.document([])
+        del whole["bays"]
+        return whole
