@@ -39,7 +39,7 @@ class Asking:
         request: dict[str, object] = {
             "verb": action,
             "bays": [bay],
-            "by": {"door": DOOR, "user": me.name, "address": address},
+            "by": ", ".join(filter(None, (DOOR, me.name, address))),
             **({"because": because} if because else {}),
         }
         try:

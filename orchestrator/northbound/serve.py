@@ -74,7 +74,8 @@ def address_of(listener: socket.socket, context: ssl.SSLContext | None) -> str:
 
 def sockets(station: Path) -> list[Path]:
     """The sockets of the station's service: that for looking, if it has one, then that for requests."""
-    return [_named(station, wiring(station).socket)]
+    found = wiring(station)
+    return [*([Path(found.view_socket)] if found.view_socket else []), _named(station, found.socket)]
 
 
 def journal(station: Path) -> Path:

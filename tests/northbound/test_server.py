@@ -112,9 +112,7 @@ def test_a_reader_that_does_not_read_is_dropped_and_the_others_go_on(
         time.sleep(0.3)
         station.document = before
         assert len(events.next("change")[2]["gone"]) == 10
-        with pytest.raises(ConnectionResetError):
-            while lazy.recv(1 << 16):
-                pass
+        assert sum(map(len, iter(lambda: lazy.recv(1 << 16), b""))) < 1_000_000, "the rest is not sent any more"
 
 
 def test_no_more_streams_than_there_are_places(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,7 +141,7 @@ def test_a_request_goes_to_the_controller_with_who_asks(pair: Pair) -> None:
     assert (answer.status, answer.json["ok"], answer.json["text"]) == (200, True, "bay-1: stop accepted")
     (asked,) = station.asked
     assert (asked["verb"], asked["bays"], asked["because"]) == ("stop", ["bay-1"], "wet floor")
-    assert asked["by"] == {"door": "page", "user": "", "address": "127.0.0.1"}
+    assert asked["by"] == "page, 127.0.0.1"
 
 
 def test_what_the_controller_refuses_is_told_in_the_readers_language(pair: Pair) -> None:
@@ -197,7 +195,7 @@ def test_a_viewer_looks_and_does_not_act(browser: Browser, closed: Pair) -> None
 def test_an_operator_acts_in_his_own_name_until_he_logs_out(browser: Browser, closed: Pair) -> None:
     browser.login("kim", "kim secret")
     assert browser.post("/api/request", {"action": "stop", "bay": "bay-1", "by": {"user": "lee"}}).json["ok"]
-    assert closed[1].asked.pop()["by"] == {"door": "page", "user": "kim", "address": "127.0.0.1"}
+    assert closed[1].asked.pop()["by"] == "page, kim, 127.0.0.1"
     session = browser.cookie
     assert browser.post("/api/logout", {}).status == 200
     browser.cookie = session
