@@ -15,6 +15,7 @@ from orchestrator.model import Cause
 from orchestrator.northbound.app import Answer, json_response, language
 from orchestrator.northbound.asking import NAME
 from orchestrator.northbound.fields import text_field
+from orchestrator.northbound.link import may_open
 from orchestrator.northbound.refusal import RefusalError
 from orchestrator.northbound.sessions import Me
 from orchestrator.northbound.work import Workers
@@ -30,10 +31,10 @@ Document = Mapping[str, Any]
 
 
 class Closely:
-    """Asks the service for the status of one bay. `socket` is where."""
+    """Asks the service for the status of one bay, on the first of its `sockets` that is open to us."""
 
-    def __init__(self, socket: Callable[[], Path]) -> None:
-        self._socket, self._workers = socket, Workers("closely", 2, 14)
+    def __init__(self, sockets: Callable[[], list[Path]]) -> None:
+        self._sockets, self._workers = sockets, Workers("closely", 2, 14)
         self._kept: dict[str, tuple[float, Document]] = {}
 
     def door(self) -> tuple[str, Role, Answer]:
@@ -49,7 +50,9 @@ class Closely:
         if monotonic() - asked_s < KEPT_S:
             return document
         try:
-            document = ask(self._socket(), {"verb": "status", "bay": bay}, ANSWER_S)
+            paths = self._sockets()
+            path = next((one for one in paths if may_open(one)), paths[-1])
+            document = ask(path, {"verb": "status", "bay": bay}, ANSWER_S)
         except (NoServiceError, OSError) as error:
             raise RefusalError(503, Cause.of("no_journal", why=str(error))) from None
         except ServiceError:

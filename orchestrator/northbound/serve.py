@@ -60,7 +60,7 @@ def assembled(
     link = Link(lambda: sockets(station))
     accounts = Accounts(users, time.monotonic, secure=context is not None)
     records = RecordDoors(lambda: journal(station), tell).doors()
-    closely = Closely(lambda: sockets(station)[0]).door()
+    closely = Closely(lambda: sockets(station)).door()
     app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), (*records, closely))
     door = Door.of(Listen.of(northbound.page.listen).host, northbound.page.hosts)
     return PageServer(Guard(app.router(), door, tell), listener, context), link

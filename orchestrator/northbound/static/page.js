@@ -330,7 +330,7 @@ export function readyAt(bay) {
 
 // --- the live link: one stream for all tabs of a browser -------------------------------------------------------------
 
-const QUIET_S = 12, STEAL_S = 8, LOCK = "station stream";
+const QUIET_S = 12, STEAL_S = 8, REFUSED_S = 30, LOCK = "station stream";
 const nowS = () => Date.now() / 1000;
 const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
 
@@ -418,7 +418,10 @@ class Link {
   }
 
   /** Begins anew: another language, or another person. */
-  restart() { this.stream?.abort(); }
+  restart() {
+    this.stream?.abort();
+    this.wake?.();
+  }
 
   restartAll() { this.tell({ kind: "restart", language }); this.restart(); }
 
@@ -443,7 +446,8 @@ class Link {
       if (failures === 3) this.polls = !this.polls;
       this.lose();
       this.tell({ kind: "lost", sinceS: this.lostS });
-      await pause(Math.min(8, 0.5 * 2 ** failures) * (0.5 + Math.random()));
+      const pauseS = store.refused ? REFUSED_S : Math.min(8, 0.5 * 2 ** failures) * (0.5 + Math.random());
+      await Promise.race([pause(pauseS), new Promise((resolve) => { this.wake = resolve; })]);
     }
   }
 
@@ -511,7 +515,10 @@ function takeEvent(event, data, revision) {
     if (!known || data.gone?.length) names = null;
     store.station = { ...store.station, ...(data.station ?? {}) };
   } else if (event === "link") store.controller = data;
-  else if (event === "refused") store.refused = data;
+  else if (event === "refused") {
+    store.refused = data;
+    if (data) Object.assign(store, { revision: null, bays: new Map(), station: null, me: null }); // it is not for this person's eyes
+  }
   shell.update(names, event);
 }
 
@@ -630,8 +637,12 @@ class Shell {
   /** Something is new: of these bays, or of everything. */
   update(names, event = "") {
     if (event === "whole" && this.wait) { this.open(); return; }
-    if (store.refused && this.tab !== "login") { go("/login"); return; }
-    if (event === "whole" && this.tab === "login" && !store.refused && store.me && location.pathname === "/login") { go("/"); return; }
+    if (store.refused && this.tab !== "login") {
+      this.wanted = location.pathname + location.search;
+      go("/login");
+      return;
+    }
+    if (event === "whole" && this.tab === "login") { go(this.wanted ?? "/"); return; }
     if (this.wait) put(this.wait, word("loading"));
     put(this.name, store.station?.station ?? word("title"));
     document.title = [this.view?.title, store.station?.station ?? word("title")].filter(Boolean).join(" · ");
@@ -641,7 +652,7 @@ class Shell {
   }
 
   showPerson() {
-    const key = `${language} ${store.me?.name} ${store.me?.role}`;
+    const key = `${language} ${store.me?.name} ${store.me?.role} ${store.refused}`;
     const before = this.who.dataset.shown;
     if (before === key) return;
     this.who.dataset.shown = key;
@@ -649,7 +660,7 @@ class Shell {
     const local = store.me && !store.me.name;
     const out = () => fetch("/api/logout", { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" }).finally(() => live.restartAll());
     const shown = store.me ? h("button", { type: "button", class: "plain", onclick: out }, word("sign_out", { name: store.me.name })) : link("/login", word("sign_in"));
-    this.who.replaceChildren(...(local ? [] : [shown]));
+    this.who.replaceChildren(...(local || store.refused ? [] : [shown]));
   }
 
   /** Each second: whether what is shown is still true. */
@@ -710,7 +721,7 @@ function baysView(main) {
   const search = h("input", { type: "search", placeholder: word("search"), "aria-label": word("search"), oninput: () => { filter.text = search.value.trim().toLowerCase(); show(); } });
   const tools = h("div", { class: "filters", role: "group", "aria-label": word("filter") }, chips.map(({ chip }) => chip), search);
   const grid = h("ul", { class: "tiles" }), none = h("p", { class: "wait", hidden: true }, word("none_match"));
-  main.append(h("h1", { class: "unseen" }, word("bays")), alarms, summary, tools, grid, none);
+  main.append(h("h1", { class: "unseen" }, word("bays")), alarms, h("div", { class: "over" }, summary, tools), grid, none);
 
   function matches(bay) {
     const about = `${bay.name} ${bay.identity?.id ?? ""} ${bay.state} ${word(bay.state)} ${bay.policy?.name ?? ""}`.toLowerCase();
