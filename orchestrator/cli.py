@@ -104,8 +104,8 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     check.add_argument("--jobs", type=int, metavar="N", help="processes for that (default: one per core)")
     check.set_defaults(run=_check)
-    schema = verbs.add_parser("schema", help="print the JSON Schema of a kind of file, for editors")
-    schema.add_argument("kind", choices=SCHEMAS, help="the kind of file")
+    schema = verbs.add_parser("schema", help="print the JSON Schema of a kind of file, for editors, or of the status")
+    schema.add_argument("kind", choices=SCHEMAS, help="the kind of file; status: what `status --json` prints")
     schema.set_defaults(run=_schema)
     decode = verbs.add_parser("decode", help="explain frames of the charger's protocol")
     decode.add_argument("hex", nargs="+", help="bytes in hexadecimal, e.g. AF FA 90 04 10 90 00 34 AF A0")
@@ -125,7 +125,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     demo.set_defaults(run=_demo)
 
 
-SCHEMAS = ("policy", "station", "map", "scenario", "northbound")
+SCHEMAS = ("policy", "station", "map", "scenario", "northbound", "status")
 NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
@@ -192,7 +192,11 @@ def _schema(arguments: argparse.Namespace) -> int:
     from orchestrator.columns import json_text
     from orchestrator.config.files import KINDS
     from orchestrator.config.json_schema import json_schema
+    from orchestrator.model.document_schema import status_schema
 
+    if arguments.kind == "status":
+        print(json_text(status_schema(), indent=1))
+        return 0
     kind = next(kind for kind in KINDS if kind.key == arguments.kind)
     print(json_text(json_schema(kind), indent=1))
     return 0

@@ -338,6 +338,8 @@ def is_free(node: ast.AST) -> bool:
         return isinstance(node.exc, ast.Call) and called(node.exc) in DIAGNOSTICS
     if isinstance(node, ast.Call):
         return called(node) in HELP | {"cast"}
+    if isinstance(node, ast.Subscript):
+        return isinstance(node.value, ast.Name) and node.value.id == "Annotated"  # what a member of a record means
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 

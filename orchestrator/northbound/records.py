@@ -35,7 +35,7 @@ class Records:
     """The records beside a journal. `say` is told what is wrong with their index."""
 
     def __init__(self, journal: Callable[[], Path], say: Callable[[Cause], None]) -> None:
-        self._journal, self._say = journal, say
+        self._journal, self._say, self._said = journal, say, frozenset[str]()
 
     def sessions(self, query: Query, language: str) -> dict[str, Any]:
         """The charges that are meant, the newest first; the next page is `before` the last of them."""
@@ -116,10 +116,16 @@ class Records:
 
     def _charges(self) -> Charges:
         try:
-            return Charges(self._folder, self._say)
+            return Charges(self._folder, self._say_once)
         except OSError as error:
             why = error.strerror or str(error)
             raise RefusalError(503, Cause.of("charges_unreadable", folder=error.filename, error=why)) from None
+
+    def _say_once(self, cause: Cause) -> None:
+        """The index of a journal in which we may not write is made anew each time; that is no news."""
+        if cause.id not in self._said:
+            self._said |= {cause.id}
+            self._say(cause)
 
     @staticmethod
     def _listed(charges: Charges, query: Query, limit: int) -> Iterator[Record]:

@@ -114,6 +114,7 @@ def certificate(tls: Tls) -> ssl.SSLContext:
 def reload_certificate(context: ssl.SSLContext, tls: Tls) -> None:
     """Read the certificate again, for connections from now on."""
     try:
+        certificate(tls)  # a context that cannot take all of it would lose what it has
         _load(context, tls)
     except CauseError as error:
         tell(Cause.of("certificate_kept", why=error.cause))

@@ -14,6 +14,7 @@ from orchestrator.core.persisted import Persisted
 from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
+from orchestrator.model.bay_document import BayEntry
 from orchestrator.service.asked import Answers, Asked, Requests, Taken
 from orchestrator.service.bayjournal import BayJournal
 from orchestrator.service.bayrecord import BayRecord
@@ -232,18 +233,17 @@ class BayRunner:
         self._revision = self._store.put(self.place, persisted)
         self.identified.answer(self._revision)
 
-    def status(self, *, closely: bool = False) -> dict[str, object]:
+    def status(self, *, closely: bool = False) -> BayEntry:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
         decision = told(self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER), *known)
-        contactor = self._contactor
         return {
             **bay_status(self.name, self._snapshot, decision, clock.now_s, clock.wall_s, self._language),
             **outlook(decision, *known, clock, self._language, closely=closely),
             **self._timer.next(decision, clock),
             "identity": self.identified.status(),
             "timed_start": self._timer.status(clock),
-            "contactor": contactor and contactor_fields(contactor, self._language),
+            "contactor": contactor_fields(self._contactor, self._language) if self._contactor is not None else None,
             "port": self.place.port,
             "bmu": {"can": self.place.can, "node_id": self.place.node_id},
             "policy": self.policy.status(),

@@ -61,7 +61,7 @@ class Followed:
                 raise
             return False
         if not part:
-            raise ConnectionError("the service has closed the connection")
+            raise ConnectionError("closed")
         self._heard += part
         self._heard_s = monotonic()
         if len(self._heard) > MAX_ANSWER:
@@ -83,5 +83,5 @@ class Followed:
         self._bays |= bays
         for name in line.get("gone", ()):
             self._bays.pop(name, None)
-        self.document |= {**station, "bays": list(self._bays.values())}
+        self.document |= {**station, "time": line["time"], "bays": list(self._bays.values())}
         return bool(bays or station)

@@ -9,10 +9,12 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import BY_PERSON
 from orchestrator.model import Cause, Decision, Effect, Snapshot, State
+from orchestrator.model.bay_document import Outlook
 from orchestrator.model.cause import SEVERAL
+from orchestrator.model.document import Forecast, Limit, Target
 from orchestrator.service.forecast import bmu_minutes, own_minutes
 from orchestrator.service.wallclock import WallClock
-from orchestrator.text.catalogue import fields, say
+from orchestrator.text.catalogue import as_told, fields, say
 
 #: What comes next where neither the reason nor a fault says it. CHARGING has sentences of its own.
 NEXT = {
@@ -42,19 +44,19 @@ def outlook(
     language: str,
     *,
     closely: bool,
-) -> dict[str, object]:
+) -> Outlook:
     """`since` and `at` are Unix time. Only `closely` there are `limits` and `forecast`, which cost most of it.
 
     Nothing but `next` is known before the first decision.
     """
     coming = next_of(decision, rules)
-    told, at_s = fields(clock.told(coming), language) or {}, _moment(coming, clock)
+    told, at_s = as_told(clock.told(coming), language), _moment(coming, clock)
     since_s = memory.since_s if memory is not None else None
     asked = once(memory.operator) if memory is not None else None
-    found: dict[str, object] = {
+    found: Outlook = {
         "since": round(clock.unix_s(since_s), 3) if since_s is not None else None,
         "next": {**told, "by_itself": by_itself(decision), "at": at_s},
-        "target": asked and {"soc_pct": asked.param("target_pct"), **(fields(clock.told(asked), language) or {})},
+        "target": None if asked is None else _target(asked, clock, language),
     }
     if not closely or memory is None or memory.last_s is None:
         return found
@@ -62,10 +64,14 @@ def outlook(
     return {**found, "limits": list(_limits(f, decision, language)), "forecast": forecast(f, clock)}
 
 
+def _target(asked: Cause, clock: WallClock, language: str) -> Target:
+    return {"soc_pct": asked.param("target_pct"), **as_told(clock.told(asked), language)}
+
+
 # --- what limits it ---------------------------------------------------------------------------------------------------
 
 
-def _limits(f: Facts, decision: Decision, language: str) -> Iterator[dict[str, object]]:
+def _limits(f: Facts, decision: Decision, language: str) -> Iterator[Limit]:
     """What limits the current, the lowest first, and then what else bounds a charge."""
     for allowed_a, cause, binds in current_limits(f, decision):
         yield {"allowed_a": allowed_a, "binds": binds, "cause": fields(cause, language), "text": say(cause, language)}
@@ -146,7 +152,7 @@ def _moment(cause: Cause, clock: WallClock) -> float | None:
 # --- how long ---------------------------------------------------------------------------------------------------------
 
 
-def forecast(f: Facts, clock: WallClock) -> dict[str, object] | None:
+def forecast(f: Facts, clock: WallClock) -> Forecast | None:
     """The target of the charge, and how long it still takes by the BMU and by ourselves; None without a charge."""
     if f.memory.session is None or not f.energised:
         return None

@@ -8,17 +8,19 @@ missed. So there is one slot for each bay and no queue, whatever a reader does.
 """
 
 import json
-import secrets
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import ceil, inf
 from operator import attrgetter
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 from orchestrator.model import Decision
 
 #: How often an entry is described anew at least, and after how long at the earliest if no more than values may differ.
 PERIOD_S, LEAST_S = 1.0, 0.9
 MINUTE_S = 60.0
+#: The part of the document that always changes; each line has its own.
+TIME = "time"
 #: The maximum number of entries described at one look.
 MOST = 24
 
@@ -31,19 +33,18 @@ class Bay(Protocol):
     name: str
     decision: Decision | None
 
-    def status(self) -> dict[str, object]:
+    def status(self) -> Fields:
         """The bay's part of the status document."""
 
 
 class Published:
     """The entries, and the lines for their readers. `station` makes the document's other parts. Used by one thread."""
 
-    def __init__(self, bays: Sequence[Bay], station: Callable[[], Fields]) -> None:
+    def __init__(self, bays: Sequence[Bay], station: Callable[[], Fields], wall: Callable[[], float]) -> None:
         self.revision = 0
-        self.instance = secrets.token_hex(
-            8
-        )  #: another one means another run of the service, whose revisions begin anew
+        self.instance = os.urandom(8).hex()  #: of another run it is another, whose revisions begin anew
         self._entries = [_Entry(bay, number / len(bays) * PERIOD_S) for number, bay in enumerate(bays)]
+        self._wall = wall
         self._station, self._station_s = station, -inf  # when they are due
         self._parts: dict[str, tuple[int, object]] = {}  # the station's, with the revisions of their last changes
         self._lines: dict[int, bytes] = {}  # what is new since a revision
@@ -67,20 +68,20 @@ class Published:
 
     def _changed_parts(self) -> Iterator[tuple[str, object]]:
         for name, part in self._station().items():
-            if name not in self._parts or self._parts[name][1] != part:
+            if name != TIME and (name not in self._parts or self._parts[name][1] != part):
                 yield name, part
 
     def document(self) -> bytes:
         """The first line for a reader: the whole status document."""
         head = {"ok": True, "revision": self.revision, "instance": self.instance}
-        parts = encoded({name: part for name, (_, part) in self._parts.items()})
+        parts = encoded({TIME: round(self._wall(), 3), **{name: part for name, (_, part) in self._parts.items()}})
         bays = b", ".join(entry.text for entry in self._entries)
         return b'%b, "document": {%b, "bays": [%b]}}\n' % (encoded(head)[:-1], parts[1:-1], bays)
 
     def since(self, revision: int) -> bytes:
         """The line for a reader that has been told everything up to `revision`: what has changed, if anything."""
         if revision not in self._lines:
-            line = [b'"revision": %d' % self.revision]
+            line = [b'"revision": %d, "time": %.3f' % (self.revision, self._wall())]
             if bays := [entry.named for entry in self._entries if entry.revision > revision]:
                 line.append(b'"bays": {%b}' % b", ".join(bays))
             if parts := {name: part for name, (changed, part) in self._parts.items() if changed > revision}:
@@ -134,9 +135,9 @@ def _gist(decision: Decision | None) -> object:
     return GIST(decision), cause.id, cause.key, step and (step.index, step.key), decision.session is None
 
 
-def _lasting(status: Mapping[str, Any]) -> object:
+def _lasting(status: Fields) -> object:
     """What counts of an entry: not the ages, except those of values that are too old, as people read them."""
-    charger, battery = dict(status["charger"]), dict(status["battery"])
+    charger, battery = (dict(cast("Mapping[str, Any]", status[part])) for part in ("charger", "battery"))
     del charger["t_s"]
     age_s, ages_s = charger.pop("age_s"), battery.pop("age_s")
     old = {name: _age(ages_s[name]) for name in battery["old"]}

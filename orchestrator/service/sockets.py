@@ -34,8 +34,8 @@ class Sockets:
         wake: Callable[[int], None],
         say: Callable[[Cause], None],
     ) -> None:
-        shown = StationStatus(station, bays, journal, store, strays, monotonic)
-        self._streams = Streams(Published(bays, shown.parts), monotonic, say)
+        shown = StationStatus(station, bays, journal, store, strays, monotonic, time)
+        self._streams = Streams(Published(bays, shown.parts, time), monotonic, say)
         self.handler = RequestHandler(shown, bays, journal, store, strays, reload, monotonic, time, wake)
         viewer = Viewer(self.handler.answer, RequestLog(journal, monotonic, shown.language), time)
 

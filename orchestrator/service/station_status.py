@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from orchestrator.config.station import Station
+from orchestrator.model.bay_document import Status
 from orchestrator.service.bay import BayRunner
 from orchestrator.service.journal import Journal
 from orchestrator.service.status import station_status
@@ -21,21 +22,21 @@ class StationStatus:
         store: Store,
         strays: Strays,
         clock: Callable[[], float],
+        wall: Callable[[], float],
     ) -> None:
         self.language = station.language.value  #: of its texts
         self._station, self._bays = station, bays
-        self._journal, self._store, self._strays, self._clock = journal, store, strays, clock
+        self._journal, self._store, self._strays = journal, store, strays
+        self._clock, self._wall = clock, wall
 
-    def document(self, bays: Sequence[BayRunner], *, closely: bool = False) -> dict[str, object]:
+    def document(self, bays: Sequence[BayRunner], *, closely: bool = False) -> Status:
         """With these bays; `closely`: with what costs too much for every bay of every answer."""
         now_s, shown = self._clock(), [bay.status(closely=closely) for bay in bays]
         problem, not_persisted = self._journal.problem(now_s), self._store.not_persisted(now_s)
         alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
         strays = self._strays.status(self.language)
-        return station_status(self._station, alarm, shown, problem, not_persisted, strays)
+        return station_status(self._station, alarm, shown, problem, not_persisted, strays, self._wall())
 
     def parts(self) -> dict[str, object]:
         """Everything but the bays."""
-        whole = self.document([])
-        del whole["bays"]
-        return whole
+        return {name: part for name, part in self.document([]).items() if name != "bays"}

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain
+from orchestrator.model.told import ToldCause
 from orchestrator.text.en.advice import ADVICE as EN_ADVICE
 from orchestrator.text.en.bays import TEXTS as EN_BAYS
 from orchestrator.text.en.codes import CODES as EN_CODES
@@ -133,9 +134,14 @@ def say(cause: Cause | None, language: str = "en", otherwise: str = "") -> str:
         return otherwise or _data(cause, texts)
 
 
-def fields(cause: Cause | None, language: str = "en") -> dict[str, object] | None:
+def fields(cause: Cause | None, language: str = "en") -> ToldCause | None:
     """A cause with its sentence, as in JSON."""
-    return {**plain(cause), "text": say(cause, language)} if cause is not None else None
+    return as_told(cause, language) if cause is not None else None
+
+
+def as_told(cause: Cause, language: str = "en") -> ToldCause:
+    """The same where there is one."""
+    return {**plain(cause), "text": say(cause, language)}
 
 
 def advise(id_: str, language: str = "en") -> str:

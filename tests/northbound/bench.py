@@ -9,15 +9,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
-from typing import Any
+from typing import Any, cast
 
 from orchestrator.config.load import load_northbound
+from orchestrator.config.northbound import Tls
 from orchestrator.config.northbound_rules import Listen
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause
 from orchestrator.northbound import link
-from orchestrator.northbound.serve import assembled, listening
+from orchestrator.northbound.serve import assembled, certificate, listening
 from orchestrator.service.control import ControlSocket
+from orchestrator.service.streams import Streams
 
 SOON_S = 5.0
 JSON = {"Content-Type": "application/json"}
@@ -26,7 +28,7 @@ HOT = {"id": "over_temperature", "params": {"pack_c": 45.23, "limit_c": 45, "aga
 
 def bay(name: str, state: str = "IDLE", cause: Mapping[str, Any] = HOT) -> dict[str, Any]:
     """As much of a bay's entry as matters here."""
-    device = {"online": True, "problem": "", "cause": None}
+    device = {"online": True, "problem": "", "cause": None, "t_s": 1.0, "age_s": 0.1}
     return {
         "name": name, "state": state, "reason": "it is hot", "cause": {**cause, "advice": "", "text": "it is hot"},
         "faults": [], "alarm": "none", "charger": device, "battery": device,
@@ -44,8 +46,9 @@ class Controller:
         self.asked: list[Mapping[str, object]] = []
         self._socket: ControlSocket | None = None
 
-    def begin(self) -> None:
-        self._socket = ControlSocket(self.path, self._answer, time.monotonic)
+    def begin(self, streams: Streams | None = None) -> None:
+        watch = streams.take if streams is not None else None
+        self._socket = ControlSocket(self.path, self._answer, time.monotonic, watch=watch)
         self._socket.start()
 
     def end(self) -> None:
@@ -59,14 +62,16 @@ class Controller:
         if request["verb"] == "watch":
             raise RequestError(Cause.of("verb_unknown", verb="watch", verbs=()))
         self.asked.append(request)
-        (name,) = request["bays"]  # type: ignore[misc]
+        (name,) = cast("list[str]", request["bays"])
         refused = name == "bay-9"
         causes = {name: {**HOT, "advice": ""}} if refused else {}
         return {"language": "en", "results": {name: "too hot" if refused else ""}, "causes": causes}
 
 
 @contextmanager
-def page(directory: Path, more: str = "", *, controller: bool = True) -> Iterator[tuple["Browser", Controller]]:
+def page(
+    directory: Path, more: str = "", *, controller: bool = True, tls: Tls | None = None
+) -> Iterator[tuple["Browser", Controller]]:
     """A server of its own on any port. `more` are further lines of its file."""
     station = Controller(directory)
     (directory / "station.yaml").write_text(
@@ -80,7 +85,7 @@ def page(directory: Path, more: str = "", *, controller: bool = True) -> Iterato
     ended, begun, loops = Event(), Event(), list[asyncio.AbstractEventLoop]()
 
     async def serve() -> None:
-        server, upstream = assembled(northbound, listener, None)
+        server, upstream = assembled(northbound, listener, certificate(tls) if tls is not None else None)
         loops.append(asyncio.get_running_loop())
         task = asyncio.create_task(upstream.run())
         begun.set()

@@ -47,17 +47,29 @@ def line(said: object) -> bytes:
 
 
 def test_what_changes_is_put_together(tmp_path: Path) -> None:
-    changes = line({"revision": 8, "bays": {"b": {"name": "b", "state": "TRIPPED"}}, "station": {"alarm": "attention"}})
+    changes = line(
+        {
+            "revision": 8,
+            "time": 2.0,
+            "bays": {"b": {"name": "b", "state": "TRIPPED"}},
+            "station": {"alarm": "attention"},
+        }
+    )
 
     def answers(connection: socket.socket) -> None:
         connection.sendall(line(FIRST) + changes[:20])
-        connection.sendall(changes[20:] + line({"revision": 9, "gone": ["a"]}))
+        connection.sendall(changes[20:] + line({"revision": 9, "time": 3.0, "gone": ["a"]}))
 
     with service(tmp_path / "s", answers):
         one = Followed(tmp_path / "s", 5.0)
         with pytest.raises(ConnectionError):
             one.wait(5.0, 5.0)
-        assert one.document == {"station": "hall", "alarm": "attention", "bays": [{"name": "b", "state": "TRIPPED"}]}
+        assert one.document == {
+            "time": 3.0,
+            "station": "hall",
+            "alarm": "attention",
+            "bays": [{"name": "b", "state": "TRIPPED"}],
+        }
         one.close()
 
 
@@ -67,7 +79,7 @@ def test_it_waits_shorter_if_something_has_changed(tmp_path: Path) -> None:
     def answers(connection: socket.socket) -> None:
         connection.sendall(line(FIRST))
         go_on.wait(5)
-        connection.sendall(line({"revision": 8, "bays": {"a": {"name": "a", "state": "HELD"}}}))
+        connection.sendall(line({"revision": 8, "time": 2.0, "bays": {"a": {"name": "a", "state": "HELD"}}}))
         connection.recv(1)
 
     with service(tmp_path / "s", answers):

@@ -29,7 +29,9 @@ class Asking:
         site.reload.start()
         station = load_station(site.station_file)
         strays = cast("Strays", None)
-        shown = StationStatus(station, [bench.bay], bench.journal, bench.store, strays, lambda: bench.now_s)
+        shown = StationStatus(
+            station, [bench.bay], bench.journal, bench.store, strays, lambda: bench.now_s, lambda: 1.8e9
+        )
         self.handler = RequestHandler(
             shown, [bench.bay], bench.journal, bench.store, strays, site.reload,
             lambda: bench.now_s, lambda: 1.8e9, lambda _: None,

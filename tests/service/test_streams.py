@@ -4,9 +4,9 @@ import json
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from time import time
 from typing import Any
 
 import pytest
@@ -20,38 +20,17 @@ from orchestrator.service.streams import KEEP_ALIVE_S, MOST_READERS, PATIENCE_S,
 from orchestrator.text.catalogue import say
 from tests.service.bench import Bench
 from tests.service.control_bench import answer, client, listening
-
-IDLE, TRIPPED = (Decision(state, Cause(state.lower())) for state in (State.IDLE, State.TRIPPED))
-
-
-@dataclass
-class Bay:
-    """One that counts how often it is described."""
-
-    name: str
-    decision: Decision | None = IDLE
-    volts: float = 50.0
-    age_s: float = 0.0
-    old: bool = False
-    more: dict[str, object] = field(default_factory=dict)
-    described: int = 0
-
-    def status(self) -> dict[str, object]:
-        self.described += 1
-        state = self.decision.state if self.decision else "STARTING"
-        charger = {"voltage_v": self.volts, "age_s": self.age_s, "t_s": self.age_s, "old": self.old}
-        battery = {"age_s": {"soc_pct": self.age_s}, "old": ["soc_pct"] if self.old else []}
-        return {"name": self.name, "state": state, "charger": charger, "battery": battery, **self.more}
+from tests.service.hall import TRIPPED, Hall
 
 
-class Site:
+class Site(Hall):
     """Some bays and their readers. The test is the thread, and time passes when it says so."""
 
     def __init__(self, bays: int = 3) -> None:
-        self.bays = [Bay(f"bay-{number + 1}") for number in range(bays)]
+        super().__init__(bays)
         self.station: dict[str, object] = {"station": "a hall", "alarm": "none"}
         self.now_s = 1000.0
-        self.published = Published(self.bays, lambda: dict(self.station))
+        self.published = Published(self.bays, lambda: {"time": self.now_s, **self.station}, lambda: self.now_s)
         self.streams = Streams(self.published, lambda: self.now_s, lambda _: None)
 
     def turn(self, count: int = 1, seconds: float = TURN_S) -> None:
@@ -146,8 +125,8 @@ def test_what_only_grows_older_is_no_change(site: Site) -> None:
             site.turn()
         assert site.bays[0].described >= 2
         assert reader.lines() == []
-        site.turn(2, KEEP_ALIVE_S)
-        assert reader.lines()[0] == {"revision": first["revision"]}
+        site.turn(seconds=KEEP_ALIVE_S)
+        assert reader.lines() == [{"revision": first["revision"], "time": pytest.approx(site.now_s)}]
 
 
 def test_how_old_a_value_is_that_is_too_old_is_told_by_the_second_and_then_by_the_minute(site: Site) -> None:
@@ -292,7 +271,7 @@ def test_a_defect_sends_the_readers_away_and_the_next_one_is_served(tmp_path: Pa
 
 def test_a_real_bay_is_told_as_in_the_status(tmp_path: Path) -> None:
     bench = Bench(tmp_path)
-    published = Published([bench.bay], lambda: {"alarm": "none"})
+    published = Published([bench.bay], lambda: {"alarm": "none"}, time)
     published.look(0.0)
     bench.charging()
     published.look(0.01)

@@ -20,12 +20,15 @@ from orchestrator.lastresort.asking import ask
 from orchestrator.service import control as control_module
 from orchestrator.service.client import Client
 from orchestrator.service.control import ControlSocket
+from orchestrator.service.published import Published
 from orchestrator.service.reload import Reload
 from orchestrator.service.sockets import Sockets
 from orchestrator.service.strays import Strays
+from orchestrator.service.streams import Streams
 from tests.core.said import into, raises
 from tests.service.bench import Bench, fields_of
-from tests.service.control_bench import answer, client
+from tests.service.control_bench import SOON_S, Bays, answer, client, closing_all, connected, listening
+from tests.service.hall import Hall
 from tests.waiting import wait_until
 
 OWN_GROUP = grp.getgrgid(os.getgid()).gr_name
@@ -126,3 +129,30 @@ def test_groups_and_a_second_socket_are_read(tmp_path: Path) -> None:
     control = load_station(file).control
     assert (control.group, control.view_group) == ("orchestrator-operators", "orchestrator-viewers")
     assert control.view_socket == tmp_path / "run" / "view.sock"
+
+
+def test_a_hundred_idle_clients_at_each_socket_delay_no_stop(tmp_path: Path) -> None:
+    """Silent ones, some in the midst of a request, and readers who read nothing."""
+    bays = Bays()
+    bays.ready.set()
+    hall = Hall(128)
+    streams = Streams(Published(hall.bays, lambda: {"alarm": "none"}, time.time), time.monotonic, lambda _: None)
+    streams.start()
+    paths = [tmp_path / "control", tmp_path / "view"]
+    with listening(paths[0], bays, streams.take), listening(paths[1], bays, streams.take), closing_all() as idle:
+        for number in range(100):
+            idle += [connected(path) for path in paths]
+            if number % 3 == 0:
+                idle[-1].sendall(b'{"verb": ')
+        for path in paths:
+            for _ in range(8):
+                idle.append(connected(path))
+                idle[-1].sendall(b'{"verb": "watch"}\n')
+        wait_until(lambda: len(streams._readers) == 16, what="all readers")
+        for _ in range(5):
+            hall.change()
+            began_s = time.monotonic()
+            ask(paths[0], {"verb": "stop"})
+            assert time.monotonic() - began_s < SOON_S
+        streams.close()
+    assert bays.asked == ["stop"] * 5
