@@ -16,6 +16,8 @@ function uplot() {
 }
 
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+/** Where figures are whole, so are the distances of the ticks. */
+const WHOLE = [1, 2, 5, 10, 20, 25, 50, 100, 200, 500, 1000];
 const drawn = new WeakMap();
 
 /** Draws [Unix seconds, SOC, A, V, °C] into an element: two charts with one time axis. */
@@ -44,9 +46,9 @@ export async function chart(element, charts) {
 
 function options({ series, dates = false }, width) {
   const stroke = colour("ink"), grid = { stroke: colour("line"), width: 1 }, font = "12px system-ui, sans-serif";
-  const times = { stroke, grid, font, ticks: grid, values: (_, splits) => splits.map((one) => (dates ? day(one) : moment(one).split(" ").at(-1))) };
+  const times = { stroke, grid, font, ticks: grid, values: (_, splits) => timesOf(splits, dates) };
   const sides = series.map(([, unit, digits, name], at) => ({
-    scale: name, side: at ? 1 : 3, stroke: colour(name), grid: at ? { show: false } : grid, ticks: grid, font, size: 58,
+    scale: name, side: at ? 1 : 3, stroke: colour(name), grid: at ? { show: false } : grid, ticks: grid, font, size: 58, ...(digits ? {} : { incrs: WHOLE }),
     values: (_, splits) => splits.map((one) => figure(one, digits, unit)),
   }));
   const lines = series.map(([label, unit, digits, name], at) => ({
@@ -59,6 +61,12 @@ function options({ series, dates = false }, width) {
     scales: Object.fromEntries([["x", {}], ...series.map(([, , , name]) => [name, name === "soc" ? { range: [0, 100] } : { range }])]),
     axes: [times, ...sides], series: [{ label: word("time"), value: (_, at) => (at === null ? "–" : moment(at)) }, ...lines],
   };
+}
+
+/** As fine as the distance of the ticks. */
+function timesOf(splits, dates) {
+  const seconds = splits.length > 1 && splits[1] - splits[0] < 60;
+  return splits.map((one) => (dates ? day(one) : moment(one, { seconds }).split(" ").at(-1)));
 }
 
 const day = (unixS) => new Intl.DateTimeFormat(languageNow(), { month: "numeric", day: "numeric" }).format(unixS * 1000);

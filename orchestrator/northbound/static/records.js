@@ -118,11 +118,11 @@ function batteryView(main, id) {
   main.append(h("p", { class: "way" }, link("/batteries", `← ${word("batteries")}`)), h("h1", {}, id), about, h("section", { class: "card" }, h("h2", {}, word("health_time")), picture), list);
   (async () => {
     try {
-      const { lines, history } = await readJson(`/api/batteries/${encodeURIComponent(id)}`);
+      const { lines } = await readJson(`/api/batteries/${encodeURIComponent(id)}`);
       about.replaceChildren(h("section", { class: "card" }, h("h2", {}, word("health")), h("ul", { class: "plainlist" }, (lines ?? []).map((one) => h("li", {}, one)))));
       const found = await charges({ battery: id, limit: PAGE });
       list.replaceChildren(table(word("charges"), COLUMNS, found.map(row)));
-      await showLife(picture, found, history);
+      await showLife(picture, found);
     } catch (error) {
       put(about, word("failed", { why: error.message }));
     }
@@ -130,12 +130,10 @@ function batteryView(main, id) {
   return { title: id };
 }
 
-/** SOH by the BMU and by our own estimate over the charges; without ours, what each charge took. */
-async function showLife(element, found, history) {
-  const at = (history ?? []).length ? history : found.toReversed().map((one) => ({ at_unix_s: one.begin.unix_s, bmu_soh_pct: one.values?.soh_pct?.end, ah: one.charger.ah }));
+/** SOH as its BMU said at the end of each charge, and what each charge took. */
+async function showLife(element, found) {
+  const at = found.toReversed().filter((one) => typeof one.values?.soh_pct?.end === "number");
   if (at.length < 2) { put(element, word("nothing")); return; }
-  const own = at.some((one) => typeof one.soh_pct === "number");
-  const column = (name) => at.map((one) => one[name] ?? null);
-  await chart(element, [{ dates: true, columns: [column("at_unix_s"), column("bmu_soh_pct"), column(own ? "soh_pct" : "ah")],
-    series: [[word("soh_bmu"), "%", 0, "volts"], own ? [word("soh_own"), "%", 0, "amps"] : [word("charged"), "Ah", 0, "amps"]] }]);
+  const columns = [at.map((one) => one.begin.unix_s), at.map((one) => one.values.soh_pct.end), at.map((one) => one.charger.ah)];
+  await chart(element, [{ dates: true, columns, series: [[word("soh_bmu"), "%", 0, "volts"], [word("charged"), "Ah", 1, "amps"]] }]);
 }

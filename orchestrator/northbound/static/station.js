@@ -32,7 +32,7 @@ function policies(bays) {
   const found = new Map();
   for (const { name, policy } of bays) if (policy) found.set(policy.sha256, { policy, bays: [...(found.get(policy.sha256)?.bays ?? []), name] });
   return [...found.values()].map(({ policy, bays: of }) => h("div", { class: "policy" }, h("h3", {}, policy.name),
-    pairList([["policy", policy.file], ["in_force", typeof policy.since === "number" ? moment(policy.since) : word("nothing")], ["used_by", of.join(", ")]]),
+    pairList([["file", policy.file], ["in_force", typeof policy.since === "number" ? moment(policy.since) : word("nothing")], ["used_by", of.join(", ")]]),
     h("p", { class: "small hash" }, `SHA-256 ${policy.sha256}`), policy.waiting_sha256 ? h("p", {}, word("waiting")) : ""));
 }
 
