@@ -176,7 +176,11 @@ function chosenLanguage() {
 }
 
 function readKept(key) {
-  try { return localStorage.getItem(key); } catch { return null; } // storage may be forbidden
+  try {
+    return localStorage.getItem(key);
+  } catch {
+    return null;
+  } // storage may be forbidden
 }
 
 /** The word for a key in the chosen language. */
@@ -187,8 +191,10 @@ export function word(key, params = {}) {
 
 // --- figures ---------------------------------------------------------------------------------------------------------
 
-const NONE = "–", NARROW = "\u202f";
-const locale = () => (language === "ko" ? "ko-KR" : navigator.language.startsWith("en-") ? navigator.language : "en-GB");
+const NONE = "–",
+  NARROW = "\u202f";
+const locale = () =>
+  language === "ko" ? "ko-KR" : navigator.language.startsWith("en-") ? navigator.language : "en-GB";
 const formats = new Map(); // making one is slow
 
 function format(kind, options) {
@@ -200,7 +206,9 @@ function format(kind, options) {
 /** A number with this many decimals and its unit; a dash for none. */
 export function figure(value, digits, unit = "") {
   if (typeof value !== "number" || !Number.isFinite(value)) return NONE;
-  const text = format(Intl.NumberFormat, { minimumFractionDigits: digits, maximumFractionDigits: digits }).format(value);
+  const text = format(Intl.NumberFormat, { minimumFractionDigits: digits, maximumFractionDigits: digits }).format(
+    value,
+  );
   return unit ? `${text}${NARROW}${unit}` : text;
 }
 
@@ -223,7 +231,8 @@ export function moment(unixS, { seconds = false, date = false } = {}) {
 /** How long, in words. */
 export function lasting(seconds) {
   if (typeof seconds !== "number") return NONE;
-  const s = Math.max(0, Math.round(seconds)), m = Math.floor(s / 60);
+  const s = Math.max(0, Math.round(seconds)),
+    m = Math.floor(s / 60);
   if (s < 60) return word("seconds", { s });
   return m < 60 ? word("minutes", { m }) : word("hours", { h: Math.floor(m / 60), m: m % 60 });
 }
@@ -258,8 +267,20 @@ function putAttribute(element, name, value) {
 /** A table: `columns` are [word, class]; `rows` are lists of texts or elements. */
 export function table(caption, columns, rows) {
   const head = columns.map(([name, kind]) => h("th", { scope: "col", class: kind }, name ? word(name) : ""));
-  const body = rows.map((row) => h("tr", {}, row.map((cell, at) => h("td", { class: columns[at][1] }, cell ?? NONE))));
-  const made = h("table", {}, h("caption", { class: "unseen" }, caption), h("thead", {}, h("tr", {}, head)), h("tbody", {}, body));
+  const body = rows.map((row) =>
+    h(
+      "tr",
+      {},
+      row.map((cell, at) => h("td", { class: columns[at][1] }, cell ?? NONE)),
+    ),
+  );
+  const made = h(
+    "table",
+    {},
+    h("caption", { class: "unseen" }, caption),
+    h("thead", {}, h("tr", {}, head)),
+    h("tbody", {}, body),
+  );
   return h("div", { class: "wide", tabindex: "0", role: "region", "aria-label": caption }, made);
 }
 
@@ -283,12 +304,22 @@ const SHAPES = {
   slash: "M12 3a9 9 0 1 0 .01 0zM6 6l12 12",
 };
 const STATES = {
-  STARTING: ["dots", "waits"], OFFLINE: ["slash", "waits"], IDLE: ["ring", "rests"], HELD: ["hand", "rests"],
-  QUALIFYING: ["dots", "works"], PRECHARGE_PULSE: ["pulse", "works"], PRECHARGE_CONTINUOUS: ["pulse", "works"],
-  CHARGING: ["bolt", "works"], FULL: ["check", "done"], SUSPENDED: ["clock", "waits"], STOPPING: ["square", "waits"],
-  TRIPPED: ["triangle", "rests"], UNCONTROLLABLE: ["octagon", "waits"],
+  STARTING: ["dots", "waits"],
+  OFFLINE: ["slash", "waits"],
+  IDLE: ["ring", "rests"],
+  HELD: ["hand", "rests"],
+  QUALIFYING: ["dots", "works"],
+  PRECHARGE_PULSE: ["pulse", "works"],
+  PRECHARGE_CONTINUOUS: ["pulse", "works"],
+  CHARGING: ["bolt", "works"],
+  FULL: ["check", "done"],
+  SUSPENDED: ["clock", "waits"],
+  STOPPING: ["square", "waits"],
+  TRIPPED: ["triangle", "rests"],
+  UNCONTROLLABLE: ["octagon", "waits"],
 };
-const RESTING = ["IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"], LEVELS = ["danger", "attention"];
+const RESTING = ["IDLE", "HELD", "FULL", "SUSPENDED", "TRIPPED"],
+  LEVELS = ["danger", "attention"];
 export const ENERGISED = ["PRECHARGE_PULSE", "PRECHARGE_CONTINUOUS", "CHARGING"];
 /** The most amperes that a charger in standby may show. */
 const STANDBY_A = 0.5;
@@ -297,7 +328,11 @@ export const isUrgent = (bay) => LEVELS.includes(bay.alarm);
 const groupOf = (bay) => (isUrgent(bay) ? "needs" : (STATES[bay.state]?.[1] ?? "waits"));
 
 export function shape(name, kind = "shape") {
-  return h("svg", { viewBox: "0 0 24 24", class: `${kind} is-${name}`, "aria-hidden": "true" }, h("path", { d: SHAPES[name] ?? SHAPES.dots }));
+  return h(
+    "svg",
+    { viewBox: "0 0 24 24", class: `${kind} is-${name}`, "aria-hidden": "true" },
+    h("path", { d: SHAPES[name] ?? SHAPES.dots }),
+  );
 }
 
 /** The state as shape and word. */
@@ -308,17 +343,28 @@ export function stateMark(state) {
 /** Whether its own fresh reading shows that the charger stands by. */
 function standsBy(bay) {
   const { charger, command } = bay;
-  return RESTING.includes(bay.state) && bay.alarm !== "danger" && command.order.action === null && charger.online
-    && !charger.old && charger.operation === 0 && charger.current_a <= STANDBY_A;
+  return (
+    RESTING.includes(bay.state) &&
+    bay.alarm !== "danger" &&
+    command.order.action === null &&
+    charger.online &&
+    !charger.old &&
+    charger.operation === 0 &&
+    charger.current_a <= STANDBY_A
+  );
 }
 
 /** When the battery is ready: [] if unknown, one moment, or the two that the estimates give. */
 function readyTimes(bay) {
   if (!ENERGISED.includes(bay.state)) return [];
-  const { forecast, battery } = bay, minutes = battery.old?.includes("time_to_full_min") ? null : battery.time_to_full_min;
+  const { forecast, battery } = bay,
+    minutes = battery.old?.includes("time_to_full_min") ? null : battery.time_to_full_min;
   const bmuS = typeof minutes === "number" && bay.state === "CHARGING" ? Date.now() / 1000 + 60 * minutes : null; // without a forecast, as the BMU says
   const known = forecast ? [forecast.bmu_at, forecast.own_at] : [bmuS];
-  const at = known.filter((one) => typeof one === "number").sort((one, other) => one - other).map((one) => moment(one));
+  const at = known
+    .filter((one) => typeof one === "number")
+    .sort((one, other) => one - other)
+    .map((one) => moment(one));
   return at[0] === at.at(-1) ? at.slice(0, 1) : at;
 }
 
@@ -330,12 +376,23 @@ export function readyAt(bay) {
 
 // --- the live link: one stream for all tabs of a browser -------------------------------------------------------------
 
-const QUIET_S = 12, STEAL_S = 8, REFUSED_S = 30, LOCK = "station stream";
+const QUIET_S = 12,
+  STEAL_S = 8,
+  REFUSED_S = 30,
+  LOCK = "station stream";
 const nowS = () => Date.now() / 1000;
 const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
 
 /** What the page knows. */
-export const store = { revision: null, bays: new Map(), station: null, me: null, page: null, controller: { connected: true }, refused: false };
+export const store = {
+  revision: null,
+  bays: new Map(),
+  station: null,
+  me: null,
+  page: null,
+  controller: { connected: true },
+  refused: false,
+};
 
 /**
  * One tab of the browser leads: it holds a lock, has the stream, and passes every event on to the others. When it is
@@ -352,7 +409,10 @@ class Link {
     this.stealS = 0; // not before this
     this.leading = null; // aborts what this tab's lead is doing
     this.waiting = null; // aborts its waiting for the lock
-    if (!navigator.locks || !window.BroadcastChannel) { this.lead(); return; }
+    if (!navigator.locks || !window.BroadcastChannel) {
+      this.lead();
+      return;
+    }
     this.channel = new BroadcastChannel("station");
     this.channel.onmessage = ({ data }) => this.hear(data);
     this.channel.postMessage({ kind: "hello" });
@@ -371,12 +431,14 @@ class Link {
     this.waiting?.abort();
     this.waiting = options.steal ? null : new AbortController();
     const wish = options.steal ? options : { signal: this.waiting.signal };
-    navigator.locks.request(LOCK, wish, () => this.lead()).catch(() => {
-      const stolen = this.leading !== null;
-      this.leading?.abort();
-      this.leading = null;
-      if (stolen) this.contend(); // another tab took it: wait in line
-    });
+    navigator.locks
+      .request(LOCK, wish, () => this.lead())
+      .catch(() => {
+        const stolen = this.leading !== null;
+        this.leading?.abort();
+        this.leading = null;
+        if (stolen) this.contend(); // another tab took it: wait in line
+      });
   }
 
   watch() {
@@ -386,9 +448,14 @@ class Link {
   }
 
   hear(message) {
-    if (message.kind === "restart") { setLanguage(message.language, { tell: false }); this.restart(); return; }
+    if (message.kind === "restart") {
+      setLanguage(message.language, { tell: false });
+      this.restart();
+      return;
+    }
     if (this.leading) {
-      if (message.kind === "hello" && store.station) this.tell({ kind: "event", event: "whole", data: wholeOf(store), revision: store.revision });
+      if (message.kind === "hello" && store.station)
+        this.tell({ kind: "event", event: "whole", data: wholeOf(store), revision: store.revision });
       return;
     }
     if (message.kind === "lost") this.lose(message.sinceS);
@@ -396,9 +463,14 @@ class Link {
     if (message.kind === "event") this.onEvent(message.event, message.data, message.revision);
   }
 
-  tell(message) { this.channel?.postMessage(message); }
+  tell(message) {
+    this.channel?.postMessage(message);
+  }
 
-  live() { this.heardS = nowS(); this.connected = true; }
+  live() {
+    this.heardS = nowS();
+    this.connected = true;
+  }
 
   lose(sinceS = nowS()) {
     if (this.connected || this.lostS > sinceS) this.lostS = sinceS;
@@ -423,14 +495,19 @@ class Link {
     this.wake?.();
   }
 
-  restartAll() { this.tell({ kind: "restart", language }); this.restart(); }
+  restartAll() {
+    this.tell({ kind: "restart", language });
+    this.restart();
+  }
 
   async lead() {
     const lead = (this.leading = new AbortController());
-    for (let failures = 0; !lead.signal.aborted; ) {
+    for (let failures = 0; !lead.signal.aborted;) {
       this.stream = new AbortController();
       lead.signal.addEventListener("abort", () => this.stream.abort(), { once: true });
-      const quiet = setInterval(() => { if (nowS() - this.heardS > 2 * QUIET_S) this.stream.abort("quiet"); }, 1000);
+      const quiet = setInterval(() => {
+        if (nowS() - this.heardS > 2 * QUIET_S) this.stream.abort("quiet");
+      }, 1000);
       const before = this.heardS;
       try {
         await (this.polls ? this.poll(this.stream.signal) : this.listen(this.stream.signal));
@@ -447,7 +524,12 @@ class Link {
       this.lose();
       this.tell({ kind: "lost", sinceS: this.lostS });
       const pauseS = store.refused ? REFUSED_S : Math.min(8, 0.5 * 2 ** failures) * (0.5 + Math.random());
-      await Promise.race([pause(pauseS), new Promise((resolve) => { this.wake = resolve; })]);
+      await Promise.race([
+        pause(pauseS),
+        new Promise((resolve) => {
+          this.wake = resolve;
+        }),
+      ]);
     }
   }
 
@@ -462,10 +544,14 @@ class Link {
   /** Server-sent events, read by hand: an EventSource shows neither keep-alives nor the status of a refusal. */
   async listen(signal) {
     const resumes = store.revision !== null && store.language === language;
-    const answer = await this.open(`/api/stream?language=${language}`, signal, resumes ? { "Last-Event-ID": store.revision } : {});
+    const answer = await this.open(
+      `/api/stream?language=${language}`,
+      signal,
+      resumes ? { "Last-Event-ID": store.revision } : {},
+    );
     store.language = language;
     const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
-    for (let rest = ""; ; ) {
+    for (let rest = ""; ;) {
       const { value, done } = await reader.read();
       if (done) return;
       this.alive();
@@ -486,7 +572,8 @@ class Link {
   }
 
   async poll(signal) {
-    const after = store.revision !== null && store.language === language ? `after=${encodeURIComponent(store.revision)}&` : "";
+    const after =
+      store.revision !== null && store.language === language ? `after=${encodeURIComponent(store.revision)}&` : "";
     const answer = await this.open(`/api/status?${after}language=${language}`, signal);
     store.language = language;
     const found = await answer.json();
@@ -527,7 +614,8 @@ function takeEvent(event, data, revision) {
 /** By bay: what was asked last and what became of it. */
 const requests = new Map();
 const SEEN = {
-  stop: standsBy, pause: standsBy,
+  stop: standsBy,
+  pause: standsBy,
   start: (bay) => ENERGISED.includes(bay.state) && bay.charger.operation === 1,
   reset: (bay) => bay.state !== "TRIPPED" && !isUrgent(bay),
 };
@@ -539,7 +627,11 @@ export async function ask(action, bay, because = "") {
   shell.update([bay]);
   try {
     const body = JSON.stringify({ action, bay, because });
-    const answer = await fetch(`/api/request?language=${language}`, { method: "POST", headers: { "Content-Type": "application/json" }, body });
+    const answer = await fetch(`/api/request?language=${language}`, {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body,
+    });
     const said = await answer.json();
     const stage = said.ok ? "accepted" : answer.status >= 500 ? "undelivered" : "refused";
     Object.assign(asked, { stage, text: said.text ?? `${answer.status}` });
@@ -573,18 +665,31 @@ export function showRequest(element, bay) {
 function progress({ action, stage, text }) {
   const bad = stage === "refused" || stage === "undelivered";
   if (bad) return [h("span", { class: "bad" }, shape("triangle"), `${word(action)}: `, word(stage, { why: text }))];
-  const stages = ["asked", "accepted", "seen"], reached = stages.indexOf(stage);
+  const stages = ["asked", "accepted", "seen"],
+    reached = stages.indexOf(stage);
   const last = action === "reset" ? "seen_reset" : "seen";
-  return [h("span", {}, `${word(action)}: `), ...stages.map((one, at) =>
-    h("span", { class: at <= reached ? "reached" : "open" }, `${at <= reached ? "●" : "○"} ${word(one === "seen" ? last : one)}`))];
+  return [
+    h("span", {}, `${word(action)}: `),
+    ...stages.map((one, at) =>
+      h(
+        "span",
+        { class: at <= reached ? "reached" : "open" },
+        `${at <= reached ? "●" : "○"} ${word(one === "seen" ? last : one)}`,
+      ),
+    ),
+  ];
 }
 
 export const mayAsk = () => store.me?.role === "operator" || store.me?.role === "admin";
 
 /** The stop button: one press. */
 export function stopButton(bay, kind) {
-  return h("button", { class: `stop ${kind}`, type: "button", "aria-label": word("stop_bay", { bay }), onclick: () => ask("stop", bay) },
-    shape("square", "solid"), h("span", {}, word("stop")));
+  return h(
+    "button",
+    { class: `stop ${kind}`, type: "button", "aria-label": word("stop_bay", { bay }), onclick: () => ask("stop", bay) },
+    shape("square", "solid"),
+    h("span", {}, word("stop")),
+  );
 }
 
 // --- the frame -------------------------------------------------------------------------------------------------------
@@ -605,19 +710,32 @@ class Shell {
     this.who = h("span", { class: "who" });
     this.name = h("span");
     const other = LANGUAGES[1 - LANGUAGES.indexOf(language)];
-    const tongue = h("button", { type: "button", class: "plain", lang: other, onclick: () => setLanguage(other) }, word("language"));
-    this.tabs = ["bays", "history", "batteries", "station"].map((view) => h("a", { href: view === "bays" ? "/" : `/${view}` }, word(view)));
+    const tongue = h(
+      "button",
+      { type: "button", class: "plain", lang: other, onclick: () => setLanguage(other) },
+      word("language"),
+    );
+    this.tabs = ["bays", "history", "batteries", "station"].map((view) =>
+      h("a", { href: view === "bays" ? "/" : `/${view}` }, word(view)),
+    );
     this.main = h("main", { id: "main", tabindex: "-1" });
     document.body.replaceChildren(
       h("a", { class: "skip", href: "#main" }, word("skip")),
-      h("header", {}, h("p", { class: "name" }, link("/", shape("bolt", "solid"), this.name)), h("nav", { "aria-label": word("views") }, this.tabs),
-        h("div", { class: "tools" }, tongue, this.who)),
-      this.lost, this.main,
+      h(
+        "header",
+        {},
+        h("p", { class: "name" }, link("/", shape("bolt", "solid"), this.name)),
+        h("nav", { "aria-label": word("views") }, this.tabs),
+        h("div", { class: "tools" }, tongue, this.who),
+      ),
+      this.lost,
+      this.main,
     );
   }
 
   async open({ focus = false } = {}) {
-    const path = location.pathname, opening = (this.opening = Symbol(path));
+    const path = location.pathname,
+      opening = (this.opening = Symbol(path));
     const [pattern, load, tab] = VIEWS.find(([one]) => one.test(path)) ?? VIEWS[0];
     const name = decodeURIComponent(pattern.exec(path)?.[1] ?? "");
     const make = await load();
@@ -625,24 +743,39 @@ class Shell {
     this.view?.close?.();
     this.view = null;
     this.tab = tab;
-    this.tabs.forEach((one) => putAttribute(one, "aria-current", new URL(one.href).pathname === (tab === "bays" ? "/" : `/${tab}`) ? "page" : null));
+    this.tabs.forEach((one) =>
+      putAttribute(
+        one,
+        "aria-current",
+        new URL(one.href).pathname === (tab === "bays" ? "/" : `/${tab}`) ? "page" : null,
+      ),
+    );
     this.main.replaceChildren();
     this.wait = store.station || tab === "login" ? null : h("p", { class: "wait" });
     if (this.wait) this.main.append(this.wait);
     else this.view = make(this.main, name);
-    if (focus) { this.main.focus({ preventScroll: true }); scrollTo(0, 0); }
+    if (focus) {
+      this.main.focus({ preventScroll: true });
+      scrollTo(0, 0);
+    }
     this.update(null);
   }
 
   /** Something is new: of these bays, or of everything. */
   update(names, event = "") {
-    if (event === "whole" && this.wait) { this.open(); return; }
+    if (event === "whole" && this.wait) {
+      this.open();
+      return;
+    }
     if (store.refused && this.tab !== "login") {
       this.wanted = location.pathname + location.search;
       go("/login");
       return;
     }
-    if (event === "whole" && this.tab === "login") { go(this.wanted ?? "/"); return; }
+    if (event === "whole" && this.tab === "login") {
+      go(this.wanted ?? "/");
+      return;
+    }
     if (this.wait) put(this.wait, word("loading"));
     put(this.name, store.station?.station ?? word("title"));
     document.title = [this.view?.title, store.station?.station ?? word("title")].filter(Boolean).join(" · ");
@@ -658,16 +791,25 @@ class Shell {
     this.who.dataset.shown = key;
     if (before && this.view) queueMicrotask(() => this.open()); // other buttons
     const local = store.me && !store.me.name;
-    const out = () => fetch("/api/logout", { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" }).finally(() => live.restartAll());
-    const shown = store.me ? h("button", { type: "button", class: "plain", onclick: out }, word("sign_out", { name: store.me.name })) : link("/login", word("sign_in"));
+    const out = () =>
+      fetch("/api/logout", { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" }).finally(
+        () => live.restartAll(),
+      );
+    const shown = store.me
+      ? h("button", { type: "button", class: "plain", onclick: out }, word("sign_out", { name: store.me.name }))
+      : link("/login", word("sign_in"));
     this.who.replaceChildren(...(local || store.refused ? [] : [shown]));
   }
 
   /** Each second: whether what is shown is still true. */
   tick() {
-    const silentS = live?.silentS ?? 0, { connected, since } = store.controller;
-    const text = silentS ? word("lost", { age: lasting(silentS) })
-      : connected === false ? word("lost_controller", { age: lasting(typeof since === "number" ? nowS() - since : 0) }) : "";
+    const silentS = live?.silentS ?? 0,
+      { connected, since } = store.controller;
+    const text = silentS
+      ? word("lost", { age: lasting(silentS) })
+      : connected === false
+        ? word("lost_controller", { age: lasting(typeof since === "number" ? nowS() - since : 0) })
+        : "";
     const lost = Boolean(text) && Boolean(store.station);
     document.body.classList.toggle("stale", lost);
     this.lost.hidden = !lost;
@@ -683,9 +825,24 @@ export function go(path) {
 
 function follow(event) {
   const target = event.target.closest("a[href]");
-  if (!target || event.defaultPrevented || event.button || event.metaKey || event.ctrlKey || event.shiftKey || target.hasAttribute("download")) return;
+  if (
+    !target ||
+    event.defaultPrevented ||
+    event.button ||
+    event.metaKey ||
+    event.ctrlKey ||
+    event.shiftKey ||
+    target.hasAttribute("download")
+  )
+    return;
   const url = new URL(target.href);
-  if (url.origin !== location.origin || url.hash || url.pathname.startsWith("/api/") || url.pathname.startsWith("/static/")) return;
+  if (
+    url.origin !== location.origin ||
+    url.hash ||
+    url.pathname.startsWith("/api/") ||
+    url.pathname.startsWith("/static/")
+  )
+    return;
   event.preventDefault();
   go(url.pathname + url.search);
 }
@@ -693,7 +850,11 @@ function follow(event) {
 export function setLanguage(chosen, { tell = true } = {}) {
   if (chosen === language) return;
   language = chosen;
-  try { localStorage.setItem("language", chosen); } catch { /* it holds for this page, then */ }
+  try {
+    localStorage.setItem("language", chosen);
+  } catch {
+    /* it holds for this page, then */
+  }
   shell.build();
   shell.open();
   if (tell) live.restartAll();
@@ -705,31 +866,69 @@ export const signedIn = () => live.restartAll();
 // --- all bays --------------------------------------------------------------------------------------------------------
 
 /** From so many bays on there is a filter, and from so many on the tiles are small. */
-const MANY = 20, DENSE = 33;
+const MANY = 20,
+  DENSE = 33;
 /** More alarms than this have a line each. */
 const MANY_ALARMS = 8;
 
 function baysView(main) {
   const tiles = new Map();
   const filter = { group: "all", text: "" };
-  const summary = h("div", { class: "summary" }), alarms = h("section", { class: "alarms", "aria-labelledby": "alarms", hidden: true });
+  const summary = h("div", { class: "summary" }),
+    alarms = h("section", { class: "alarms", "aria-labelledby": "alarms", hidden: true });
   const chips = ["all", "needs", "works", "done", "rests", "waits"].map((group) => {
     const count = h("b");
-    const chip = h("button", { type: "button", class: "chip", "aria-pressed": "false", onclick: () => { filter.group = group; show(); } }, word(group), " ", count);
+    const chip = h(
+      "button",
+      {
+        type: "button",
+        class: "chip",
+        "aria-pressed": "false",
+        onclick: () => {
+          filter.group = group;
+          show();
+        },
+      },
+      word(group),
+      " ",
+      count,
+    );
     return { group, count, chip };
   });
-  const search = h("input", { type: "search", placeholder: word("search"), "aria-label": word("search"), oninput: () => { filter.text = search.value.trim().toLowerCase(); show(); } });
-  const tools = h("div", { class: "filters", role: "group", "aria-label": word("filter") }, chips.map(({ chip }) => chip), search);
-  const grid = h("ul", { class: "tiles" }), none = h("p", { class: "wait", hidden: true }, word("none_match"));
-  main.append(h("h1", { class: "unseen" }, word("bays")), alarms, h("div", { class: "over" }, summary, tools), grid, none);
+  const search = h("input", {
+    type: "search",
+    placeholder: word("search"),
+    "aria-label": word("search"),
+    oninput: () => {
+      filter.text = search.value.trim().toLowerCase();
+      show();
+    },
+  });
+  const tools = h(
+    "div",
+    { class: "filters", role: "group", "aria-label": word("filter") },
+    chips.map(({ chip }) => chip),
+    search,
+  );
+  const grid = h("ul", { class: "tiles" }),
+    none = h("p", { class: "wait", hidden: true }, word("none_match"));
+  main.append(
+    h("h1", { class: "unseen" }, word("bays")),
+    alarms,
+    h("div", { class: "over" }, summary, tools),
+    grid,
+    none,
+  );
 
   function matches(bay) {
-    const about = `${bay.name} ${bay.identity?.id ?? ""} ${bay.state} ${word(bay.state)} ${bay.policy?.name ?? ""}`.toLowerCase();
+    const about =
+      `${bay.name} ${bay.identity?.id ?? ""} ${bay.state} ${word(bay.state)} ${bay.policy?.name ?? ""}`.toLowerCase();
     return (filter.group === "all" || groupOf(bay) === filter.group) && about.includes(filter.text);
   }
 
   function show() {
-    const bays = [...store.bays.values()], counts = {};
+    const bays = [...store.bays.values()],
+      counts = {};
     for (const bay of bays) counts[groupOf(bay)] = (counts[groupOf(bay)] ?? 0) + 1;
     const used = (group) => group === "all" || counts[group] || group === filter.group;
     for (const { group, count, chip } of chips) {
@@ -753,12 +952,22 @@ function baysView(main) {
   return {
     title: word("bays"),
     update(names) {
-      if (!names) for (const name of [...tiles.keys()]) if (!store.bays.has(name)) { tiles.get(name).element.remove(); tiles.delete(name); }
+      if (!names)
+        for (const name of [...tiles.keys()])
+          if (!store.bays.has(name)) {
+            tiles.get(name).element.remove();
+            tiles.delete(name);
+          }
       for (const name of names ?? store.bays.keys()) {
         if (!tiles.has(name)) tiles.set(name, new Tile(name));
         tiles.get(name).show(store.bays.get(name));
       }
-      if (!names) grid.append(...[...store.bays.keys()].map((name) => tiles.get(name).element).filter((one, at) => grid.children[at] !== one));
+      if (!names)
+        grid.append(
+          ...[...store.bays.keys()]
+            .map((name) => tiles.get(name).element)
+            .filter((one, at) => grid.children[at] !== one),
+        );
       show();
     },
   };
@@ -766,7 +975,8 @@ function baysView(main) {
 
 /** Bays, amperes and kilowatts together. */
 function summarise(element, bays) {
-  const amps = bays.map((bay) => bay.charger.current_a ?? 0), watts = bays.map((bay, at) => amps[at] * (bay.charger.voltage_v ?? 0));
+  const amps = bays.map((bay) => bay.charger.current_a ?? 0),
+    watts = bays.map((bay, at) => amps[at] * (bay.charger.voltage_v ?? 0));
   const sum = (list) => list.reduce((one, other) => one + other, 0);
   const count = word(bays.length === 1 ? "count_one" : "count", { count: figure(bays.length, 0) });
   put(element, [count, figure(sum(amps), 0, "A"), figure(sum(watts) / 1000, 1, "kW")].join(" · "));
@@ -778,16 +988,32 @@ function showAlarms(section, bays) {
   const { strays = [], journal, persisted } = store.station;
   const lines = [
     ...urgent.map((bay) => ({ level: bay.alarm, of: bay.name, path: bayPath(bay.name), text: bay.reason })),
-    ...strays.filter((one) => !one.verified).map((one) => ({ level: "danger", of: one.port, path: "/station", text: one.problem || one.state })),
-    ...[journal, persisted].filter((one) => one?.problem).map((one) => ({ level: "attention", of: word("station"), path: "/station", text: one.problem })),
+    ...strays
+      .filter((one) => !one.verified)
+      .map((one) => ({ level: "danger", of: one.port, path: "/station", text: one.problem || one.state })),
+    ...[journal, persisted]
+      .filter((one) => one?.problem)
+      .map((one) => ({ level: "attention", of: word("station"), path: "/station", text: one.problem })),
   ];
   const key = JSON.stringify([language, lines]);
   if (section.dataset.shown === key) return;
   section.dataset.shown = key;
   section.hidden = !lines.length;
-  section.replaceChildren(h("h2", { id: "alarms" }, word("alarms")), h("ul", { class: lines.length > MANY_ALARMS ? "many" : null }, lines.map(({ level, of, path, text }) =>
-    h("li", { class: level }, shape(level === "danger" ? "octagon" : "triangle"),
-      h("p", {}, h("b", {}, word(level), " · ", link(path, of)), " ", text)))));
+  section.replaceChildren(
+    h("h2", { id: "alarms" }, word("alarms")),
+    h(
+      "ul",
+      { class: lines.length > MANY_ALARMS ? "many" : null },
+      lines.map(({ level, of, path, text }) =>
+        h(
+          "li",
+          { class: level },
+          shape(level === "danger" ? "octagon" : "triangle"),
+          h("p", {}, h("b", {}, word(level), " · ", link(path, of)), " ", text),
+        ),
+      ),
+    ),
+  );
 }
 
 /** One bay among all. */
@@ -803,12 +1029,23 @@ class Tile {
     this.why = h("p", { class: "why" });
     this.asked = h("p", { class: "asked", role: "status", hidden: true });
     this.stop = mayAsk() ? stopButton(name, "small") : null;
-    this.element = h("li", { class: "tile" },
-      h("h2", {}, link(bayPath(name), name)), this.state, h("p", { class: "charge" }, this.soc, h("span", { class: "ready" }, this.ready, this.at)), this.bar, this.values, this.why, this.asked, this.stop);
+    this.element = h(
+      "li",
+      { class: "tile" },
+      h("h2", {}, link(bayPath(name), name)),
+      this.state,
+      h("p", { class: "charge" }, this.soc, h("span", { class: "ready" }, this.ready, this.at)),
+      this.bar,
+      this.values,
+      this.why,
+      this.asked,
+      this.stop,
+    );
   }
 
   show(bay) {
-    const { battery, charger } = bay, old = battery.old ?? [];
+    const { battery, charger } = bay,
+      old = battery.old ?? [];
     putAttribute(this.element, "data-state", bay.state);
     putAttribute(this.element, "data-alarm", bay.alarm);
     if (this.state.dataset.of !== bay.state) {
@@ -819,7 +1056,12 @@ class Tile {
     put(this.soc, figure(known ? battery.soc_pct : null, 0, "%"));
     this.level.style.width = `${known ? battery.soc_pct : 0}%`;
     const of = (name, digits, unit) => shown(known ? battery[name] : null, digits, unit, old.includes(name));
-    put(this.values, [of("voltage_v", 2, "V"), shown(charger.current_a, 2, "A", charger.old), of("temperature_c", 1, "°C")].join(" · "));
+    put(
+      this.values,
+      [of("voltage_v", 2, "V"), shown(charger.current_a, 2, "A", charger.old), of("temperature_c", 1, "°C")].join(
+        " · ",
+      ),
+    );
     put(this.ready, readyAt(bay));
     put(this.at, readyTimes(bay).at(-1) ?? "");
     put(this.why, bay.reason);
