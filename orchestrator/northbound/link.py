@@ -75,8 +75,12 @@ class Link:
 
     def _take(self, line: Mapping[str, Any]) -> None:
         """One line of the stream: the whole document, what changed, or nothing new."""
-        if "document" in line:
-            new = self.picture.replace(line["document"])
+        document = line.get("document")
+        time_s = (line if document is None else document).get("time")
+        if isinstance(time_s, int | float):
+            self.picture.time = time_s
+        if document is not None:
+            new = self.picture.replace(document)
         else:
             new = self.picture.merge(line.get("bays") or {}, line.get("station") or {}, list(line.get("gone") or ()))
         if not self._connected(connected=True) and new:

@@ -12,8 +12,8 @@ from typing import Any
 
 Document = Mapping[str, Any]
 
-#: Keys of the status document that are no state of the station.
-TRANSPORT = frozenset({"ok", "bays", "revision"})
+#: Keys of the status document that are no state of the station; its time goes on, and is no news.
+TRANSPORT = frozenset({"ok", "bays", "revision", "time"})
 #: As many removed bays are remembered; whoever has seen none of that gets the whole document.
 MOST_GONE = 256
 
@@ -27,6 +27,7 @@ class Change:
     bays: tuple[Document, ...]
     station: Document
     gone: tuple[str, ...] = ()
+    time: float | None = None  #: Unix time at the service; None: one that does not tell
 
 
 @dataclass(slots=True)
@@ -34,6 +35,7 @@ class Picture:
     """The station as last told. Belongs to the event loop."""
 
     revision: int
+    time: float | None = None  #: Unix time of what was told last, by the service's clock
     first: int = 0  #: a reader that has not seen this revision needs the whole document; 0: there is none yet
     _bays: dict[str, Document] = field(default_factory=dict)
     _station: dict[str, Any] = field(default_factory=dict)
@@ -93,13 +95,15 @@ class Picture:
     def since(self, seen: int | None) -> Change:
         """What a reader has not seen that has seen this revision of ours; None: nothing."""
         if seen is None or not self.first <= seen <= self.revision:
-            return Change(self.revision, whole=True, bays=tuple(self._bays.values()), station=dict(self._station))
+            bays, station = tuple(self._bays.values()), dict(self._station)
+            return Change(self.revision, whole=True, bays=bays, station=station, time=self.time)
         return Change(
             self.revision,
             whole=False,
             bays=tuple(bay for name, bay in self._bays.items() if self._bay_seen[name] > seen),
             station={name: value for name, value in self._station.items() if self._key_seen[name] > seen},
             gone=tuple(name for name, revision in self._gone.items() if revision > seen),
+            time=self.time,
         )
 
     def _begin(self, bays: dict[str, Document], station: dict[str, Any]) -> None:

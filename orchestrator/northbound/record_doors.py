@@ -9,9 +9,11 @@ from starlette.responses import Response
 
 from orchestrator.config.northbound import Role
 from orchestrator.model import Cause
-from orchestrator.northbound.app import Answer, json_response, language
+from orchestrator.northbound.app import Answer, language
 from orchestrator.northbound.records import Records
+from orchestrator.northbound.refusal import JSON
 from orchestrator.northbound.sessions import Me
+from orchestrator.northbound.told import encoded
 from orchestrator.northbound.work import Workers
 
 CSV = {
@@ -42,7 +44,8 @@ class RecordDoors:
 
     def _json(self, what: Callable[[Request], Any]) -> Answer:
         async def answer(request: Request, _me: Me) -> Response:
-            return json_response(await self._workers.do(what, request))
+            # A curve is long: encoding it would hold up the live streams.
+            return Response(await self._workers.do(lambda: encoded(what(request))), headers=JSON)
 
         return answer
 

@@ -51,13 +51,14 @@ class Teller:
 def fields(change: Change, language: str) -> dict[str, Any]:
     """A change as JSON: a whole document has its bays in a list, what changed has them by name."""
     document = {**change.station, "bays": list(change.bays)}
+    time = {} if change.time is None else {"time": change.time}
     if language:
         document = in_language(document, language)
         document["bays"] = [_causes(bay, language) for bay in document["bays"]]
     if change.whole:
-        return {"revision": change.revision, "document": {**document, "revision": change.revision}}
+        return {"revision": change.revision, "document": {**document, **time, "revision": change.revision}}
     told = {str(bay["name"]): bay for bay in document.pop("bays")}
-    return {"revision": change.revision, "bays": told, "station": document, "gone": list(change.gone)}
+    return {"revision": change.revision, "bays": told, "station": document, "gone": list(change.gone), **time}
 
 
 def _causes(part: Any, language: str) -> Any:  # noqa: ANN401 - a part of the document

@@ -28,10 +28,11 @@ HOT = {"id": "over_temperature", "params": {"pack_c": 45.23, "limit_c": 45, "aga
 
 def bay(name: str, state: str = "IDLE", cause: Mapping[str, Any] = HOT) -> dict[str, Any]:
     """As much of a bay's entry as matters here."""
-    device = {"online": True, "problem": "", "cause": None, "t_s": 1.0, "age_s": 0.1}
+    device = {"online": True, "problem": "", "cause": None}
     return {
         "name": name, "state": state, "reason": "it is hot", "cause": {**cause, "advice": "", "text": "it is hot"},
-        "faults": [], "alarm": "none", "charger": device, "battery": device,
+        "faults": [], "alarm": "none", "charger": {**device, "t_s": 1.0, "age_s": 0.1, "old": False},
+        "battery": {**device, "age_s": {}, "old": []},
     }  # fmt: skip
 
 

@@ -42,7 +42,7 @@ class Bay:
 def test_changes_come_by_the_stream_of_the_service(tmp_path: Path) -> None:
     bays = [Bay("bay-1"), Bay("bay-2")]
     station = {"station": "hall", "language": "en", "alarm": "none"}
-    streams = Streams(Published(bays, lambda: dict(station)), time.monotonic, lambda _: None)
+    streams = Streams(Published(bays, lambda: dict(station), lambda: 1000.0), time.monotonic, lambda _: None)
     streams.start()
     with page(tmp_path, controller=False) as (browser, controller):
         controller.begin(streams)
@@ -50,7 +50,7 @@ def test_changes_come_by_the_stream_of_the_service(tmp_path: Path) -> None:
         with browser.stream() as events:
             whole = events.next("whole")[2]
             assert [one["name"] for one in whole["document"]["bays"]] == ["bay-1", "bay-2"]
-            assert whole["document"]["station"] == "hall"
+            assert (whole["document"]["station"], whole["document"]["time"]) == ("hall", 1000.0)
             bays[1].go(State.TRIPPED)
             change = events.next("change")[2]
             assert {name: one["state"] for name, one in change["bays"].items()} == {"bay-2": "TRIPPED"}
