@@ -15,8 +15,8 @@ from orchestrator.northbound.told import PAGE, Teller, encoded
 MOST = 32
 #: Something is sent at least this often; the reader takes silence for a lost connection.
 ALIVE_S = 5.0
-#: How long a reader may be asked to wait by the long poll.
-POLL_S = 25.0
+#: How long a reader may be asked to wait by the long poll: the page takes 12 s of silence for a lost connection.
+POLL_S = 8.0
 #: Readers that are up to date are told of changes at most so often.
 PACE_S = 0.1
 ALIVE = ":\n\n"

@@ -406,6 +406,7 @@ class Link {
     this.connected = false;
     this.lostS = nowS(); // since when there is no connection
     this.polls = false; // something between here and the station holds streams back
+    this.opened = false; // the stream has begun
     this.stealS = 0; // not before this
     this.leading = null; // aborts what this tab's lead is doing
     this.waiting = null; // aborts its waiting for the lock
@@ -503,24 +504,13 @@ class Link {
   async lead() {
     const lead = (this.leading = new AbortController());
     for (let failures = 0; !lead.signal.aborted;) {
-      this.stream = new AbortController();
-      lead.signal.addEventListener("abort", () => this.stream.abort(), { once: true });
-      const quiet = setInterval(() => {
-        if (nowS() - this.heardS > 2 * QUIET_S) this.stream.abort("quiet");
-      }, 1000);
-      const before = this.heardS;
-      try {
-        await (this.polls ? this.poll(this.stream.signal) : this.listen(this.stream.signal));
-        failures = this.heardS > before ? 0 : failures + 1;
-      } catch {
-        const again = this.stream.signal.aborted && this.stream.signal.reason !== "quiet";
-        failures = again || this.heardS > before + 1 ? 0 : failures + 1;
-        if (again) continue;
-      } finally {
-        clearInterval(quiet);
-      }
+      const begunS = nowS();
+      const end = await this.attempt(lead.signal);
       if (lead.signal.aborted) return;
-      if (failures === 3) this.polls = !this.polls;
+      const heard = this.heardS > begunS;
+      failures = heard || end === "again" ? 0 : failures + 1;
+      if (end === "more" || end === "again") continue;
+      this.polls = !this.polls && this.opened && !heard; // a stream that begins, and brings nothing
       this.lose();
       this.tell({ kind: "lost", sinceS: this.lostS });
       const pauseS = store.refused ? REFUSED_S : Math.min(8, 0.5 * 2 ** failures) * (0.5 + Math.random());
@@ -530,6 +520,25 @@ class Link {
           this.wake = resolve;
         }),
       ]);
+    }
+  }
+
+  /** Listens for as long as that works: "more" after an answer to a poll, "again" if it is to begin anew, "lost". */
+  async attempt(lead) {
+    const own = (this.stream = new AbortController()),
+      signal = AbortSignal.any([own.signal, lead]),
+      begunS = nowS();
+    const quiet = setInterval(() => {
+      if (nowS() - Math.max(this.heardS, begunS) > QUIET_S) own.abort("quiet");
+    }, 1000);
+    this.opened = false;
+    try {
+      await (this.polls ? this.poll(signal) : this.listen(signal));
+      return this.polls ? "more" : "lost";
+    } catch {
+      return own.signal.aborted && own.signal.reason !== "quiet" ? "again" : "lost";
+    } finally {
+      clearInterval(quiet);
     }
   }
 
@@ -550,6 +559,7 @@ class Link {
       resumes ? { "Last-Event-ID": store.revision } : {},
     );
     store.language = language;
+    this.opened = true;
     const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
     for (let rest = ""; ;) {
       const { value, done } = await reader.read();
