@@ -885,7 +885,7 @@ function baysView(main) {
   const tiles = new Map();
   const filter = { group: "all", text: "" };
   const summary = h("div", { class: "summary" }),
-    alarms = h("section", { class: "alarms", "aria-labelledby": "alarms", hidden: true });
+    alarms = new Alarms();
   const chips = ["all", "needs", "works", "done", "rests", "waits"].map((group) => {
     const count = h("b");
     const chip = h(
@@ -924,7 +924,7 @@ function baysView(main) {
     none = h("p", { class: "wait", hidden: true }, word("none_match"));
   main.append(
     h("h1", { class: "unseen" }, word("bays")),
-    alarms,
+    alarms.element,
     h("div", { class: "over" }, summary, tools),
     grid,
     none,
@@ -956,7 +956,7 @@ function baysView(main) {
     }
     none.hidden = shown > 0;
     summarise(summary, bays);
-    showAlarms(alarms, bays);
+    alarms.show(bays);
   }
 
   return {
@@ -993,37 +993,62 @@ function summarise(element, bays) {
 }
 
 /** On top: each bay that needs a person with its reason, which begins with what to do; then the station's own problems. */
-function showAlarms(section, bays) {
+class Alarms {
+  constructor() {
+    this.lines = new Map(); // kept while their texts change: somebody may just be on a link
+    this.list = h("ul");
+    this.news = h("p", { class: "unseen", role: "alert" });
+    const title = h("h2", { id: "alarms" }, word("alarms"));
+    this.element = h(
+      "section",
+      { class: "alarms", "aria-labelledby": "alarms", hidden: true },
+      title,
+      this.list,
+      this.news,
+    );
+  }
+
+  show(bays) {
+    const told = alarmsOf(bays),
+      wanted = new Map(told.map((one) => [`${one.level} ${one.of}`, one]));
+    for (const [key, { item }] of this.lines) {
+      if (wanted.has(key)) continue;
+      item.remove();
+      this.lines.delete(key);
+    }
+    const fresh = told.filter((one) => !this.lines.has(`${one.level} ${one.of}`));
+    for (const one of fresh) this.lines.set(`${one.level} ${one.of}`, this.line(one));
+    for (const [key, { text }] of wanted) put(this.lines.get(key).text, ` ${text}`);
+    const items = [...wanted.keys()].map((key) => this.lines.get(key).item);
+    if (items.some((item, at) => this.list.children[at] !== item)) this.list.append(...items);
+    putAttribute(this.list, "class", told.length > MANY_ALARMS ? "many" : null);
+    this.element.hidden = !told.length;
+    if (fresh.length) put(this.news, fresh.map(({ level, of }) => `${word(level)}: ${of}`).join(", "));
+  }
+
+  line({ level, of, path }) {
+    const text = h("span"),
+      mark = shape(level === "danger" ? "octagon" : "triangle");
+    return {
+      text,
+      item: h("li", { class: level }, mark, h("p", {}, h("b", {}, word(level), " · ", link(path, of)), text)),
+    };
+  }
+}
+
+function alarmsOf(bays) {
   const urgent = bays.filter(isUrgent).sort((one, other) => LEVELS.indexOf(one.alarm) - LEVELS.indexOf(other.alarm));
-  const { strays = [], journal, persisted } = store.station;
-  const lines = [
+  const { strays = [], journal, persisted } = store.station,
+    path = "/station";
+  const left = strays.filter((one) => !one.verified),
+    troubled = Object.entries({ journal, persisted });
+  return [
     ...urgent.map((bay) => ({ level: bay.alarm, of: bay.name, path: bayPath(bay.name), text: bay.reason })),
-    ...strays
-      .filter((one) => !one.verified)
-      .map((one) => ({ level: "danger", of: one.port, path: "/station", text: one.problem || one.state })),
-    ...[journal, persisted]
-      .filter((one) => one?.problem)
-      .map((one) => ({ level: "attention", of: word("station"), path: "/station", text: one.problem })),
+    ...left.map((one) => ({ level: "danger", of: one.port, path, text: one.problem || one.state })),
+    ...troubled
+      .filter(([, one]) => one?.problem)
+      .map(([of, one]) => ({ level: "attention", of: word(of), path, text: one.problem })),
   ];
-  const key = JSON.stringify([language, lines]);
-  if (section.dataset.shown === key) return;
-  section.dataset.shown = key;
-  section.hidden = !lines.length;
-  section.replaceChildren(
-    h("h2", { id: "alarms" }, word("alarms")),
-    h(
-      "ul",
-      { class: lines.length > MANY_ALARMS ? "many" : null },
-      lines.map(({ level, of, path, text }) =>
-        h(
-          "li",
-          { class: level },
-          shape(level === "danger" ? "octagon" : "triangle"),
-          h("p", {}, h("b", {}, word(level), " · ", link(path, of)), " ", text),
-        ),
-      ),
-    ),
-  );
 }
 
 /** One bay among all. */
