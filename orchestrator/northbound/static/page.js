@@ -350,7 +350,7 @@ function standsBy(bay) {
     charger.online &&
     !charger.old &&
     charger.operation === 0 &&
-    charger.current_a <= STANDBY_A
+    (charger.current_a ?? Infinity) <= STANDBY_A
   );
 }
 
@@ -690,7 +690,7 @@ function progress({ action, stage, text }) {
   ];
 }
 
-export const mayAsk = () => store.me?.role === "operator" || store.me?.role === "admin";
+export const mayAsk = () => store.me?.role === "operator";
 
 /** The stop button: one press. */
 export function stopButton(bay, kind) {
