@@ -76,6 +76,7 @@ def test_a_reset_is_held_for_a_second_by_mouse_or_key(tab: Tab, station: Shown) 
     tab.mouse("button.hold", "mousePressed")
     tab.value("new Promise((done) => setTimeout(done, 300))")
     tab.mouse("button.hold", "mouseReleased")
+    assert station.asked == []
     tab.value("document.querySelector('button.hold').focus()")
     tab.key("Enter", 13, "rawKeyDown")
     tab.wait("document.querySelector('.foot .asked').textContent.includes('● accepted')")

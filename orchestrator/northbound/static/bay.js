@@ -347,10 +347,9 @@ function holdButton(act, describedBy, done) {
   for (const name of ["pointerup", "pointerleave", "pointercancel", "blur"]) made.addEventListener(name, end);
   made.addEventListener("contextmenu", (event) => event.preventDefault());
   made.addEventListener("keydown", (event) => {
-    if (isKey(event)) {
-      event.preventDefault();
-      begin();
-    }
+    if (!isKey(event)) return;
+    event.preventDefault();
+    if (!event.repeat) begin(); // held on, it acts once
   });
   made.addEventListener("keyup", (event) => {
     if (isKey(event)) {
