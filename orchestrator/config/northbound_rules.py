@@ -11,8 +11,8 @@ from pathlib import Path
 from orchestrator.config.names import name_problem
 from orchestrator.config.rules import Problems
 
-#: A name in the DNS, or an address.
-_HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]{0,251}[A-Za-z0-9])?|[0-9a-fA-F:.]{2,45}")
+#: A name in the DNS.
+_HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9_.-]{0,251}[A-Za-z0-9])?")
 _LISTEN = re.compile(r"(?:\[([0-9a-fA-F:.]+)\]|([^\[\]:]+)):([0-9]{1,5})")
 #: As `orchestrator user add` writes it: n, r, p, salt and hash.
 PASSWORD = re.compile(r"scrypt:(\d{1,7}):(\d{1,2}):(\d):([0-9a-f]{32}):([0-9a-f]{64})")
@@ -33,11 +33,8 @@ class Listen:
         if not match or int(match[3]) > 65535:
             raise ValueError(f"{text[:80]!r}: write ADDRESS:PORT, for example 127.0.0.1:8080 or '[::1]:8080'")
         host = match[1] or match[2]
-        try:
-            ipaddress.ip_address(host if host != LOCALHOST else "127.0.0.1")
-        except ValueError:
-            text = f"{host[:80]!r} is no address: write that of a network interface of this machine, or localhost"
-            raise ValueError(text) from None
+        if host != LOCALHOST and not _is_address(host):
+            raise ValueError(f"{host[:80]!r} is no address: write that of one of this machine's networks, or localhost")
         return cls(host, int(match[3]))
 
     @property
@@ -46,11 +43,19 @@ class Listen:
         return self.host == LOCALHOST or ipaddress.ip_address(self.host).is_loopback
 
 
+def _is_address(text: str) -> bool:
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        return False
+    return True
+
+
 def northbound_problems(values: Mapping[str, object]) -> Problems:
     """All findings between the keys, and in the files that they name."""
     yield from _listen(values)
     for i, host in enumerate(_tuple(values.get("page.hosts"))):
-        if not _HOST.fullmatch(str(host)):
+        if not _HOST.fullmatch(str(host)) and not _is_address(str(host)):
             yield f"page.hosts[{i}]", f"{str(host)[:80]!r} is no host name: write it without https:// and without port"
     for name, secret in (
         ("station", False), ("users", True), ("page.tls.cert_file", False), ("page.tls.key_file", True),

@@ -26,10 +26,12 @@ Counts = tuple[tuple[Backoff, str], ...]  #: the failures of the name, and of th
 
 
 class Accounts:
-    """The users, their sessions, and failed logins. `clock` tells monotonic seconds."""
+    """The users, their sessions, and failed logins. `clock` tells monotonic seconds, `say` is told who logs in."""
 
-    def __init__(self, users: Users | None, clock: Callable[[], float], *, secure: bool) -> None:
-        self._users, self._clock, self._secure = users, clock, secure
+    def __init__(
+        self, users: Users | None, clock: Callable[[], float], say: Callable[[Cause], None], *, secure: bool
+    ) -> None:
+        self._users, self._clock, self._say, self._secure = users, clock, say, secure
         self._sessions = Sessions(users) if users is not None else None
         # Browsers send such a name back only over TLS, only to this host, and let no other host set it.
         self._cookie = f"__Host-{COOKIE}" if secure else COOKIE
@@ -65,7 +67,8 @@ class Accounts:
             raise RefusalError(409, Cause("login_none"))
         name, password = text_field(asked, "name", NAME), text_field(asked, "password", LONGEST)
         self._users.look()
-        counts = ((self._names, name), (self._addresses, request.client.host if request.client else ""))
+        address = request.client.host if request.client else ""
+        counts = ((self._names, name), (self._addresses, address))
         self._check_wait(counts)
         if self._waiting >= MOST_WAITING:
             raise RefusalError(503, Cause("page_busy"), {"retry-after": "2"})
@@ -76,6 +79,7 @@ class Accounts:
                 user = await self._known(name, password, counts)
         finally:
             self._waiting -= 1
+        self._say(Cause.of("login_done", name=name, role=user.role.value, address=address))
         self.logout(request)  # a session from before the login is worth nothing after it
         id_ = self._sessions.begin(name, user, self._clock())
         return Me(name, user.role), self._set(id_, int(LASTS_S))
@@ -97,6 +101,7 @@ class Accounts:
             return user
         for count, who in counts:
             count.failed(who, self._clock())
+        self._say(Cause.of("login_failed", name=name, address=counts[1][1]))
         raise RefusalError(401, Cause("login_wrong"))
 
     def _check_wait(self, counts: Counts) -> None:

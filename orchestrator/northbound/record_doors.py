@@ -26,8 +26,8 @@ CSV = {
 class RecordDoors:
     """Answers from the records beside a journal, two readers at a time: nothing else waits for them."""
 
-    def __init__(self, journal: Callable[[], Path], say: Callable[[Cause], None]) -> None:
-        self._records, self._workers = Records(journal, say), Workers("record", 2, 14)
+    def __init__(self, journal: Callable[[], Path], say: Callable[[Cause], None], home: Path | None = None) -> None:
+        self._records, self._workers = Records(journal, say, home), Workers("record", 2, 14)
 
     def doors(self) -> tuple[tuple[str, Role, Answer], ...]:
         """Address, least role, and what answers."""

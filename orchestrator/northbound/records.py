@@ -32,10 +32,10 @@ Query = Mapping[str, str]
 
 
 class Records:
-    """The records beside a journal. `say` is told what is wrong with their index."""
+    """The records beside a journal, and their index, which may be in `home`. `say` is told what is wrong with it."""
 
-    def __init__(self, journal: Callable[[], Path], say: Callable[[Cause], None]) -> None:
-        self._journal, self._say, self._said = journal, say, frozenset[str]()
+    def __init__(self, journal: Callable[[], Path], say: Callable[[Cause], None], home: Path | None) -> None:
+        self._journal, self._say, self._home, self._said = journal, say, home, frozenset[str]()
 
     def sessions(self, query: Query, language: str) -> dict[str, Any]:
         """The charges that are meant, the newest first; the next page is `before` the last of them."""
@@ -116,7 +116,7 @@ class Records:
 
     def _charges(self) -> Charges:
         try:
-            return Charges(self._folder, self._say_once)
+            return Charges(self._folder, self._say_once, self._home)
         except OSError as error:
             why = error.strerror or str(error)
             raise RefusalError(503, Cause.of("charges_unreadable", folder=error.filename, error=why)) from None

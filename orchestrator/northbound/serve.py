@@ -58,8 +58,8 @@ def assembled(
     station = northbound.station
     users = Users(northbound.users, tell) if northbound.users is not None else None
     link = Link(lambda: sockets(station))
-    accounts = Accounts(users, time.monotonic, secure=context is not None)
-    records = RecordDoors(lambda: journal(station), tell).doors()
+    accounts = Accounts(users, time.monotonic, tell, secure=context is not None)
+    records = RecordDoors(lambda: journal(station), tell, own_directory()).doors()
     closely = Closely(lambda: sockets(station)).door()
     app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), (*records, closely))
     door = Door.of(Listen.of(northbound.page.listen).host, northbound.page.hosts)
@@ -81,6 +81,12 @@ def sockets(station: Path) -> list[Path]:
 def journal(station: Path) -> Path:
     """The journal of the station's service."""
     return _named(station, wiring(station).journal)
+
+
+def own_directory() -> Path | None:
+    """Where this process may keep something, as systemd says: it may not write beside the records of the service."""
+    found = os.environ.get("STATE_DIRECTORY")
+    return Path(found) if found else None
 
 
 def _named(station: Path, path: str) -> Path:

@@ -41,8 +41,9 @@ def add_user(name: str, role: str, file: str) -> int:
 def _password(name: str) -> str:
     """Typed twice at a terminal, otherwise the first line of standard input."""
     if sys.stdin.isatty():
-        password = getpass(f"{name}: ")
-        if getpass(f"{name} (2): ") != password:
+        language = own_language()
+        password = getpass(f"{say(Cause.of('password_for', name=name), language)}: ")
+        if getpass(f"{say(Cause('password_again'), language)}: ") != password:
             raise UsageError("user: the two passwords differ; nothing is changed")
     else:
         password = sys.stdin.readline().rstrip("\r\n")

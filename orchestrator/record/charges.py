@@ -40,10 +40,13 @@ class Battery(NamedTuple):
 
 
 class Charges:
-    """Those in this folder now; OSError if its files cannot be read. `say` is told what is wrong with the index."""
+    """Those in this folder now; OSError if its files cannot be read. `say` is told what is wrong with the index.
 
-    def __init__(self, folder: Path, say: Callable[[Cause], None] = lambda _: None) -> None:
-        self._folder, self._db = folder, opened(folder, say)
+    The index is in `home`, if that is another directory.
+    """
+
+    def __init__(self, folder: Path, say: Callable[[Cause], None] = lambda _: None, home: Path | None = None) -> None:
+        self._folder, self._db = folder, opened(folder, say, home)
 
     def listed(
         self,

@@ -225,12 +225,13 @@ def test_a_login_makes_a_new_session_whatever_the_browser_had(browser: Browser) 
     assert browser.get("/api/me").json["me"] is None, "a login ends the session that it was made in"
 
 
-def test_wrong_logins_look_alike_and_slow_down(closed: Pair) -> None:
+def test_wrong_logins_look_alike_slow_down_and_are_told(closed: Pair, capfd: pytest.CaptureFixture[str]) -> None:
     browser = Browser(closed[0].port)
     answers = [browser.login(name, "wrong") for name in ("kim", "nobody", "nobody", "kim", "nobody", "kim", "kim")]
     assert [answer.status for answer in answers] == [401] * 6 + [429]
     assert answers[0].json == answers[1].json
     assert int(answers[-1].headers["Retry-After"]) >= 1
+    assert capfd.readouterr().err.count("a login as kim from 127.0.0.1 has failed") == 3
     assert browser.login("kim", "kim secret").status == 429, "even the right one has to wait"
 
 

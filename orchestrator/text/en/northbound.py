@@ -11,7 +11,11 @@ TEXTS: Mapping[str, str] = {
     "page_error": "an error of the page's own at {path}: {error}",
     "user_saved": "{name} may log in as {role} ({file})",
     "users_not_written": "{file} cannot be written, nothing is changed: {error}",
+    "password_for": "password for {name}",
+    "password_again": "the same again",
     # who may come in
+    "login_done": "{name} ({role}) has logged in from {address}",
+    "login_failed": "a login as {name} from {address} has failed",
     "login_needed": "log in first",
     "login_wrong": "no user has this name and this password",
     "login_wait": "too many logins have failed: try again in {wait_s:.0f} s",
@@ -31,6 +35,6 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "too much is asked at once: try again in a few seconds",
     "page_late": "the answer takes too long: try again, or ask for less",
     "page_failed": "the page's server has made an error, which its log has; the station is not affected",
-    "controller_silent": "the controller does not answer ({why}): nobody knows whether this was done; `orchestrator estop` "
+    "controller_silent": "the controller does not answer ({why}): do not rely on this having been done; `orchestrator estop` "
     "on the gateway stops every charger",
 }

@@ -11,6 +11,10 @@ TEXTS: Mapping[str, str] = {
     "page_error": "페이지 서버의 자체 오류({path}): {error}",
     "user_saved": "{name} 사용자가 {role} 역할로 로그인할 수 있습니다({file})",
     "users_not_written": "{file}을(를) 쓸 수 없어 아무것도 바꾸지 않았습니다: {error}",
+    "password_for": "{name} 사용자의 비밀번호",
+    "password_again": "비밀번호 다시 입력",
+    "login_done": "{name}({role}) 사용자가 {address}에서 로그인했습니다",
+    "login_failed": "{address}에서 {name} 사용자의 로그인이 실패했습니다",
     "login_needed": "먼저 로그인하십시오",
     "login_wrong": "이름 또는 비밀번호가 맞지 않습니다",
     "login_wait": "로그인 실패가 너무 많습니다. {wait_s:.0f}초 후에 다시 시도하십시오",
@@ -29,6 +33,6 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "요청이 너무 많습니다. 몇 초 후에 다시 시도하십시오",
     "page_late": "응답이 너무 오래 걸립니다. 다시 시도하거나 범위를 줄이십시오",
     "page_failed": "페이지 서버에 오류가 발생했으며 로그에 기록되었습니다. 스테이션에는 영향이 없습니다",
-    "controller_silent": "컨트롤러가 응답하지 않습니다({why}). 요청이 처리되었는지 알 수 없습니다. 게이트웨이에서 `orchestrator estop`을 "
+    "controller_silent": "컨트롤러가 응답하지 않습니다({why}). 요청이 처리되지 않았을 수 있습니다. 게이트웨이에서 `orchestrator estop`을 "
     "실행하면 모든 충전기가 정지합니다",
 }
