@@ -379,7 +379,8 @@ export function readyAt(bay) {
 const QUIET_S = 12,
   STEAL_S = 8,
   REFUSED_S = 30,
-  LOCK = "station stream";
+  LOCK = "station stream",
+  TAKEN = "503";
 const nowS = () => Date.now() / 1000;
 const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
 
@@ -407,6 +408,7 @@ class Link {
     this.lostS = nowS(); // since when there is no connection
     this.polls = false; // something between here and the station holds streams back
     this.opened = false; // the stream has begun
+    this.full = false; // all its places are taken
     this.stealS = 0; // not before this
     this.leading = null; // aborts what this tab's lead is doing
     this.waiting = null; // aborts its waiting for the lock
@@ -455,8 +457,7 @@ class Link {
       return;
     }
     if (this.leading) {
-      if (message.kind === "hello" && store.station)
-        this.tell({ kind: "event", event: "whole", data: wholeOf(store), revision: store.revision });
+      if (message.kind === "hello" && store.station) this.tellAll();
       return;
     }
     if (message.kind === "lost") this.lose(message.sinceS);
@@ -466,6 +467,13 @@ class Link {
 
   tell(message) {
     this.channel?.postMessage(message);
+  }
+
+  /** For a tab that has just been opened. */
+  tellAll() {
+    this.tell({ kind: "event", event: "link", data: store.controller, revision: null });
+    this.tell({ kind: "event", event: "whole", data: wholeOf(store), revision: store.revision });
+    if (!this.connected) this.tell({ kind: "lost", sinceS: this.lostS });
   }
 
   live() {
@@ -510,7 +518,7 @@ class Link {
       const heard = this.heardS > begunS;
       failures = heard || end === "again" ? 0 : failures + 1;
       if (end === "more" || end === "again") continue;
-      this.polls = !this.polls && this.opened && !heard; // a stream that begins, and brings nothing
+      this.polls = !this.polls && (this.full || (this.opened && !heard)); // or a stream that begins, and brings nothing
       this.lose();
       this.tell({ kind: "lost", sinceS: this.lostS });
       const pauseS = store.refused ? REFUSED_S : Math.min(8, 0.5 * 2 ** failures) * (0.5 + Math.random());
@@ -531,11 +539,12 @@ class Link {
     const quiet = setInterval(() => {
       if (nowS() - Math.max(this.heardS, begunS) > QUIET_S) own.abort("quiet");
     }, 1000);
-    this.opened = false;
+    this.opened = this.full = false;
     try {
       await (this.polls ? this.poll(signal) : this.listen(signal));
       return this.polls ? "more" : "lost";
-    } catch {
+    } catch (error) {
+      this.full = error.message === TAKEN;
       return own.signal.aborted && own.signal.reason !== "quiet" ? "again" : "lost";
     } finally {
       clearInterval(quiet);
