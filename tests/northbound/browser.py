@@ -22,7 +22,7 @@ OPTIONS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions",
     "--remote-debugging-pipe",
 )  # fmt: skip
-WITHIN_S = 8.0
+WITHIN_S = 15.0
 END_S = 5.0
 
 
