@@ -302,6 +302,7 @@ SAID = frozenset({
     ("service.journal_files", ""),  # the same, of a journal
     ("service.bay", " in "),  # where an exception of our own was raised
     ("northbound.stream", "event: "),  # no words, but what a browser reads
+    ("northbound.stream", "id: "),  # the same
     ("northbound.user_verb", "# Who may log in"),  # a comment in a file
     ("northbound.verbs", "the page needs the package"),  # what is not installed
 })  # fmt: skip

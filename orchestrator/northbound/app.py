@@ -17,7 +17,7 @@ from orchestrator.northbound.fields import number_field
 from orchestrator.northbound.refusal import JSON, RefusalError, language_of_request
 from orchestrator.northbound.sessions import Me
 from orchestrator.northbound.static import Static
-from orchestrator.northbound.stream import Streams
+from orchestrator.northbound.stream import Streams, sent
 from orchestrator.northbound.told import asked_language, encoded
 
 #: Larger than any revision.
@@ -25,7 +25,7 @@ MOST_REVISION = 10**15
 #: The page's own addresses: one file answers at all of them.
 PAGES = ("/", "/bay/{bay}", "/history", "/batteries", "/station", "/login")
 
-STREAM = {"content-type": "text/event-stream; charset=utf-8", "cache-control": "no-store"}
+STREAM = {"content-type": "text/event-stream; charset=utf-8", "cache-control": "no-store", "vary": "accept-encoding"}
 
 Answer = Callable[[Request, Me], Awaitable[Response]]
 
@@ -97,7 +97,9 @@ class App:
         seen = number_field({"after": after} if after.isdigit() else {}, "after", MOST_REVISION, 0)
         self.streams.check_room()
         events = self.streams.events(seen, self._asked(request), lambda: self._me(request))
-        return StreamingResponse(events, headers=STREAM)
+        packed = "gzip" in request.headers.get("accept-encoding", "")
+        headers = {**STREAM, **({"content-encoding": "gzip"} if packed else {})}
+        return StreamingResponse(sent(events, packed=packed), headers=headers)
 
     async def status(self, request: Request, _me: Me) -> Response:
         """The long poll."""

@@ -13,7 +13,6 @@ from pathlib import Path
 from time import time
 from typing import Any
 
-from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import MAX_ANSWER, ask
 from orchestrator.northbound.picture import Picture
 
@@ -62,8 +61,8 @@ class Link:
             except NoStreamError:
                 self._polls = True
                 continue
-            except (OSError, ServiceError, ValueError, KeyError, TypeError, AttributeError, EOFError):
-                pass  # gone, hung up, silent, or no service of this kind
+            except Exception:  # noqa: BLE001, S110 - gone, hung up, silent, or it sends nonsense: what is shown is old now
+                pass
             self._connected(connected=False)
             self._polls = False  # an update may have come meanwhile
             await asyncio.sleep(pause_s)

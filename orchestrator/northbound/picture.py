@@ -54,8 +54,8 @@ class Picture:
         return str(self._station.get("language", ""))
 
     def replace(self, document: Document) -> bool:
-        """The whole document as it is now; returns whether anything in it is new."""
-        bays = {str(bay["name"]): bay for bay in document["bays"]}
+        """The whole document as it is now; returns whether anything in it is new. ValueError if it is none."""
+        bays = {_name(bay): bay for bay in document["bays"]}
         station = {name: value for name, value in document.items() if name not in TRANSPORT}
         left = [name for name in self._bays if name in bays]
         in_place = left == list(bays)[: len(left)]
@@ -112,3 +112,10 @@ class Picture:
         self._bays, self._station, self._gone = bays, station, {}
         self._bay_seen = dict.fromkeys(bays, self.revision)
         self._key_seen = dict.fromkeys(station, self.revision)
+
+
+def _name(bay: Document) -> str:
+    name = bay["name"]
+    if not isinstance(name, str):
+        raise ValueError(f"{name!r:.80} is no name")
+    return name

@@ -5,11 +5,13 @@ Events: `link` (whether the controller is there, and since when), `whole` (the d
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
+from typing import NamedTuple
 
 from orchestrator.model import Cause
 from orchestrator.northbound.link import Link
+from orchestrator.northbound.packed import HEAD, piece
 from orchestrator.northbound.refusal import RefusalError
-from orchestrator.northbound.told import PAGE, Teller, encoded
+from orchestrator.northbound.told import PAGE, Teller, Told, encoded
 
 #: The most streams at once, of all readers together.
 MOST = 32
@@ -19,10 +21,34 @@ ALIVE_S = 5.0
 POLL_S = 8.0
 #: Readers that are up to date are told of changes at most so often.
 PACE_S = 0.1
-ALIVE = ":\n\n"
+#: How long the long poll waits while nothing is known of the station.
+UNKNOWN_S = 1.0
 
 #: Who reads; None: somebody who may not, or not any more.
 Who = Callable[[], Mapping[str, str] | None]
+
+
+class Event(NamedTuple):
+    """One server-sent event; JSON as we write it has no line ends. `told` is shared with other readers."""
+
+    begin: str
+    told: Told | None = None
+    end: str = ""
+
+    @property
+    def plain(self) -> bytes:
+        """As text."""
+        return f"{self.begin}{self.told.members if self.told is not None else ''}{self.end}".encode()
+
+    @property
+    def packed(self) -> bytes:
+        """As a piece of a gzip stream."""
+        if self.told is None:
+            return piece(self.begin)
+        return piece(self.begin) + self.told.packed + piece(self.end)
+
+
+ALIVE = Event(":\n\n")
 
 
 class Streams:
@@ -36,7 +62,7 @@ class Streams:
         if self._open >= MOST:
             raise RefusalError(503, Cause.of("streams_taken", most=MOST), {"retry-after": "10"})
 
-    async def events(self, seen: int | None, language: str, me: Who) -> AsyncIterator[str]:
+    async def events(self, seen: int | None, language: str, me: Who) -> AsyncIterator[Event]:
         """The events for one reader, who has seen this revision, until it leaves or may not read any more."""
         self._open += 1
         try:
@@ -45,17 +71,18 @@ class Streams:
         finally:
             self._open -= 1
 
-    async def _events(self, seen: int | None, language: str, me: Who) -> AsyncIterator[str]:
-        link, told = self._link, (False, 0.0)
+    async def _events(self, seen: int | None, language: str, me: Who) -> AsyncIterator[Event]:
+        link, shown = self._link, (False, 0.0)
         while (who := me()) is not None:
             new = False
-            if told != (link.connected, link.since_s):
-                new, told = True, (link.connected, link.since_s)
-                yield event("link", encoded(self.link_fields()))
+            if shown != (link.connected, link.since_s):
+                new, shown = True, (link.connected, link.since_s)
+                yield Event(f"event: link\ndata: {encoded(self.link_fields())}\n\n")
             if link.picture.known and seen != link.picture.revision:
-                change, members = self._teller.since(seen, language)
-                new, seen = True, change.revision
-                yield event("whole", _whole(members, who), seen) if change.whole else event("change", members, seen)
+                told = self._teller.since(seen, language)
+                new, seen = True, told.change.revision
+                name = "whole" if told.change.whole else "change"
+                yield Event(f"id: {seen}\nevent: {name}\ndata: {{", told, f"{_beside(told, who)}}}\n\n")
                 await asyncio.sleep(PACE_S)
             if not new and not await link.changed(ALIVE_S):
                 yield ALIVE
@@ -63,26 +90,33 @@ class Streams:
     async def poll(self, seen: int | None, language: str, me: Who) -> str:
         """The same for one who cannot read a stream: JSON, as soon as there is something that it has not seen."""
         link = self._link
-        if seen == link.picture.revision:
+        if not link.picture.known:
+            await link.changed(UNKNOWN_S)
+        elif seen == link.picture.revision:
             await link.changed(POLL_S)
         beside = f'"link":{encoded(self.link_fields())}'
         if not link.picture.known:
-            return _whole(f'"revision":null,"document":null,{beside}', me())
-        change, members = self._teller.since(seen, language)
-        return _whole(f"{members},{beside}", me()) if change.whole else f"{{{members},{beside}}}"
+            return f'{{"revision":null,"document":null,{beside}{_own(me())}}}'
+        told = self._teller.since(seen, language)
+        return f"{{{told.members},{beside}{_beside(told, me())}}}"
 
     def link_fields(self) -> dict[str, object]:
         """Whether the controller answers, and since when that is so, in Unix seconds."""
         return {"connected": self._link.connected, "since": round(self._link.since_s, 3)}
 
 
-def _whole(members: str, who: object) -> str:
-    """A whole document has beside it what the page needs to begin with."""
-    return f'{{{members},"me":{encoded(who)},"page":{encoded(PAGE)}}}'
+def _beside(told: Told, who: object) -> str:
+    """What a whole document has beside it: what the page needs to begin with."""
+    return _own(who) if told.change.whole else ""
 
 
-def event(name: str, members: str, revision: int | None = None) -> str:
-    """One server-sent event. JSON as we write it has no line ends."""
-    data = members if members.startswith("{") else f"{{{members}}}"
-    id_ = "" if revision is None else f"id: {revision}\n"
-    return f"{id_}event: {name}\ndata: {data}\n\n"
+def _own(who: object) -> str:
+    return f',"me":{encoded(who)},"page":{encoded(PAGE)}'
+
+
+async def sent(events: AsyncIterator[Event], *, packed: bool) -> AsyncIterator[bytes]:
+    """The events as they go over the wire."""
+    if packed:
+        yield HEAD
+    async for event in events:
+        yield event.packed if packed else event.plain

@@ -1,10 +1,12 @@
 """What a reader is told of the station, in the reader's language; the same for all who have seen the same."""
 
 import json
+from functools import cached_property
 from typing import Any
 
 from orchestrator import __version__
 from orchestrator.model.cause import PARTS
+from orchestrator.northbound.packed import piece
 from orchestrator.northbound.picture import Change, Picture
 from orchestrator.text.catalogue import LANGUAGES
 from orchestrator.text.document import in_language, said
@@ -25,16 +27,29 @@ def asked_language(value: str | None) -> str:
     return value if value is not None and value in LANGUAGES else ""
 
 
+class Told:
+    """A change in words: JSON members, without the braces, so that a reader's own can be put beside them."""
+
+    def __init__(self, change: Change, language: str) -> None:
+        self.change = change
+        self.members = encoded(fields(change, language))[1:-1]
+
+    @cached_property
+    def packed(self) -> bytes:
+        """The same as a piece of a gzip stream, made once."""
+        return piece(self.members)
+
+
 class Teller:
     """Puts changes of the picture into words."""
 
     def __init__(self, picture: Picture) -> None:
         self._picture = picture
         self._revision = 0
-        self._texts: dict[tuple[bool, int | None, str], tuple[Change, str]] = {}
+        self._texts: dict[tuple[bool, int | None, str], Told] = {}
 
-    def since(self, seen: int | None, language: str) -> tuple[Change, str]:
-        """What has changed since, and its JSON members, without the braces: the reader's own are put beside them."""
+    def since(self, seen: int | None, language: str) -> Told:
+        """What has changed since then."""
         picture = self._picture
         if picture.revision != self._revision:
             self._texts, self._revision = {}, picture.revision
@@ -42,9 +57,8 @@ class Teller:
         if key not in self._texts:
             if len(self._texts) >= MOST_TEXTS:
                 self._texts.clear()
-            change = picture.since(seen)
             own = picture.language == language  # nothing to translate
-            self._texts[key] = change, encoded(fields(change, "" if own else language))[1:-1]
+            self._texts[key] = Told(picture.since(seen), "" if own else language)
         return self._texts[key]
 
 

@@ -47,10 +47,11 @@ class Published:
         self._wall = wall
         self._station, self._station_s = station, -inf  # when they are due
         self._parts: dict[str, tuple[int, object]] = {}  # the station's, with the revisions of their last changes
-        self._lines: dict[int, bytes] = {}  # what is new since a revision
+        self._lines: dict[int, bytes] = {}  # what is new since a revision, as of the last look
 
     def look(self, now_s: float) -> bool:
         """Describe what is due, most urgent first; returns whether that was everything."""
+        self._lines.clear()
         turned = [entry for entry in self._entries if entry.has_turned()]
         due = sorted((entry for entry in self._entries if now_s >= entry.due_s), key=lambda entry: entry.due_s)
         todo = list(dict.fromkeys((*turned, *due)))
@@ -60,7 +61,6 @@ class Published:
             parts, self._station_s = dict(self._changed_parts()), now_s + PERIOD_S
         if changed or parts:
             self.revision += 1
-            self._lines.clear()
         for entry in changed:
             entry.revision = self.revision
         self._parts |= {name: (self.revision, part) for name, part in parts.items()}

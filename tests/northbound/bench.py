@@ -5,6 +5,7 @@ import http.client
 import json
 import socket
 import time
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -173,12 +174,35 @@ class Browser:
             yield connection
 
 
+class Unpacked:
+    """The lines of a chunked gzip stream, each as soon as it has come."""
+
+    def __init__(self, file: Any) -> None:
+        self._file, self._unpacker, self._text = file, zlib.decompressobj(16 + zlib.MAX_WBITS), b""
+
+    def readline(self) -> bytes:
+        while b"\n" not in self._text:
+            size = int(self._file.readline(), 16)
+            self._text += self._unpacker.decompress(self._file.read(size))
+            self._file.readline()
+        line, _, self._text = self._text.partition(b"\n")
+        return line + b"\n"
+
+    def close(self) -> None:
+        self._file.close()
+
+
 class Stream:
     """The events of a stream, one after the other."""
 
     def __init__(self, connection: socket.socket) -> None:
-        self._file = connection.makefile("rb")
+        self._file: Any = connection.makefile("rb")
         self.head = b"".join(iter(self._file.readline, b"\r\n"))
+
+    def unpacked(self) -> "Stream":
+        """The same for a reader that has asked for gzip."""
+        self._file = Unpacked(self._file)
+        return self
 
     def close(self) -> None:
         self._file.close()

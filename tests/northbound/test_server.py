@@ -73,6 +73,17 @@ def test_a_stream_begins_with_the_whole_and_goes_on_with_changes(pair: Pair) -> 
         assert list(change["bays"]) == ["bay-2"]
 
 
+def test_a_browser_gets_the_same_packed(pair: Pair) -> None:
+    browser, station = pair
+    with browser.stream("?language=ko", Accept_Encoding="gzip, br") as events:
+        assert b"content-encoding: gzip" in events.head
+        unpacked = events.unpacked()
+        assert unpacked.next("whole")[2]["document"]["bays"][0]["reason"].startswith("팩 온도가")
+        for alarm in ("danger", "none"):
+            station.document = {**station.document, "alarm": alarm}
+            assert unpacked.next("change")[2]["station"] == {"alarm": alarm}
+
+
 def test_the_long_poll_tells_the_same(pair: Pair) -> None:
     browser, station = pair
     wait_until(lambda: browser.get("/api/status").json["document"])
@@ -94,6 +105,18 @@ def test_a_controller_that_goes_and_comes_back_is_told(tmp_path: Path) -> None:
         assert events.next("link")[2]["connected"] is False
         answer = browser.post("/api/request", {"action": "stop", "bay": "bay-1"})
         assert (answer.status, answer.error) == (503, "controller_silent")
+
+
+@pytest.mark.parametrize(
+    "nonsense", [{}, {"bays": 7}, {"bays": [{}]}, {"bays": [[]]}, {"bays": [{"name": {}}], "time": "x"}]
+)
+def test_what_is_no_status_is_no_connection(tmp_path: Path, nonsense: dict[str, object]) -> None:
+    with page(tmp_path) as (browser, station), browser.stream() as events:
+        events.next("whole")
+        sensible, station.document = station.document, nonsense
+        assert events.next("link")[2]["connected"] is False
+        station.document = sensible
+        assert events.next("link")[2]["connected"] is True
 
 
 def test_a_reader_that_does_not_read_is_dropped_and_the_others_go_on(

@@ -36,10 +36,10 @@ def service(path: Path, answers: Callable[[socket.socket], None]) -> Iterator[No
                 assert json.loads(stream.readline()) == {"verb": "watch", "version": 1}
                 answers(connection)
 
-        thread = threading.Thread(target=serve)
+        thread = threading.Thread(target=serve, daemon=True)
         thread.start()
         yield
-        thread.join()
+        thread.join(5)
 
 
 def line(said: object) -> bytes:

@@ -167,6 +167,23 @@ def test_one_who_reads_slowly_misses_states_between_and_never_the_newest(site: S
         assert newest["revision"] == site.published.revision
 
 
+def test_each_reader_is_told_what_is_new_for_it(site: Site) -> None:
+    with reading(site, 2) as (quick, slow):
+        site.turn()
+        quick.lines()
+        for bay in site.bays[:2]:
+            bay.decision = TRIPPED
+            site.turn()
+            assert [list(line["bays"]) for line in quick.lines()] == [[bay.name]]
+        slow.lines()
+        site.turn()
+        (line,) = slow.lines()
+        assert list(line["bays"]) == ["bay-1", "bay-2"]
+        assert line["revision"] == site.published.revision
+        site.turn(seconds=KEEP_ALIVE_S)
+        assert [one.lines()[0]["time"] for one in (quick, slow)] == [pytest.approx(site.now_s)] * 2
+
+
 def test_a_document_longer_than_any_buffer_arrives_whole(site: Site) -> None:
     for bay in site.bays:
         bay.more = {"reason": "전" * 100_000}
