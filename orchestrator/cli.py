@@ -122,6 +122,7 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
     demo.add_argument("--fault", metavar="NAME", help="inject a fault in mid-charge; 'list' shows the names")
     demo.add_argument("--plain", action="store_true", help="lines instead of a live picture")
+    demo.add_argument("--page", action="store_true", help="show it in a browser, too, until Ctrl-C")
     demo.set_defaults(run=_demo)
 
 
@@ -226,6 +227,6 @@ def _demo(arguments: argparse.Namespace) -> int:
     from orchestrator.demo.run import demo
 
     try:
-        return demo(arguments.fault, plain=arguments.plain)
+        return demo(arguments.fault, plain=arguments.plain, page=arguments.page)
     except ImportError as error:
         raise missing("the demo", error, "demo") from None

@@ -18,6 +18,7 @@ from orchestrator.model import Cause
 from orchestrator.northbound.accounts import Accounts
 from orchestrator.northbound.app import App
 from orchestrator.northbound.asking import Asking
+from orchestrator.northbound.closely import Closely
 from orchestrator.northbound.door import Door
 from orchestrator.northbound.guard import Guard
 from orchestrator.northbound.link import Link
@@ -59,7 +60,8 @@ def assembled(
     link = Link(lambda: sockets(station))
     accounts = Accounts(users, time.monotonic, tell, secure=context is not None)
     records = RecordDoors(lambda: journal(station), tell, own_directory()).doors()
-    app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), records)
+    closely = Closely(lambda: sockets(station)).door()
+    app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), (*records, closely))
     door = Door.of(Listen.of(northbound.page.listen).host, northbound.page.hosts)
     return PageServer(Guard(app.router(), door, tell), listener, context), link
 

@@ -95,6 +95,7 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
     "diagram": (("diagram --policy my-policy.yaml --format svg --out states.svg", "the states with its thresholds"),),
     "demo": (
         ("demo", "a charge in about a minute"),
+        ("demo --page", "the same, and in a browser"),
         ("demo --fault list", "the faults that can be injected"),
     ),
     "completion": (
