@@ -99,6 +99,8 @@ class _Entry:
         self._seen: Decision | None = None  # the last decision looked at
         self._gist: object = None  # of the one described last
         self._lasting: object = None
+        self._last: Fields = {}  # as encoded last …
+        self._members: dict[str, bytes] = {}  # … and its members
 
     @property
     def named(self) -> bytes:
@@ -118,10 +120,20 @@ class _Entry:
         lasting = _lasting(status)
         changed = lasting != self._lasting
         if changed:
-            self.text, self._lasting = encoded(status), lasting
+            self.text, self._lasting = self._encoded(status), lasting
         self._seen, self._gist = seen, _gist(seen)  # not before: it may have failed
         self.due_s = self._phase_s + ceil((now_s + LEAST_S - self._phase_s) / PERIOD_S) * PERIOD_S
         return changed
+
+    def _encoded(self, status: Fields) -> bytes:
+        """As JSON; what is as before in it is not encoded again: of a bay that charges, most is."""
+        last, before = self._last, self._members
+        now = {
+            name: before[name] if last.get(name, self) == value else b"%b: %b" % (encoded(name), encoded(value))
+            for name, value in status.items()
+        }
+        self._last, self._members = status, now
+        return b"{%b}" % b", ".join(now.values())
 
 
 GIST = attrgetter("state", "alarm", "faults", "setpoint", "command")
