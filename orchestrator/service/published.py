@@ -1,7 +1,8 @@
 """The status as its readers follow it: each bay's entry with the revision of its last change, made once for all.
 
 Theory of operation. At each look a bay whose state, cause, faults, step, command or alarm have changed is described
-anew. All others are described anew once a second, spread over that second, so that no look takes long. What has only
+anew. All others are described anew once a second, spread over that second, so that no look takes long; of very many
+bays 64 a second, in turn: so the controller pays no more, however many there are. What has only
 grown older is no change, unless it is too old. A changed entry replaces the one before and gets the next revision; a
 reader that has been told everything up to some revision is told all entries above it, however many changes it has
 missed. So there is one slot for each bay and no queue, whatever a reader does.
@@ -16,8 +17,10 @@ from typing import Any, Protocol, cast
 
 from orchestrator.model import Decision
 
-#: How often an entry is described anew at least, and after how long at the earliest if no more than values may differ.
-PERIOD_S, LEAST_S = 1.0, 0.9
+#: How often an entry is described anew if no more than figures may differ, and how many are in a second at most.
+PERIOD_S, RATE = 1.0, 64
+#: This much earlier is not too early.
+EARLY_S = 0.1
 MINUTE_S = 60.0
 #: The part of the document that always changes; each line has its own.
 TIME = "time"
@@ -43,7 +46,8 @@ class Published:
     def __init__(self, bays: Sequence[Bay], station: Callable[[], Fields], wall: Callable[[], float]) -> None:
         self.revision = 0
         self.instance = os.urandom(8).hex()  #: of another run it is another, whose revisions begin anew
-        self._entries = [_Entry(bay, number / len(bays) * PERIOD_S) for number, bay in enumerate(bays)]
+        period_s = max(PERIOD_S, len(bays) / RATE)
+        self._entries = [_Entry(bay, period_s, number / len(bays)) for number, bay in enumerate(bays)]
         self._wall = wall
         self._station, self._station_s = station, -inf  # when they are due
         self._parts: dict[str, tuple[int, object]] = {}  # the station's, with the revisions of their last changes
@@ -91,14 +95,17 @@ class Published:
 
 
 class _Entry:
-    """One bay's entry."""
+    """One bay's entry, described in each period at this `part` of it."""
 
-    def __init__(self, bay: Bay, phase_s: float) -> None:
+    def __init__(self, bay: Bay, period_s: float, part: float) -> None:
         self.revision, self.due_s, self.text = 0, -inf, b""
-        self._bay, self._phase_s, self._key = bay, phase_s, encoded(bay.name)
+        self._bay, self._key = bay, encoded(bay.name)
+        self._period_s, self._phase_s = period_s, part * period_s
         self._seen: Decision | None = None  # the last decision looked at
         self._gist: object = None  # of the one described last
         self._lasting: object = None
+        self._last: Fields = {}  # as encoded last …
+        self._members: dict[str, bytes] = {}  # … and its members
 
     @property
     def named(self) -> bytes:
@@ -118,10 +125,21 @@ class _Entry:
         lasting = _lasting(status)
         changed = lasting != self._lasting
         if changed:
-            self.text, self._lasting = encoded(status), lasting
+            self.text, self._lasting = self._encoded(status), lasting
         self._seen, self._gist = seen, _gist(seen)  # not before: it may have failed
-        self.due_s = self._phase_s + ceil((now_s + LEAST_S - self._phase_s) / PERIOD_S) * PERIOD_S
+        periods = ceil((now_s - EARLY_S - self._phase_s) / self._period_s) + 1
+        self.due_s = self._phase_s + periods * self._period_s
         return changed
+
+    def _encoded(self, status: Fields) -> bytes:
+        """As JSON; what is as before in it is not encoded again: of a bay that charges, most is."""
+        last, before = self._last, self._members
+        now = {
+            name: before[name] if last.get(name, self) == value else b'"%b": %b' % (name.encode(), encoded(value))
+            for name, value in status.items()
+        }
+        self._last, self._members = status, now
+        return b"{%b}" % b", ".join(now.values())
 
 
 GIST = attrgetter("state", "alarm", "faults", "setpoint", "command")

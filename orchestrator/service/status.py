@@ -25,7 +25,15 @@ from orchestrator.model import (
     Snapshot,
 )
 from orchestrator.model.bay_document import BayEntry, BayState, Status, Stray
-from orchestrator.model.document import VERSION, BatteryFields, ChargerFields, CommandFields, ContactorFields, Fault
+from orchestrator.model.document import (
+    LEVELS,
+    VERSION,
+    BatteryFields,
+    ChargerFields,
+    CommandFields,
+    ContactorFields,
+    Fault,
+)
 from orchestrator.model.told import Problem, ToldCause
 from orchestrator.service.contactor import Contactor
 from orchestrator.service.records import command_fields, session_fields
@@ -143,7 +151,7 @@ def _text(told: ToldCause | None) -> str:
 
 
 def _level(alarm: Alarm) -> str:
-    return alarm.name.lower()
+    return LEVELS[alarm]
 
 
 def _command(decision: Decision) -> CommandFields:

@@ -24,7 +24,7 @@ MOST_READERS = 16
 #: How often the bays are looked at while somebody reads, and how soon again if there is more to describe or to write.
 TURN_S, SOON_S = 0.08, 0.005
 #: After each turn the thread rests for this multiple of the turn's CPU time.
-REST = 2.0
+REST = 4.0
 #: A reader is told something this often (it is promised 5 s), and is sent away if it takes nothing for this long.
 KEEP_ALIVE_S, PATIENCE_S = 4.0, 30.0
 

@@ -7,7 +7,7 @@ from typing import get_origin
 from orchestrator.model.bay_document import Status
 from orchestrator.model.document import VERSION
 from orchestrator.model.document_schema import Member, about, members
-from orchestrator.service.published import PERIOD_S
+from orchestrator.service.published import RATE
 from orchestrator.service.streams import MOST_READERS, PATIENCE_S, TURN_S
 
 HEAD = f"""\
@@ -48,7 +48,8 @@ The answer is a line for now, and then a line for every change until you close t
   other members that has changed, and `gone` the names of bays that are no more (a running service loses none today).
 - `revision` increases while the service runs, `instance` is another one after a restart. There is a line at least every
   5 s, without a change if there is none; after longer silence, connect anew.
-- A change of state, reason, fault, step, command or alarm is told within {TURN_S:.1f} s, figures once in {PERIOD_S:.0f} s for each bay.
+- A change of state, reason, fault, step, command or alarm is told within {TURN_S:.1f} s, figures once a
+  second, of more than {RATE} bays in turn, {RATE} in a second.
 - What has only grown older is no change: as long as lines come, a value that is not mentioned is as it was, and as fresh
   as `old` says. Of a value that is too old its age is told as well.
 - Who reads slowly is told the newest next and misses what was between. Who takes nothing for {PATIENCE_S:.0f} s is sent away.

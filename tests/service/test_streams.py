@@ -15,7 +15,7 @@ from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import Alarm, Cause, Decision, State
 from orchestrator.service.client import Client
-from orchestrator.service.published import MOST, PERIOD_S, Published
+from orchestrator.service.published import MOST, PERIOD_S, RATE, Published
 from orchestrator.service.streams import KEEP_ALIVE_S, MOST_READERS, PATIENCE_S, TURN_S, Streams
 from orchestrator.text.catalogue import say
 from tests.service.bench import Bench
@@ -261,8 +261,8 @@ def test_a_long_look_is_done_in_parts_and_the_next_ones_are_short() -> None:
             before = sum(bay.described for bay in site.bays)
             site.turn()
             looks.append(sum(bay.described for bay in site.bays) - before)
-        assert max(looks) <= 2 * 128 * TURN_S / PERIOD_S
-        assert sum(looks) == pytest.approx(3 * 128, rel=0.1)
+        assert max(looks) <= 2 * RATE * TURN_S
+        assert sum(looks) == pytest.approx(3 * RATE, rel=0.1)
 
 
 def test_a_defect_sends_the_readers_away_and_the_next_one_is_served(tmp_path: Path) -> None:
