@@ -11,7 +11,7 @@ SETUP := pyproject.toml requirements/install.sh
 help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
 
-demo: .venv/demo.stamp  ## charge a simulated battery over real wire bytes, about a minute
+demo: .venv/demo.stamp $(if $(findstring --page,$(ARGS)),.venv/web.stamp)  ## charge a simulated battery over real wire bytes, about a minute; ARGS=--page shows it in a browser
 	$(BIN)/orchestrator demo $(ARGS)
 
 # Modules are compiled once and beforehand, not by each worker and each of some thousand processes (which the variable

@@ -22,6 +22,7 @@ from orchestrator.errors import (
     ServiceError,
     UsageError,
 )
+from orchestrator.northbound.verbs import add_northbound_verbs
 from orchestrator.service.verbs import add_service_verbs
 from orchestrator.shell.commands import with_examples
 from orchestrator.shell.verbs import add_shell_verbs
@@ -78,6 +79,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
     add_service_verbs(verbs, replay_charge)
     _add_estop(verbs)
+    add_northbound_verbs(verbs)
     _add_tool_verbs(verbs)
     add_shell_verbs(verbs, _parser)
     return with_examples(parser)
@@ -93,15 +95,17 @@ def _add_estop(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> 
 
 
 def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    check = verbs.add_parser("check", help="report every error in policies, stations, object maps and scenarios")
+    check = verbs.add_parser(
+        "check", help="report every error in policies, stations, object maps, scenarios and northbound files"
+    )
     check.add_argument("file", nargs="+", help="files of any kind; a key in each identifies its kind")
     check.add_argument(
         "--exhaustive", action="store_true", help="also explore all that can happen under a policy: a minute for each"
     )
     check.add_argument("--jobs", type=int, metavar="N", help="processes for that (default: one per core)")
     check.set_defaults(run=_check)
-    schema = verbs.add_parser("schema", help="print the JSON Schema of a kind of file, for editors")
-    schema.add_argument("kind", choices=SCHEMAS, help="the kind of file")
+    schema = verbs.add_parser("schema", help="print the JSON Schema of a kind of file, for editors, or of the status")
+    schema.add_argument("kind", choices=SCHEMAS, help="the kind of file; status: what `status --json` prints")
     schema.set_defaults(run=_schema)
     decode = verbs.add_parser("decode", help="explain frames of the charger's protocol")
     decode.add_argument("hex", nargs="+", help="bytes in hexadecimal, e.g. AF FA 90 04 10 90 00 34 AF A0")
@@ -118,10 +122,11 @@ def _add_tool_verbs(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]"
     demo = verbs.add_parser("demo", help="charge an emulated battery over real wire bytes, in about a minute")
     demo.add_argument("--fault", metavar="NAME", help="inject a fault in mid-charge; 'list' shows the names")
     demo.add_argument("--plain", action="store_true", help="lines instead of a live picture")
+    demo.add_argument("--page", action="store_true", help="show it in a browser, too, until Ctrl-C")
     demo.set_defaults(run=_demo)
 
 
-SCHEMAS = ("policy", "station", "map", "scenario")
+SCHEMAS = ("policy", "station", "map", "scenario", "northbound", "status")
 NMT = ("start", "stop", "reset-node", "reset-communication")
 
 
@@ -188,7 +193,11 @@ def _schema(arguments: argparse.Namespace) -> int:
     from orchestrator.columns import json_text
     from orchestrator.config.files import KINDS
     from orchestrator.config.json_schema import json_schema
+    from orchestrator.model.document_schema import status_schema
 
+    if arguments.kind == "status":
+        print(json_text(status_schema(), indent=1))
+        return 0
     kind = next(kind for kind in KINDS if kind.key == arguments.kind)
     print(json_text(json_schema(kind), indent=1))
     return 0
@@ -218,6 +227,6 @@ def _demo(arguments: argparse.Namespace) -> int:
     from orchestrator.demo.run import demo
 
     try:
-        return demo(arguments.fault, plain=arguments.plain)
+        return demo(arguments.fault, plain=arguments.plain, page=arguments.page)
     except ImportError as error:
         raise missing("the demo", error, "demo") from None

@@ -19,11 +19,11 @@ lock() { # OUTPUT SOURCE [OPTION]...
     sed -i 's/^# The following packages are considered.*/# builds the package/' "$output"
 }
 
-# runtime is part of completion, demo, gpio and workbench, and these are part of dev. setuptools, which builds the package, is in all
+# runtime is part of completion, demo, gpio, web and workbench, and these are part of dev. setuptools, which builds the package, is in all
 # of them: an installation fetches nothing that its list does not name.
 rm -f requirements/*.txt
 lock runtime.txt pyproject.toml --build-deps-for=editable
-for extra in completion demo gpio workbench; do
+for extra in completion demo gpio web workbench; do
     lock "$extra.txt" pyproject.toml --build-deps-for=editable --extra="$extra" --constraint=requirements/runtime.txt
 done
 lock dev.txt requirements/dev.in

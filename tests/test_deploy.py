@@ -16,7 +16,10 @@ from orchestrator.service import supervisor
 
 ROOT = Path(__file__).resolve().parent.parent
 UNIT = ROOT / "deploy" / "orchestrator.service"
+NORTHBOUND = ROOT / "deploy" / "orchestrator-northbound.service"
+UNITS = (UNIT, NORTHBOUND)
 PAGE = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+NORTHBOUND_PAGE = (ROOT / "docs" / "northbound.md").read_text(encoding="utf-8")
 #: systemd's own checker, if there is one: `systemd-analyze security` has --offline since version 250.
 ANALYZE = [path for path in (shutil.which("systemd-analyze"),) if path]
 
@@ -63,7 +66,7 @@ def test_run_and_estop_are_used_as_they_want_to_be() -> None:
 
 
 def test_the_page_installs_every_file_that_is_shipped_and_no_other() -> None:
-    named = set(re.findall(r"deploy/([\w.-]+)", PAGE))
+    named = set(re.findall(r"deploy/([\w.-]+)", PAGE + NORTHBOUND_PAGE))
     assert named == {file.name for file in (ROOT / "deploy").iterdir()}
 
 
@@ -80,23 +83,37 @@ def test_the_page_names_verbs_that_there_are() -> None:
     assert verbs <= set(re.findall(r"^    ([a-z]+)(?: |$)", listed, re.MULTILINE))
 
 
-def runnable(directory: Path) -> Path:
+def runnable(unit: Path, directory: Path) -> Path:
     """The unit with an existing program; otherwise the checker complains about nothing else."""
-    copy = directory / UNIT.name
+    copy = directory / unit.name
     program = SERVICE["ExecStart"][0].split()[0]
-    copy.write_text(UNIT.read_text(encoding="utf-8").replace(program, sys.executable), encoding="utf-8")
+    copy.write_text(unit.read_text(encoding="utf-8").replace(program, sys.executable), encoding="utf-8")
     return copy
 
 
+@pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("analyze", ANALYZE)
-def test_systemd_knows_every_key(analyze: str, tmp_path: Path) -> None:
-    done = subprocess.run([analyze, "verify", str(runnable(tmp_path))], capture_output=True, text=True, check=True)
+def test_systemd_knows_every_key(analyze: str, unit: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        [analyze, "verify", str(runnable(unit, tmp_path))], capture_output=True, text=True, check=True
+    )
     assert done.stderr == ""
 
 
+@pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("analyze", ANALYZE)
-def test_exposure_is_low(analyze: str, tmp_path: Path) -> None:
-    command = [analyze, "security", "--offline=true", "--no-pager", "--threshold=15", str(runnable(tmp_path))]
+def test_exposure_is_low(analyze: str, unit: Path, tmp_path: Path) -> None:
+    command = [analyze, "security", "--offline=true", "--no-pager", "--threshold=15", str(runnable(unit, tmp_path))]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
     assert float(done.stdout.rpartition(": ")[2].split()[0]) <= 1.5
+
+
+def test_the_page_is_served_by_a_unit_that_knows_the_controller_by_its_sockets_alone() -> None:
+    served = settings(NORTHBOUND)
+    program, verb, file = served["ExecStart"][0].split()
+    assert (program, verb) == (SERVICE["ExecStart"][0].split()[0], "serve")
+    assert file in NORTHBOUND_PAGE
+    assert served["User"] != SERVICE["User"]
+    assert served["RestrictAddressFamilies"] == ["AF_UNIX AF_INET AF_INET6"]
+    assert not {"DeviceAllow", "Requires", "BindsTo"} & served.keys()

@@ -22,7 +22,7 @@ def test_every_extra_has_packages() -> None:
     extras = {
         line.partition("extra ==")[2].strip(" '\"") for line in requires(DISTRIBUTION) or () if "extra ==" in line
     }
-    assert extras == {"completion", "gpio", "demo", "workbench", "dask"}
+    assert extras == {"completion", "gpio", "demo", "web", "workbench", "dask"}
     assert not [extra for extra in extras if DISTRIBUTION in install_extra(extra)]
 
 
@@ -39,6 +39,18 @@ def test_a_verb_without_its_package_says_so(
     assert capsys.readouterr().err.startswith(
         f"orchestrator: svg needs the package pygraphviz: {sys.executable} -m pip install "
     )
+
+
+def test_the_page_without_its_packages_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.startswith("orchestrator.northbound.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "starlette.requests", None)
+    assert main(["serve", "northbound.yaml"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"orchestrator: the page needs the package starlette.requests: {sys.executable} -m pip ")
+    assert "uvicorn" in said
 
 
 #: Stands in for a Python without the extra `demo`.

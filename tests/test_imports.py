@@ -52,9 +52,13 @@ EDGES: dict[str, tuple[str, ...]] = {
     "gist": ("model", "show"),
     "page": ("columns", "gist", "model", "show", "text"),
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
+    # A process of its own, which knows the controller by its sockets and the record by its files.
+    "northbound": (
+        "config", "errors", "extras", "lastresort.asking", "model", "record", "service.history_verb", "show", "text",
+    ),
     "cli": (
         "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",
-        "link", "model", "protocol", "record", "service", "shell", "show", "sim", "text", "workbench",
+        "link", "model", "northbound", "protocol", "record", "service", "shell", "show", "sim", "text", "workbench",
     ),
     "shell": ("lastresort.asking", "service.where", "workbench.verbs"),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
@@ -67,6 +71,7 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "distributed": ("workbench.simulate.sweep",),
     "durand": ("sim",),
     "gpiod": ("link.gpio",),
+    "h11": ("northbound.connection",),
     "jinja2": ("workbench.draw.page",),
     "matplotlib": ("workbench.draw.plot", "workbench.draw.tradeoff"),
     "msgpack": ("link.can_socket",),
@@ -74,7 +79,9 @@ OWNERS: dict[str, tuple[str, ...]] = {
     "rich": ("demo",),
     "serial": ("link.serial",),
     "shtab": ("shell.completion",),
+    "starlette": ("northbound",),
     "transitions": ("core.machine",),
+    "uvicorn": ("northbound.connection", "northbound.server"),
     "yaml": ("config",),
 }
 #: These always give the same answer to the same arguments: of the standard library they may use only LIBRARY.
@@ -85,7 +92,17 @@ LIBRARY = frozenset({
 })  # fmt: skip
 #: … and none of these built-in functions.
 IMPURE_CALLS = frozenset({"__import__", "breakpoint", "eval", "exec", "input", "open", "print"})
-CLOCK_READERS = ("cli", "commissioning", "demo", "lastresort", "record.utc", "service", "sim", "workbench.verbs")
+CLOCK_READERS = (
+    "cli",
+    "commissioning",
+    "demo",
+    "lastresort",
+    "northbound",
+    "record.utc",
+    "service",
+    "sim",
+    "workbench.verbs",
+)
 CLOCKS = frozenset({
     "clock_gettime", "clock_gettime_ns", "ctime", "gmtime", "localtime", "monotonic", "monotonic_ns", "perf_counter",
     "perf_counter_ns", "process_time", "process_time_ns", "strftime", "thread_time", "thread_time_ns", "time",
@@ -261,7 +278,7 @@ def test_what_is_allowed_is_not_complained_about(name: str, source: str) -> None
 #: Parts that make causes. A sentence in them could be neither translated nor compared.
 SILENT = (
     "core", "devices", "interlock", "link", "model", "protocol.sdo", "protocol.words", "service", "show",
-    "gist", "page",
+    "gist", "northbound", "page",
 )  # fmt: skip
 WORD, WORDS = re.compile("[('\"]?[A-Za-z]?[a-z]+['a-z]*[.,;:)'\"]*"), 3
 #: Errors of the program, of files and of the command line are for who mends them, and in English.
@@ -284,6 +301,10 @@ SAID = frozenset({
     ("service.reach", ""),  # what `check` says of a file
     ("service.journal_files", ""),  # the same, of a journal
     ("service.bay", " in "),  # where an exception of our own was raised
+    ("northbound.stream", "event: "),  # no words, but what a browser reads
+    ("northbound.stream", "id: "),  # the same
+    ("northbound.user_verb", "# Who may log in"),  # a comment in a file
+    ("northbound.verbs", "the page needs the package"),  # what is not installed
 })  # fmt: skip
 
 
@@ -318,6 +339,8 @@ def is_free(node: ast.AST) -> bool:
         return isinstance(node.exc, ast.Call) and called(node.exc) in DIAGNOSTICS
     if isinstance(node, ast.Call):
         return called(node) in HELP | {"cast"}
+    if isinstance(node, ast.Subscript):
+        return isinstance(node.value, ast.Name) and node.value.id == "Annotated"  # what a member of a record means
     return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
 
 

@@ -11,8 +11,8 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 #: runtime is part of every other list, and all are part of dev.
-LISTS = ("runtime", "completion", "demo", "gpio", "workbench", "dev")
-EXTRAS = ("completion", "demo", "gpio", "workbench")
+LISTS = ("runtime", "completion", "demo", "gpio", "web", "workbench", "dev")
+EXTRAS = ("completion", "demo", "gpio", "web", "workbench")
 OWN = ("fuzz", "mutation", "reference")  #: needed only by their own command
 ALL = (*LISTS, *OWN)
 

@@ -1,4 +1,4 @@
-"""The four kinds of file, and finding one by path or by the name of a shipped file."""
+"""The five kinds of file, and finding one by path or by the name of a shipped file."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -28,12 +28,18 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """One kind of file: its identifying key, the folder of shipped ones, and its content."""
+    """One kind of file: its name, which is its identifying key, the folder of shipped ones, and its content."""
 
     key: str
     about: str
     folder: str
     content: Callable[[], Content]
+    known_by: str = ""  #: the identifying key, if it is another one
+
+    @property
+    def mark(self) -> str:
+        """The key by which a file of this kind is known."""
+        return self.known_by or self.key
 
 
 def _scenario() -> Content:
@@ -44,11 +50,32 @@ def _scenario() -> Content:
     return Content(Scenario, partial(problems, SCENARIO_RULES))
 
 
+def _northbound() -> Content:
+    """As above: the service never reads one."""
+    from orchestrator.config.northbound import Northbound  # noqa: PLC0415 - see above
+    from orchestrator.config.northbound_rules import northbound_problems  # noqa: PLC0415 - see above
+
+    return Content(Northbound, northbound_problems)
+
+
+def _users() -> Content:
+    """As above."""
+    from orchestrator.config.northbound import UsersFile  # noqa: PLC0415 - see above
+    from orchestrator.config.northbound_rules import user_problems  # noqa: PLC0415 - see above
+
+    return Content(UsersFile, user_problems)
+
+
 POLICY = Kind("policy", "policy", "policies", lambda: Content(Policy, policy_problems))
 MAP = Kind("map", "object map", "configs/maps", lambda: Content(ObjectMap, partial(problems, MAP_RULES)))
 STATION = Kind("station", "station", "configs/stations", lambda: Content(Station, station_problems))
 SCENARIO = Kind("scenario", "scenario", "configs/scenarios", _scenario)
-KINDS = (POLICY, MAP, STATION, SCENARIO)
+#: It names its station under the key `station`, so it is looked for before stations are.
+NORTHBOUND = Kind("northbound", "northbound file", "configs/northbound", _northbound, known_by="page")
+#: In the order in which a file's keys are compared with theirs.
+KINDS = (POLICY, MAP, NORTHBOUND, STATION, SCENARIO)
+#: Written by `orchestrator user`, so it is none of the kinds that people write.
+USERS = Kind("users", "file of users", "", _users)
 
 
 @dataclass(frozen=True, slots=True)

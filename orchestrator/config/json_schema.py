@@ -1,4 +1,4 @@
-"""JSON Schema (draft 7) of the four kinds of file, for editors: made from the dataclasses that the reader fills.
+"""JSON Schema (draft 7) of the five kinds of file, for editors: made from the dataclasses that the reader fills.
 
 It describes each key and its permitted values, so that an editor can complete, explain and check as you type. It cannot
 express rules between keys: `orchestrator check` has the final say.

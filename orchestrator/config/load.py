@@ -1,4 +1,4 @@
-"""Loads a `Station`, a `Policy`, an `ObjectMap` or a `Scenario` from a file, or reports every finding in it at once."""
+"""Loads what is in a file of one of our kinds, or reports every finding in it at once."""
 
 import os
 from collections import Counter
@@ -10,7 +10,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from orchestrator.config.change import changed
-from orchestrator.config.files import KINDS, MAP, POLICY, SCENARIO, STATION, Kind, Place, find, nearest_file, place
+from orchestrator.config.files import (
+    KINDS,
+    MAP,
+    NORTHBOUND,
+    POLICY,
+    SCENARIO,
+    STATION,
+    USERS,
+    Kind,
+    Place,
+    find,
+    nearest_file,
+    place,
+)
 from orchestrator.config.plainfile import read_plain
 from orchestrator.config.policy import Policy
 from orchestrator.config.rules import Problems
@@ -26,13 +39,14 @@ from orchestrator.keys import Source
 from orchestrator.protocol.objects import ObjectMap
 
 if TYPE_CHECKING:
+    from orchestrator.config.northbound import Northbound, UsersFile
     from orchestrator.config.scenario import Scenario
 
 T = TypeVar("T")
 #: A file's values by path, and the lines of the keys that it has → what is probably unintended.
 Lint = Callable[[Mapping[str, object], Source], Problems]
 #: The kind of file expected wherever one is named.
-OURS = "a YAML file: a station, a policy, an object map or a scenario"
+OURS = "a YAML file: a station, a policy, an object map, a scenario or a northbound file"
 
 
 def load_station(path: str | Path) -> Station:
@@ -62,6 +76,20 @@ def load_scenario(name_or_path: str | Path) -> "Scenario":
     return _load(SCENARIO, _find(SCENARIO, name_or_path, None), Scenario)
 
 
+def load_northbound(path: str | Path) -> "Northbound":
+    """The northbound file at a path. Raises `ConfigError`."""
+    from orchestrator.config.northbound import Northbound  # noqa: PLC0415 - as in `files.py`
+
+    return _load(NORTHBOUND, place(path), Northbound)
+
+
+def load_users(path: str | Path) -> "UsersFile":
+    """The users in a file. Raises `ConfigError`."""
+    from orchestrator.config.northbound import UsersFile  # noqa: PLC0415 - as in `files.py`
+
+    return _load(USERS, place(path), UsersFile)
+
+
 @dataclass(frozen=True, slots=True)
 class Checked:
     """What `examine` looked at, and found."""
@@ -78,8 +106,8 @@ def check(paths: Iterable[str | Path], lint: Mapping[str, Lint] | None = None) -
 def examine(paths: Iterable[str | Path], lint: Mapping[str, Lint] | None = None) -> Checked:
     """Everything wrong in these files and in the files that they name, sorted. Without an error the answer is yes.
 
-    A file's kind is identified by its key `policy`, `station`, `map` or `scenario`. A file named twice is reported
-    once. `lint`, by that key, adds warnings about files without errors.
+    A file's kind is identified by its key `policy`, `map`, `page`, `station` or `scenario`. A file named twice is
+    reported once. `lint`, by that key, adds warnings about files without errors.
     """
     places = [place(path) for path in paths]
     loader = _Loader(places, lint=lint)
@@ -139,7 +167,8 @@ class _Loader:
             return
         keys = [name.text for name, _ in node.entries] if isinstance(node, Entries) else []
         near = next((f" ({key!r}: did you mean {found}?)" for key in keys if (found := _kind_near(key))), "")
-        text = f"this is no file of ours: it has none of the keys policy, station, map, scenario{near}"
+        marks = ", ".join(kind.mark for kind in KINDS)
+        text = f"this is no file of ours: it has none of the keys {marks}{near}"
         self.findings.append(Finding(self._name(where), node.mark.line, node.mark.column, text))
 
     def load(self, kind: Kind, where: Place) -> object:
@@ -152,7 +181,9 @@ class _Loader:
             node = self._tree(where)
             others = _kinds(node)
             if others and kind not in others:
-                text = f"{self._name(where)} has the key {others[0].key!r}; needed is a file with the key {kind.key!r}"
+                text = (
+                    f"{self._name(where)} has the key {others[0].mark!r}; needed is a file with the key {kind.mark!r}"
+                )
                 raise UnfitError(text)
             self._loaded[real] = self._read(kind, where, changed(node, self._changes) if node else None)
         return self._loaded[real]
@@ -210,8 +241,8 @@ class _Loader:
 def _kinds(node: Node | None) -> list[Kind]:
     """The kinds of file that this may be, by its keys."""
     keys = {name.text for name, _ in node.entries} if isinstance(node, Entries) else set()
-    return [kind for kind in KINDS if kind.key in keys]
+    return [kind for kind in KINDS if kind.mark in keys]
 
 
 def _kind_near(key: str) -> str:
-    return nearest(key, [kind.key for kind in KINDS])
+    return nearest(key, [kind.mark for kind in KINDS])

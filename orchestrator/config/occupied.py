@@ -12,12 +12,16 @@ from orchestrator.config.station import Station
 
 def occupied(station: Station) -> Iterator[str]:
     """An error, with its line, for each name at which the service could create nothing."""
-    socket, directory = station.control.socket, station.journal.directory
-    if os.path.lexists(socket) and not socket.is_socket():
-        what = "a directory" if socket.is_dir() else "a file"
-        text = f"{socket} is {what}, where the service would create its socket: name a file that is not there yet"
-        yield _error(station, "control.socket", text)
-    for path, name in (("control.socket", socket.parent), ("journal.directory", directory)):
+    control, directory = station.control, station.journal.directory
+    sockets = {"control.socket": control.socket}
+    if control.view_socket is not None:
+        sockets["control.view_socket"] = control.view_socket
+    for path, socket in sockets.items():
+        if os.path.lexists(socket) and not socket.is_socket():
+            what = "a directory" if socket.is_dir() else "a file"
+            text = f"{socket} is {what}, where the service would create its socket: name a file that is not there yet"
+            yield _error(station, path, text)
+    for path, name in (*((path, socket.parent) for path, socket in sockets.items()), ("journal.directory", directory)):
         if (file := _file_in_the_way(name)) is not None:
             text = f"{file} is a file, where a directory is needed: name another directory, or move the file away"
             yield _error(station, path, text)

@@ -32,6 +32,7 @@ class Wiring:
     socket: str
     contactors: tuple[tuple[str, int, bool], ...] = ()
     journal: str = ""  #: the journal's directory
+    view_socket: str = ""
     damaged: bool = False  #: part of the file, and ports with it, may be missing
 
 
@@ -48,12 +49,14 @@ def wiring(path: Path) -> Wiring:
     for match in _PORT.findall(bare):
         ports.setdefault(match.decode(errors="surrogateescape"), "")
     socket = _text(_get(_get(node, "control"), "socket")) or _found(_SOCKET, bare)
+    view = _text(_get(_get(node, "control"), "view_socket"))
     journal = _text(_get(_get(node, "journal"), "directory")) or _found(_DIRECTORY, bare)
     return Wiring(
         {_shown(path.parent / port): name for port, name in ports.items()},
         _shown(path.parent / socket) if socket else "",
         tuple((_shown(path.parent / chip), line, active_low) for chip, line, active_low in _contactors(node)),
         _shown(path.parent / journal) if journal else "",
+        _shown(path.parent / view) if view else "",
         damaged=bool(wrong) or any(_get(node, key) is None for key in _WHOLE),
     )
 

@@ -107,7 +107,16 @@ class BayConfig:
 class Control:
     """Where requests and queries arrive."""
 
-    socket: Path = key("the Unix socket for status and commands; only its owner can open it")
+    socket: Path = key("the Unix socket for status and commands; only its owner can open it, and `group`")
+    group: str | None = key(
+        "the members of this group may use the control socket, too; null: nobody else", default=None
+    )
+    view_socket: Path | None = key(
+        "a second socket, which tells the status and takes no commands; null: none", default=None
+    )
+    view_group: str | None = key(
+        "the members of this group may use the view socket, too; null: nobody else", default=None
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

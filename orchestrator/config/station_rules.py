@@ -25,6 +25,7 @@ Values = Mapping[str, object]
 def station_problems(values: Values) -> Problems:
     """All that the rules find in one station; what is a finding already is left out."""
     yield from problems(_STATION_RULES, values)
+    yield from _viewers_without_socket(values)
     bays = bays_of(values)
     for path, bay in bays.items():
         for at, text in problems(_BAY_RULES, bay):
@@ -103,16 +104,33 @@ def _station_name(name: str) -> Problems:
         yield "station", problem
 
 
-def _socket(socket: Path) -> Problems:
+def _socket(socket: Path, name: str = "socket") -> Problems:
     length = len(os.fsencode(socket.absolute()))
     if length > SOCKET_PATH_MAX:
-        yield "control.socket", f"the whole path has {length} bytes; Linux allows a socket {SOCKET_PATH_MAX}"
+        yield f"control.{name}", f"the whole path has {length} bytes; Linux allows a socket {SOCKET_PATH_MAX}"
+
+
+def _view_socket(socket: Path) -> Problems:
+    yield from _socket(socket, "view_socket")
+
+
+def _two_sockets(socket: Path, view_socket: Path) -> Problems:
+    if os.path.normpath(socket) == os.path.normpath(view_socket):
+        yield "control.view_socket", "this is the control socket; give viewers another one"
+
+
+def _viewers_without_socket(values: Values) -> Problems:
+    """A rule that a missing key fails: rules skip those."""
+    if values.get("control.view_group") is not None and values.get("control.view_socket") is None:
+        yield "control.view_group", "there is no control.view_socket; name one, or leave this out"
 
 
 _STATION_RULES: tuple[Rule, ...] = (
     Rule(_station_name, ("station",)),
     Rule(bus_problems, ("can",)),
     Rule(_socket, ("control.socket",)),
+    Rule(_view_socket, ("control.view_socket",)),
+    Rule(_two_sockets, ("control.socket", "control.view_socket")),
 )
 
 

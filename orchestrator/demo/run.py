@@ -3,6 +3,7 @@
 import shutil
 import sys
 import time
+from contextlib import suppress
 
 from orchestrator.demo.screen import Lines, Picture, Screen
 from orchestrator.demo.stage import Stage
@@ -16,8 +17,11 @@ LOOK_EVERY_S = 0.1
 NO_FAULT = ("heal", "frozen_temperature", "soc_jump")
 
 
-def demo(fault: str | None, *, plain: bool) -> int:
-    """Charge an emulated battery, or stop because of `fault`; 0 if it ended as it should."""
+def demo(fault: str | None, *, plain: bool, page: bool = False) -> int:
+    """Charge an emulated battery, or stop because of `fault`; 0 if it ended as it should.
+
+    With a `page` it goes on until Ctrl-C: people may do there what they like.
+    """
     known = [name for name in FAULTS if name not in NO_FAULT]
     if fault == "list":
         for name in known:
@@ -34,6 +38,10 @@ def demo(fault: str | None, *, plain: bool) -> int:
         flush=True,
     )
     with Stage() as stage:
+        if page:
+            print(f"{stage.serve()} (Ctrl-C ends the demo)", flush=True)
+            _watch_on(stage, story, screen)
+            return 0
         with screen.live():
             _watch(stage, story, screen)
         _sum_up(stage, story)
@@ -53,10 +61,16 @@ def _screen(*, plain: bool) -> Screen:
         return Lines()
 
 
-def _watch(stage: Stage, story: Story, screen: Screen) -> None:
-    """Watch the bay until the story is over."""
+def _watch_on(stage: Stage, story: Story, screen: Screen) -> None:
+    """Watch the bay until Ctrl-C."""
+    with suppress(KeyboardInterrupt), screen.live():
+        _watch(stage, story, screen, on=True)
+
+
+def _watch(stage: Stage, story: Story, screen: Screen, *, on: bool = False) -> None:
+    """Watch the bay until the story is over, or `on` and on."""
     began_s = time.monotonic()
-    while not story.over(t_s := time.monotonic() - began_s):
+    while not story.over(t_s := time.monotonic() - began_s) or on:
         bay = stage.bay()
         if bay is not None:
             story.look(t_s, bay)

@@ -26,6 +26,8 @@ bays:
 control: {{socket: run/orchestrator.sock}}
 journal: {{directory: run/journal}}
 """
+#: Any free port of this machine.
+PAGE = "station: station.yaml\npage: {listen: 127.0.0.1:0}\n"
 #: The service verifies every charger within this after it is told to end.
 END_S = 8.0
 
@@ -46,6 +48,20 @@ class Stage:
         can = json.dumps({"interface": "pty", "channel": str(self.directory / "can0")})
         self.plant = PlantProcess(self.directory, "--pack", "demo", "--soc", "-100", "--can", can, *plant)
         self.service = self._start()
+        self.page: subprocess.Popen[str] | None = None
+
+    def serve(self) -> str:
+        """Start the page's server; returns the line that says where. OrchestratorError if it does not start."""
+        (self.directory / "northbound.yaml").write_text(PAGE, encoding="utf-8")
+        command = [sys.executable, "-P", "-m", "orchestrator", "serve", "northbound.yaml"]
+        self.page = subprocess.Popen(  # noqa: S603 - our own program, by our own interpreter
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=self.directory
+        )
+        told, why = self.page.stdout, self.page.stderr
+        assert told is not None and why is not None
+        if line := told.readline().strip():
+            return line
+        raise OrchestratorError(why.read().strip())
 
     def _start(self) -> "subprocess.Popen[bytes]":
         with self.log.open("ab") as log:
@@ -88,5 +104,8 @@ class Stage:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self.page is not None:
+            self.page.kill()
+            self.page.communicate()
         self.end()
         self.plant.close()

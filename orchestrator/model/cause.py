@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
+from orchestrator.model.told import CauseFields
+
 #: The deepest nesting of causes; no real cause comes near it.
 DEPTH = 10
 #: Several causes at once, in `whats`.
@@ -81,7 +83,7 @@ def said(text: str) -> Cause:
     return Cause.of(SAID, text=text)
 
 
-def plain(cause: Cause) -> dict[str, object]:
+def plain(cause: Cause) -> CauseFields:
     """The cause as a JSON value; `from_plain` is the inverse."""
     return {
         "id": cause.id,

@@ -40,10 +40,13 @@ class Battery(NamedTuple):
 
 
 class Charges:
-    """Those in this folder now; OSError if its files cannot be read. `say` is told what is wrong with the index."""
+    """Those in this folder now; OSError if its files cannot be read. `say` is told what is wrong with the index.
 
-    def __init__(self, folder: Path, say: Callable[[Cause], None] = lambda _: None) -> None:
-        self._folder, self._db = folder, opened(folder, say)
+    The index is in `home`, if that is another directory.
+    """
+
+    def __init__(self, folder: Path, say: Callable[[Cause], None] = lambda _: None, home: Path | None = None) -> None:
+        self._folder, self._db = folder, opened(folder, say, home)
 
     def listed(
         self,
@@ -52,9 +55,13 @@ class Charges:
         battery: str | None = None,
         since_s: float | None = None,
         began_s: tuple[float, float] | None = None,
+        before: str | None = None,
         limit: int | None = None,
     ) -> Iterator[Record]:
-        """What lists need of each, the newest first; not those over before `since_s`, or begun outside `began_s`."""
+        """What lists need of each, the newest first; not those over before `since_s`, or begun outside `began_s`.
+
+        `before`: only those older than the charge with this id.
+        """
         where, values = ["1"], list[object]()
         if bays is not None:
             where.append(f"bay IN ({', '.join('?' * len(bays))})")
@@ -62,6 +69,7 @@ class Charges:
         from_s, to_s = began_s or (None, None)
         for column, value in (
             ("battery =", battery), ("last_unix_s >=", since_s), ("begin_unix_s >=", from_s), ("begin_unix_s <", to_s),
+            ("id <", before),
         ):  # fmt: skip
             if value is not None:
                 where.append(f"{column} ?")

@@ -2,8 +2,8 @@
 
 Theory of operation. The files are the truth; the index can be removed at any time. One asker writes at a time, under a
 lock on the directory. An asker that does not get the lock soon, or may not write there, uses a copy in memory, brought
-up to date in the same way. A new index is built under another name and replaces the old one when it is whole. Nothing
-that decides lives in it.
+up to date in the same way; one that may never write there has an index of its own, in a `home`. A new index is built
+under another name and replaces the old one when it is whole. Nothing that decides lives in it.
 """
 
 import errno
@@ -38,23 +38,26 @@ class UselessError(Exception):
     """There is no index, or one of another version, or a damaged one."""
 
 
-def opened(folder: Path, say: Say) -> sqlite3.Connection:
-    """The index as of now, to be read only: the one on disk, or in memory. OSError if the files cannot be read."""
+def opened(folder: Path, say: Say, home: Path | None = None) -> sqlite3.Connection:
+    """The index as of now, to be read only: the one on disk, or in memory. OSError if the files cannot be read.
+
+    It is beside the files, or in `home`.
+    """
     if not folder.is_dir():
         return _built(":memory:", None, say)
     for _ in range(AGAIN):
         with suppress(FileNotFoundError):
-            return _opened(folder, say)
-    return _opened(folder, say)
+            return _opened(folder, home or folder, say)
+    return _opened(folder, home or folder, say)
 
 
-def _opened(folder: Path, say: Say) -> sqlite3.Connection:
+def _opened(folder: Path, home: Path, say: Say) -> sqlite3.Connection:
     why: object = os.strerror(errno.EACCES)
-    if os.access(folder, os.W_OK):
+    if os.access(home, os.W_OK):
         try:
-            with _locked(folder):
-                _refresh(folder, say)
-            return _connected(folder / NAME, "ro")
+            with _locked(home):
+                _refresh(folder, home, say)
+            return _connected(home / NAME, "ro")
         except BusyError:
             why = Cause("index_being_built")
         except FileNotFoundError:
@@ -62,11 +65,11 @@ def _opened(folder: Path, say: Say) -> sqlite3.Connection:
         except (OSError, sqlite3.Error) as error:
             why = str(error)
     try:
-        db = _connected(folder / NAME, "ro")
+        db = _connected(home / NAME, "ro")
         _check(db)
     except (UselessError, sqlite3.Error):
         built = _built(":memory:", folder, say)
-        say(Cause.of("index_not_written", folder=str(folder), error=why))
+        say(Cause.of("index_not_written", folder=str(home), error=why))
         return built
     return _current(db, folder, say)
 
@@ -74,7 +77,7 @@ def _opened(folder: Path, say: Say) -> sqlite3.Connection:
 def rebuilt(folder: Path, say: Say) -> int:
     """Build the index anew, whatever is there; the number of charges in it. BusyError, OSError or sqlite3.Error."""
     with _locked(folder):
-        _rebuild(folder, say)
+        _rebuild(folder, folder, say)
     with closing(_connected(folder / NAME, "ro")) as db:
         return int(db.execute("SELECT count(*) FROM charges").fetchone()[0])
 
@@ -96,9 +99,9 @@ def _locked(folder: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def _refresh(folder: Path, say: Say) -> None:
+def _refresh(folder: Path, home: Path, say: Say) -> None:
     """Bring the index on disk up to date; build it if it is not there, or not of use."""
-    path = folder / NAME
+    path = home / NAME
     try:
         with closing(_connected(path, "rw")) as db:
             _check(db)
@@ -109,11 +112,11 @@ def _refresh(folder: Path, say: Say) -> None:
         pass
     except sqlite3.DatabaseError as error:
         if _is_damage(error):
-            path.replace(folder / DAMAGED)
-            say(Cause.of("index_damaged", file=str(folder / DAMAGED), error=str(error)))
+            path.replace(home / DAMAGED)
+            say(Cause.of("index_damaged", file=str(home / DAMAGED), error=str(error)))
         elif path.exists():
             raise
-    _rebuild(folder, say)
+    _rebuild(folder, home, say)
 
 
 def _is_damage(error: sqlite3.DatabaseError) -> bool:
@@ -121,20 +124,20 @@ def _is_damage(error: sqlite3.DatabaseError) -> bool:
     return not isinstance(error, sqlite3.OperationalError) or error.sqlite_errorcode == sqlite3.SQLITE_ERROR
 
 
-def _rebuild(folder: Path, say: Say) -> None:
-    new, path = folder / NEW, folder / NAME
+def _rebuild(folder: Path, home: Path, say: Say) -> None:
+    new, path = home / NEW, home / NAME
     new.unlink(missing_ok=True)
     try:
         _built(str(new), folder, say).close()
         with new.open("rb+") as file:
             os.fsync(file.fileno())
         if os.geteuid() == 0:  # the next asker may be the service's own user
-            owner = folder.stat()
+            owner = home.stat()
             os.chown(new, owner.st_uid, owner.st_gid)
         new.replace(path)
     finally:
         new.unlink(missing_ok=True)
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    descriptor = os.open(home, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)
     finally:

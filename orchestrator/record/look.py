@@ -44,7 +44,7 @@ class Look:
 
     def plainly(self, cause: Cause) -> dict[str, object]:
         """The cause as a record has it."""
-        return plain(self.told(cause) or cause)
+        return {**plain(self.told(cause) or cause)}
 
     def values(self) -> tuple[float | None, ...]:
         """The present values, in the order of `VALUES`; None where nothing fresh is known."""

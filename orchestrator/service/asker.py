@@ -1,4 +1,8 @@
-"""The person behind a request: the user at the other end of the socket, for whom root acts, and why."""
+"""The person behind a request: the user at the other end of the socket, for whom root acts, and why.
+
+A program that passes on what others want says who they are, in `by`. Nobody vouches for that but the program: it stands
+beside the program's own user, and never instead of it.
+"""
 
 import pwd
 from collections.abc import Mapping
@@ -38,6 +42,7 @@ class Asker:
     uid: int | None = None  #: by the kernel's word
     behind: str = ""  #: the person who became root by sudo: only root is believed
     because: str = ""
+    by: str = ""  #: whose wish it is, by the word of the program that asks: door, user, address
     estop: bool = False  #: by way of `orchestrator estop`
     unix_s: float = field(default=0.0, compare=False)
 
@@ -48,19 +53,25 @@ class Asker:
         known = uid if isinstance(uid, int) else None
         behind = _text(request.get("sudo_user")) if known == ROOT else ""
         estop = request.get("means") == "estop"
-        return cls(known, "" if behind == user_name(ROOT) else behind, _text(request.get("because")), estop, unix_s)
+        behind = "" if behind == user_name(ROOT) else behind
+        return cls(known, behind, _text(request.get("because")), _text(request.get("by")), estop, unix_s)
 
     @property
-    def person(self) -> str:
-        """The name of the person; "" if unknown."""
+    def person(self) -> str | Cause:
+        """The person, however it asks; "" if unknown. What a program passes on is another's than its own."""
+        return self.who if self.by else self._user
+
+    @property
+    def _user(self) -> str:
         return self.behind or ("" if self.uid is None else user_name(self.uid))
 
     @property
     def who(self) -> str | Cause:
-        """For people: "kim", or "root for kim"."""
-        if self.uid is None or not self.behind:
-            return self.person
-        return Cause.of("on_behalf", user=user_name(self.uid), person=self.behind)
+        """For people: "kim", "root for kim", or "northbound for page, lee, 10.0.0.7"."""
+        who: str | Cause = self._user
+        if self.uid is not None and self.behind:
+            who = Cause.of("on_behalf", user=user_name(self.uid), person=self.behind)
+        return Cause.of("passed_on", user=who, by=self.by) if self.by else who
 
     def cause(self, request: Request, target_pct: float | None = None) -> Cause | None:
         """What the request becomes, a start with the target of its one charge; None if nobody knows who makes it."""
@@ -89,7 +100,7 @@ def started_later(timed: TimedStart) -> Cause | None:
     return replace(told.with_(target_pct=timed.target_pct), id="started_later_to_by")
 
 
-def held_by_others(operator: Operator, person: str) -> Cause | None:
+def held_by_others(operator: Operator, person: str | Cause) -> Cause | None:
     """The stops and pauses of others than this person that hold a bay; None if there are none."""
     holds = [one for hold in (operator.hold, operator.paused_by) if hold is not None for one in parts(hold)]
     others = [one for one in holds if one.id in NAMED and _person(one.param("who")) != person]
@@ -97,4 +108,4 @@ def held_by_others(operator: Operator, person: str) -> Cause | None:
 
 
 def _person(who: object) -> object:
-    return who.param("person") if isinstance(who, Cause) else who
+    return who.param("person") if isinstance(who, Cause) and who.id == "on_behalf" else who

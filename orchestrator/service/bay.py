@@ -14,6 +14,7 @@ from orchestrator.core.persisted import Persisted
 from orchestrator.core.states import ENERGISED, QUIET, SETTLED
 from orchestrator.interlock import grant
 from orchestrator.model import STOP, Alarm, Cause, Decision, Request, Snapshot, State
+from orchestrator.model.bay_document import BayEntry
 from orchestrator.service.asked import Answers, Asked, Requests, Taken
 from orchestrator.service.bayjournal import BayJournal
 from orchestrator.service.bayrecord import BayRecord
@@ -98,8 +99,7 @@ class BayRunner:
     def is_due(self, now_s: float) -> bool:
         """Whether a decision is due. One for a value that would get too old is put off when a newer one has come."""
         if now_s >= self.due_s and self.decision is not None and self._memory is not None and not self._internal:
-            reading, values = self._charger.view[0], self._battery.view[0]
-            self.due_s = due_s(self.last_s, self.decision, self._memory, reading, values)
+            self.due_s = due_s(self.last_s, self.decision, self._memory, self._charger.view[0], self._battery.view[0])
         return now_s >= self.due_s
 
     def answer(self) -> None:
@@ -232,7 +232,7 @@ class BayRunner:
         self._revision = self._store.put(self.place, persisted)
         self.identified.answer(self._revision)
 
-    def status(self, *, closely: bool = False) -> dict[str, object]:
+    def status(self, *, closely: bool = False) -> BayEntry:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
         decision = told(self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER), *known)
@@ -243,7 +243,7 @@ class BayRunner:
             **self._feed.status(clock, self._language),
             "identity": self.identified.status(),
             "timed_start": self._timer.status(clock),
-            "contactor": self._contactor and contactor_fields(self._contactor, self._language),
+            "contactor": contactor_fields(self._contactor, self._language) if self._contactor is not None else None,
             "port": self.place.port,
             "bmu": {"can": self.place.can, "node_id": self.place.node_id},
             "policy": self.policy.status(),

@@ -3,7 +3,10 @@
 import json
 import socket
 import struct
+from array import array
 from collections.abc import Mapping
+from fcntl import ioctl
+from termios import TIOCOUTQ
 
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause
@@ -66,6 +69,25 @@ class Client:
         except BlockingIOError:
             return False
         return not self._left
+
+    @property
+    def left(self) -> int:
+        """The number of bytes that are still to be written."""
+        return len(self._left)
+
+    @property
+    def waiting(self) -> int:
+        """About how many bytes the client has not taken yet, those in the kernel's buffer included; 0 means none."""
+        held = array("i", [0])
+        ioctl(self, TIOCOUTQ, held)
+        return held[0] + self.left
+
+    def has_left(self) -> bool:
+        """Whether the client has closed its end; what it says is not heard. OSError if the connection is broken."""
+        try:
+            return not self._connection.recv(MAX_REQUEST)
+        except BlockingIOError:
+            return False
 
     def close(self) -> None:
         """Close the connection."""

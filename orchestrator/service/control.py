@@ -1,13 +1,11 @@
 """The control socket: accepts clients and their requests. One JSON object per line, in and out.
 
-Only the owner of the service (and root) can open the socket. One thread serves all clients at once and waits for none:
-each has limits on time and bytes, and a slow client delays only itself. Stops go first (`reception.py`). After each
-turn the thread rests, so that no number of clients takes more than a fixed share of the CPU; the control loop never
-waits for a client.
+One thread serves all clients at once and waits for none: each has limits on time and bytes, and a slow client delays
+only itself. Stops go first (`reception.py`). After each turn the thread rests, so that no number of clients takes more
+than a fixed share of the CPU; the control loop never waits for a client.
 """
 
 import errno
-import os
 import selectors
 import socket
 import threading
@@ -18,11 +16,12 @@ from math import inf
 from pathlib import Path
 from time import sleep, thread_time
 
-from orchestrator.errors import RequestError, StartError
+from orchestrator.errors import RequestError
 from orchestrator.model import Cause
 from orchestrator.service.client import Client, parse_request
-from orchestrator.service.reception import Handler, OnRefused, Reception, encode, refused
-from orchestrator.service.socketfile import identity, listen, remove
+from orchestrator.service.doorkeeper import Doorkeeper, group_id
+from orchestrator.service.reception import WATCH, Handler, OnRefused, Reception, encode, refused
+from orchestrator.service.socketfile import SocketName
 
 #: The maximum number of clients served at once; one more displaces the longest idle one.
 MAX_CLIENTS = 256
@@ -37,8 +36,6 @@ STALL_S = 30.0
 #: accept()'s errors for a closed listener; after any other error it is worth trying again a little later.
 CLOSED = (errno.EINVAL, errno.EBADF)
 RETRY_S = 0.1
-#: The shortest interval between reports of rejected users and other problems.
-SAY_S = 60.0
 
 
 class ControlSocket:
@@ -52,17 +49,19 @@ class ControlSocket:
         say: Callable[[Cause], None] = lambda _: None,
         language: str = "en",
         on_refused: OnRefused = lambda _request, _why: None,
+        watch: Callable[[Client], Cause | None] | None = None,
+        group: str | None = None,
     ) -> None:
-        self._path, self._clock, self._say, self._language = path, clock, say, language
-        self._strangers, self._said_s = 0, -inf  # turned away since the last report
+        self._clock, self._say, self._language, self._take_reader = clock, say, language, watch
+        self._doorkeeper = Doorkeeper(say, group)
         self._turn_s: float | None = None  # when the present turn began
         self._closing, self._clients = False, set[Client]()
         self._receive = partial(Reception, handler, self._reply, language, on_refused)
         self._reception = self._receive()
         self._accept_s = -inf  # nobody is accepted before this
         self._selector = selectors.DefaultSelector()
-        self._listener = listen(path)
-        self._identity, self._name_s = identity(path), clock()
+        self._name, self._name_s = SocketName(path, None if group is None else group_id(group)), clock()
+        self._listener = self._name.listener
         self._lost: Cause | None = None
         self._thread = threading.Thread(target=self._run, name="control", daemon=True)
 
@@ -78,7 +77,7 @@ class ControlSocket:
     def close(self) -> None:
         """Stop listening and remove the socket's name."""
         self._closing = True
-        remove(self._path, self._identity)
+        self._name.remove()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)  # which wakes the thread; it closes the rest
         if not self._thread.is_alive():
@@ -157,17 +156,13 @@ class ControlSocket:
 
     def _take_in(self, client: Client, now_s: float) -> None:
         """Turn away other users; read at once, because the request has mostly arrived already."""
-        pid, uid, _ = client.peer()
+        refusal = self._doorkeeper.refusal(client, now_s)
         self._selector.register(client, selectors.EVENT_READ)
         self._clients.add(client)
-        if uid in (0, os.getuid()):
+        if refusal is None:
             self._serve(client, now_s)
-            return
-        self._strangers += 1
-        if now_s - self._said_s >= SAY_S:
-            self._say(Cause.of("socket_stranger", uid=uid, pid=pid, times=self._strangers))
-            self._strangers, self._said_s = 0, now_s
-        self._refuse(client, Cause("owner_only"), now_s)
+        else:
+            self._refuse(client, refusal, now_s)
 
     def _pause_accepting(self, now_s: float) -> None:
         self._accept_s = now_s + RETRY_S
@@ -197,11 +192,22 @@ class ControlSocket:
             elif client.hear(now_s):
                 self._selector.unregister(client)
                 client.request = {**parse_request(client.line), "uid": client.uid}
-                self._reception.take(client, now_s)
+                if not self._hands_over(client):
+                    self._reception.take(client, now_s)
         except RequestError as error:
             self._refuse(client, error.cause, now_s)
         except OSError:
             self._drop(client)
+
+    def _hands_over(self, client: Client) -> bool:
+        """Whether it wants to be told of changes: then it is no client of this thread any more."""
+        if self._take_reader is None or client.request.get("verb") != WATCH:
+            return False
+        self._clients.discard(client)
+        if (why := self._take_reader(client)) is not None:
+            self._clients.add(client)
+            raise RequestError(why)
+        return True
 
     def _refuse(self, client: Client, why: Cause, now_s: float) -> None:
         self._reply(client, encode(refused(why, self._language)), now_s)
@@ -227,22 +233,16 @@ class ControlSocket:
 
     def _look_for_name(self) -> None:
         """Check the socket's name: if somebody removes or rebinds it, nobody can stop a bay here any more."""
-        found = identity(self._path)
-        if self._closing or found == self._identity:
+        if self._closing or (found := self._name.look()) is None:
             return
-        if found is not None:
-            self._complain(Cause.of("socket_taken", socket=str(self._path)))
-            return
-        try:
-            listener = listen(self._path)
-        except StartError as error:
-            self._complain(Cause.of("socket_lost", socket=str(self._path), error=error.cause))
+        if self._name.listener is self._listener:
+            self._complain(found)
             return
         with suppress(KeyError):
             self._selector.unregister(self._listener)
         self._listener.close()
-        self._listener, self._identity, self._lost = listener, identity(self._path), None
-        self._say(Cause.of("socket_again", socket=str(self._path)))
+        self._listener, self._lost = self._name.listener, None
+        self._say(found)
 
     def _complain(self, trouble: Cause) -> None:
         if trouble != self._lost:

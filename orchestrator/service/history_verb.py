@@ -136,16 +136,22 @@ def _show(found: Iterable[Happened], language: str, *, programs: bool) -> bool:
 
 def last_events(directory: Path, bay: str, language: str, now_s: float) -> list[tuple[str, str]]:
     """The newest sentences about one bay with their times, for its page; or why there are none."""
-    asked, clock = Asked([bay]), WallClock(now_s, now_s)
+    clock = WallClock(now_s, now_s)
+    try:
+        found = newest_events(directory, bay, language, ON_PAGE)
+    except OrchestratorError as error:
+        return [("", say(Cause.of("no_journal", why=str(error)), language))]
+    return [(clock.time_of_day(one.unix_s), one.text) for one in found] or [("", say(Cause("no_events"), language))]
+
+
+def newest_events(directory: Path, bay: str, language: str, most: int) -> Iterable[Happened]:
+    """The newest events of one bay, looked for in the newest parts of the journal only; OrchestratorError as below."""
+    asked = Asked([bay])
 
     def tell(paths: Sequence[Path]) -> Iterator[Happened]:
         return filter(asked.is_meant, happened(paths, language, asked.may_be))
 
-    try:
-        found = newest(event_files(directory)[-PARTS:], ON_PAGE, tell)
-    except OrchestratorError as error:
-        return [("", say(Cause.of("no_journal", why=str(error)), language))]
-    return [(clock.time_of_day(one.unix_s), one.text) for one in found] or [("", say(Cause("no_events"), language))]
+    return newest(event_files(directory)[-PARTS:], most, tell)
 
 
 def between(directory: Path, bay: str, since: str, until: str, language: str, most: int) -> Iterator[Happened]:

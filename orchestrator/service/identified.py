@@ -13,6 +13,7 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.persisted import Persisted
 from orchestrator.model import Cause, Snapshot
 from orchestrator.model.cause import plain
+from orchestrator.model.document import IdentityFields
 from orchestrator.model.identity import Identity
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
@@ -41,6 +42,7 @@ class Identified:
         self._serial: int | None = None
         self._typed: str | None = None  # None before the first decision: the persisted state is still being read
         self.identity = Identity.of(bay.battery.can, bay.battery.node_id, None, "")  #: the present one
+        self._status = (self.identity, self._fields(self.identity))
         self.asked: deque[Named] = deque()  #: what operators have typed that no decision has taken yet
         self._taken: list[Named] = []  # what one has taken, without its revision yet
 
@@ -50,10 +52,13 @@ class Identified:
         self.asked.append(named)
         return named
 
-    def status(self) -> dict[str, object]:
+    def status(self) -> IdentityFields:
         """The battery's part of the status document. Any thread."""
-        now = self.identity
-        return {**self._fields(now), "text": sentence(now.cause, self._language)}
+        now, (known, status) = self.identity, self._status
+        if now != known:
+            status = self._fields(now)
+            self._status = (now, status)
+        return status
 
     def follow(self, now_s: float, snapshot: Snapshot, memory: Memory) -> None:
         """Follow a decision: made from `snapshot`, with `memory` as its result."""
@@ -94,16 +99,16 @@ class Identified:
         self._taken.clear()
 
     def _tell(self, identity: Identity, now_s: float, *, aloud: bool) -> None:
-        line = {**self._fields(identity), "text": sentence(identity.cause, self._language)}
-        self._journal.put(self._bay.name, ("battery", line), now_s)
+        self._journal.put(self._bay.name, ("battery", self._fields(identity)), now_s)
         if aloud:
             self._say(Cause.of("identity_now", bay=self._bay.name, what=identity.cause))
 
-    def _fields(self, identity: Identity) -> dict[str, object]:
+    def _fields(self, identity: Identity) -> IdentityFields:
         return {
             "id": identity.id,
             "source": identity.source.value,
             "typed": identity.typed,
             "contradicted": identity.contradicted,
             "cause": plain(identity.cause),
+            "text": sentence(identity.cause, self._language),
         }

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from orchestrator.core.demand import WAITS
 from orchestrator.core.facts import Facts
 from orchestrator.core.finish import goes_full, once, target
 from orchestrator.core.limits import bounds, limit, lowest
@@ -9,10 +10,12 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import BY_PERSON
 from orchestrator.model import Cause, Decision, Effect, Snapshot, State
+from orchestrator.model.bay_document import Outlook
 from orchestrator.model.cause import SEVERAL
+from orchestrator.model.document import Forecast, Limit, Target
 from orchestrator.service.forecast import bmu_minutes, own_minutes
 from orchestrator.service.wallclock import WallClock
-from orchestrator.text.catalogue import fields, say
+from orchestrator.text.catalogue import as_told, fields, say
 
 #: What comes next where neither the reason nor a fault says it. CHARGING has sentences of its own.
 NEXT = {
@@ -42,33 +45,38 @@ def outlook(
     language: str,
     *,
     closely: bool,
-) -> dict[str, object]:
+) -> Outlook:
     """`since` and `at` are Unix time. Only `closely` there are `limits` and `forecast`, which cost most of it.
 
     Nothing but `next` is known before the first decision.
     """
     coming = next_of(decision, rules)
-    told, at_s = fields(clock.told(coming), language) or {}, _moment(coming, clock)
+    told, at_s = as_told(clock.told(coming), language), _moment(coming, clock)
     since_s = memory.since_s if memory is not None else None
     asked = once(memory.operator) if memory is not None else None
-    found: dict[str, object] = {
+    found: Outlook = {
         "since": round(clock.unix_s(since_s), 3) if since_s is not None else None,
         "next": {**told, "by_itself": by_itself(decision), "at": at_s},
-        "target": asked and {"soc_pct": asked.param("target_pct"), **(fields(clock.told(asked), language) or {})},
+        "target": None if asked is None else _target(asked, clock, language),
     }
     if not closely or memory is None or memory.last_s is None:
         return found
     f = Facts.of(memory.last_s, snapshot, memory, rules)
-    return {**found, "limits": list(_limits(f, decision, language)), "forecast": forecast(f, clock)}
+    return {**found, "limits": list(_limits(f, decision, clock, language)), "forecast": forecast(f, clock)}
+
+
+def _target(asked: Cause, clock: WallClock, language: str) -> Target:
+    return {"soc_pct": asked.param("target_pct"), **as_told(clock.told(asked), language)}
 
 
 # --- what limits it ---------------------------------------------------------------------------------------------------
 
 
-def _limits(f: Facts, decision: Decision, language: str) -> Iterator[dict[str, object]]:
+def _limits(f: Facts, decision: Decision, clock: WallClock, language: str) -> Iterator[Limit]:
     """What limits the current, the lowest first, and then what else bounds a charge."""
     for allowed_a, cause, binds in current_limits(f, decision):
-        yield {"allowed_a": allowed_a, "binds": binds, "cause": fields(cause, language), "text": say(cause, language)}
+        told = as_told(clock.told(cause), language)
+        yield {"allowed_a": allowed_a, "binds": binds, "cause": told, "text": told["text"]}
     for cause in charge_limits(f.rules):
         yield {"allowed_a": None, "binds": False, "cause": fields(cause, language), "text": say(cause, language)}
 
@@ -78,7 +86,10 @@ def current_limits(f: Facts, decision: Decision) -> Iterator[tuple[float, Cause,
     worst, step = decision.faults[0] if decision.faults else None, decision.step
     least = lowest(f, worst)
     key = step.key if step is not None else least.key if least.allowed_a < f.rules.worst_a[-1] else ""
-    found = [(one.allowed_a, limit(f, one), bool(key) and one.key == key) for one in bounds(f, worst)]
+    why = f.snapshot.granted_why if decision.cause.id == WAITS else None
+    found = [(one.allowed_a, limit(f, one), not why and bool(key) and one.key == key) for one in bounds(f, worst)]
+    if why is not None:  # the others say what the bay could use
+        found.append((0.0, why, True))
     if step is not None and step.key and not any(binds for *_, binds in found):  # precharge, or a row just left
         found.append((f.rules.worst_a[step.index], step.rule, True))
     return iter(sorted(found, key=lambda one: (not one[2], one[0])))
@@ -146,7 +157,7 @@ def _moment(cause: Cause, clock: WallClock) -> float | None:
 # --- how long ---------------------------------------------------------------------------------------------------------
 
 
-def forecast(f: Facts, clock: WallClock) -> dict[str, object] | None:
+def forecast(f: Facts, clock: WallClock) -> Forecast | None:
     """The target of the charge, and how long it still takes by the BMU and by ourselves; None without a charge."""
     if f.memory.session is None or not f.energised:
         return None

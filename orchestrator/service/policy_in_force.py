@@ -7,6 +7,7 @@ from orchestrator.config.differences import differences
 from orchestrator.config.station import BayConfig
 from orchestrator.core.rules import Rules
 from orchestrator.model import Cause
+from orchestrator.model.document import PolicyFields
 from orchestrator.service.news import News
 
 #: More changed keys than this are counted only.
@@ -56,7 +57,7 @@ class PolicyInForce:
         self.news = News.of(self.rules)
         self._since_s = time()
 
-    def status(self) -> dict[str, object]:
+    def status(self) -> PolicyFields:
         """Its part of the status document. `since` is Unix time: when this service began, or adopted it."""
         policy, offered = self.rules.bay.policy, self._offered
         return {

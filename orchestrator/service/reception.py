@@ -29,7 +29,7 @@ QUEUE_S = 2.0
 #: The bays answer within this, or never.
 ANSWER_S = 10.0
 
-STOP, STATUS = "stop", "status"
+STOP, STATUS, WATCH = "stop", "status", "watch"
 
 Answer = Mapping[str, object]
 Same = tuple[int, bytes]  #: the user, and the request's line

@@ -19,6 +19,7 @@ from orchestrator.model import (
     State,
 )
 from orchestrator.model.cause import plain
+from orchestrator.model.document import Order, SessionFields
 from orchestrator.service.rows import Row, as_columns, bare
 from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import say
@@ -52,7 +53,7 @@ def decision_lines(
     if before is None or now.state is not before.state:
         yield "transition", {"from": before.state if before else None, "to": now.state, **why()}
     if before is None or now.command != before.command:
-        yield "command", command_fields(now.command)
+        yield "command", {**command_fields(now.command)}
     yield from _fault_lines(before, now, language)
     yield from _session_lines(before, now, language, clock)
     if before is None or _gist(now) != _gist(before):
@@ -63,7 +64,7 @@ def _at(clock: WallClock | None, cause: Cause | None) -> Cause | None:
     return cause if clock is None else clock.told(cause)
 
 
-def command_fields(command: Command | None) -> dict[str, object]:
+def command_fields(command: Command | None) -> Order:
     """A command as shown in journal and status."""
     return {"action": command.action, "value": command.value} if command else {"action": None}
 
@@ -123,7 +124,7 @@ def _session_lines(
         yield "session", {"event": "end", **session_fields(now.session, language, clock)}
 
 
-def session_fields(session: Session, language: str = "en", clock: WallClock | None = None) -> dict[str, object]:
+def session_fields(session: Session, language: str = "en", clock: WallClock | None = None) -> SessionFields:
     """A session as rounded figures, for people."""
     return {
         "elapsed_s": round(session.elapsed_s, 1),

@@ -4,7 +4,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from orchestrator.config.station import Station
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause, Request
 from orchestrator.model.cause import plain
@@ -17,10 +16,9 @@ from orchestrator.service.journal import Journal
 from orchestrator.service.reception import Answer, Later, refused
 from orchestrator.service.reload import Reading, Reload
 from orchestrator.service.request_log import RequestLog
-from orchestrator.service.status import station_status
+from orchestrator.service.station_status import StationStatus
 from orchestrator.service.store import KEPT_WITHIN_S, Store
 from orchestrator.service.strays import Strays
-from orchestrator.service.supply import Feeds
 from orchestrator.service.terms import START_WITH, Terms
 from orchestrator.text.catalogue import say
 
@@ -39,7 +37,7 @@ class RequestHandler:
 
     def __init__(
         self,
-        station: Station,
+        shown: StationStatus,
         bays: Sequence[BayRunner],
         journal: Journal,
         store: Store,
@@ -48,12 +46,10 @@ class RequestHandler:
         clock: Callable[[], float],
         wall: Callable[[], float],
         wake: Callable[[int], None],
-        feeds: Feeds,
     ) -> None:
-        self._station, self._bays, self._language = station, bays, station.language.value
-        self._journal, self._store, self._strays, self._reload = journal, store, strays, reload
+        self._shown, self._bays, self._language = shown, bays, shown.language
+        self._store, self._strays, self._reload = store, strays, reload
         self._clock, self._wall, self._wake = clock, wall, wake
-        self._feeds = feeds
         self._log = RequestLog(journal, clock, self._language)
         user_name(os.getuid())  # the only one who is let in, besides root
 
@@ -63,12 +59,7 @@ class RequestHandler:
         if verb == "status":
             name = request.get("bay")
             bays = self._bays if name is None else [self._named(name)]
-            now_s, shown = self._clock(), [bay.status(closely=name is not None) for bay in bays]
-            problem, not_persisted = self._journal.problem(now_s), self._store.not_persisted(now_s)
-            alarm = max(self._strays.alarm, *(bay.alarm for bay in self._bays))
-            strays = self._strays.status(self._language)
-            document = station_status(self._station, alarm, shown, problem, not_persisted, strays)
-            return {**document, **self._feeds.status(self._language)}
+            return self._shown.document(bays, closely=name is not None)
         if verb == RELOAD:
             return self._reread(Asker.of(request, self._wall()))
         if isinstance(verb, str) and verb in {*Request, START_WITH}:
@@ -83,7 +74,9 @@ class RequestHandler:
         if verb == IDENTIFY:
             return self._identify(request.get("bays"), request.get("battery"), Asker.of(request, self._wall()))
         raise RequestError(
-            Cause.of("verb_unknown", verb=f"{verb!r:.80}", verbs=("status", RELOAD, *map(str, Request), IDENTIFY))
+            Cause.of(
+                "verb_unknown", verb=f"{verb!r:.80}", verbs=("status", "watch", RELOAD, *map(str, Request), IDENTIFY)
+            )
         )
 
     def _identify(self, names: object, battery: object, asker: Asker) -> Later:

@@ -33,6 +33,7 @@ class RequestLog:
             **by,
             "sudo_user": asker.behind,
             "because": asker.because,
+            "passed_on": asker.by,
             "means": "estop" if asker.estop else "",
             "accepted": answer is None,
             "answer": say(answer, self._language),

@@ -1,4 +1,4 @@
-"""The control socket's name in the file system: created owner-only, watched, and removed only while it is ours."""
+"""A socket's name in the file system: created for its owner or a group, watched, and removed only while it is ours."""
 
 import os
 import socket
@@ -16,16 +16,16 @@ PROBE_S = 1.0
 Identity = tuple[int, int]  #: device and inode
 
 
-def listen(path: Path) -> socket.socket:
-    """The listening socket, owner-only from the first moment; a dead one in its place is removed."""
+def listen(path: Path, group: int | None = None) -> socket.socket:
+    """The listening socket, owner-only from the first moment, then also for a group; a dead one there is removed."""
     if not _is_free(path):
         raise StartError(Cause.of("socket_occupied", socket=str(path)))
     if is_alive(path):
         raise StartError(Cause.of("socket_answered", socket=str(path)))
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        _bind(listener, path)
+        _make_directory(path.parent, group)
+        _bind(listener, path, group)
         listener.listen(WAITING)
     except OSError as error:
         listener.close()
@@ -42,10 +42,21 @@ def _is_free(path: Path) -> bool:
         return True
 
 
-def _bind(listener: socket.socket, path: Path) -> None:
+def _make_directory(directory: Path, group: int | None) -> None:
+    """One for the owner; where a group must come through, others may do that and no more."""
+    there = directory.exists()
+    directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if group is not None and not there:
+        directory.chmod(0o711)
+
+
+def _bind(listener: socket.socket, path: Path, group: int | None) -> None:
     path.unlink(missing_ok=True)
     os.fchmod(listener.fileno(), 0o600)  # Linux gives the name the socket's mode; the umask would affect all threads
     listener.bind(str(path))
+    if group is not None:
+        os.chown(path, -1, group, follow_symlinks=False)
+        path.chmod(0o660)
 
 
 def is_alive(path: Path) -> bool:
@@ -72,7 +83,28 @@ def identity(path: Path) -> Identity | None:
     return found.st_dev, found.st_ino
 
 
-def remove(path: Path, ours: Identity | None) -> None:
-    """Remove the name, unless it belongs to another socket by now."""
-    if ours is not None and identity(path) == ours:
-        path.unlink(missing_ok=True)
+class SocketName:
+    """A listening socket under its name, which somebody else may remove or take."""
+
+    def __init__(self, path: Path, group: int | None = None) -> None:
+        self._path, self._group, self.listener = path, group, listen(path, group)
+        self._identity = identity(path)
+
+    def look(self) -> Cause | None:
+        """What has become of the name: None if nothing. If it was removed, there is a new `listener` under it."""
+        found, socket_ = identity(self._path), str(self._path)
+        if found == self._identity:
+            return None
+        if found is not None:
+            return Cause.of("socket_taken", socket=socket_)
+        try:
+            self.listener = listen(self._path, self._group)
+        except StartError as error:
+            return Cause.of("socket_lost", socket=socket_, error=error.cause)
+        self._identity = identity(self._path)
+        return Cause.of("socket_again", socket=socket_)
+
+    def remove(self) -> None:
+        """Remove the name, unless it belongs to another socket by now."""
+        if self._identity is not None and identity(self._path) == self._identity:
+            self._path.unlink(missing_ok=True)

@@ -13,20 +13,20 @@ from dataclasses import replace
 
 from orchestrator.core.persisted import Persisted, TimedStart
 from orchestrator.model import Alarm, Cause, Decision, Request, State
+from orchestrator.model.bay_document import Waiting
 from orchestrator.model.cause import plain
+from orchestrator.model.document import TimedStart as TimedStartFields
 from orchestrator.service.asked import Asked, Taken
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.store import Store
 from orchestrator.service.wallclock import WallClock
-from orchestrator.text.catalogue import fields, say
+from orchestrator.text.catalogue import as_told, say
 
 #: A start that could not be made is still made within this.
 MOST_LATE_S = 3600.0
 #: For how long a start that is refused is tried again, and how often.
 PATIENCE_S, AGAIN_S = 60.0, 5.0
-#: What of the status is not of `next`.
-OWN = frozenset({"target_soc_pct", "pending"})
 #: Why a bay is paused by a person: only a start ends that.
 PAUSES = frozenset({"operator_pause", "paused_by"})
 #: For how long the status tells why one was not made.
@@ -98,22 +98,23 @@ class StartTimer:
         """This state, with the start that is to come."""
         return replace(persisted, timed=self._timed)
 
-    def status(self, clock: WallClock) -> dict[str, object] | None:
+    def status(self, clock: WallClock) -> TimedStartFields | None:
         """Its part of the status document; `at` is Unix time. Any thread."""
         timed = self._timed
         if timed is None:
             return None
-        told = fields(clock.told(cause_of(timed, self._bay)), self._language) or {}
+        told = as_told(clock.told(cause_of(timed, self._bay)), self._language)
         return {
             **told, "at": timed.start_unix_s, "target_soc_pct": timed.target_pct, "pending": timed.outcome is None,
         }  # fmt: skip
 
-    def next(self, decision: Decision, clock: WallClock) -> dict[str, object]:
+    def next(self, decision: Decision, clock: WallClock) -> Waiting:
         """What comes next of a bay that waits for a start, in the status document: nobody needs to come. Any thread."""
-        told = self.status(clock)
-        if told is None or not told["pending"] or not self._waits(decision):
+        timed = self._timed
+        if timed is None or timed.outcome is not None or not self._waits(decision):
             return {}
-        return {"next": {**{name: told[name] for name in told if name not in OWN}, "by_itself": True}}
+        told = as_told(clock.told(cause_of(timed, self._bay)), self._language)
+        return {"next": {**told, "at": timed.start_unix_s, "by_itself": True}}
 
     def _waits(self, decision: Decision) -> bool:
         """Whether nothing but the time is waited for."""

@@ -44,7 +44,7 @@ def status(arguments: argparse.Namespace) -> int:
 def _blocks(document: dict[str, object], arguments: argparse.Namespace) -> list[Block]:
     """A page about the one bay that is named, else the table of all that are meant."""
     language, width = own_language(), own_width()
-    if _named(arguments) is None or arguments.problems or arguments.group:
+    if named(arguments) is None or arguments.problems or arguments.group:
         return overview(document, arguments, time.strftime(CLOCK))
     from orchestrator.service.bay_page import bay_blocks
     from orchestrator.service.history_verb import last_events
@@ -66,7 +66,7 @@ def overview(document: Mapping[str, object], arguments: argparse.Namespace, cloc
     return blocks(document, language, width, clock, problems=arguments.problems)
 
 
-def _named(arguments: argparse.Namespace) -> str | None:
+def named(arguments: argparse.Namespace) -> str | None:
     """The bay, if exactly one is named, and not by a pattern."""
     words = arguments.bay
     return words[0] if len(words) == 1 and is_plain(words) and not arguments.excepted else None
@@ -82,11 +82,16 @@ def _checked(path: Path, arguments: argparse.Namespace) -> dict[str, object]:
 
 def look(path: Path, arguments: argparse.Namespace, within_s: float = ANSWER_S) -> dict[str, object]:
     """The status document with the bays that the command line means. ServiceError if one of them is unknown."""
-    words, excepted, one = arguments.bay, arguments.excepted, _named(arguments)
-    document = ask(path, {"verb": "status", "bay": one}, within_s)
+    document = ask(path, {"verb": "status", "bay": named(arguments)}, within_s)
     document.pop("ok")
+    return meant(document, arguments)
+
+
+def meant(document: dict[str, object], arguments: argparse.Namespace) -> dict[str, object]:
+    """This document with the bays that the command line means. ServiceError if one of them is unknown."""
+    words, excepted = arguments.bay, arguments.excepted
     bays = cast("list[dict[str, object]]", document["bays"])
-    if one is None and (words or excepted):
+    if words or excepted:
         known = [str(bay["name"]) for bay in bays]
         chosen = choose(words or None, excepted, known)
         if chosen.unknown or not chosen.bays:

@@ -14,6 +14,7 @@ from threading import Thread
 from orchestrator.devices.charger import ChargerPort
 from orchestrator.errors import RequestError
 from orchestrator.model import STOP, Alarm, Cause, ChargerReading, Operation
+from orchestrator.model.bay_document import Stray
 from orchestrator.service.closing import close_all
 from orchestrator.service.past import Place, shown
 from orchestrator.service.store import Store
@@ -135,7 +136,7 @@ class Strays:
         """The ports to close at the end."""
         return [stray.port for stray in self._strays]
 
-    def status(self, language: str = "en") -> list[dict[str, object]]:
+    def status(self, language: str = "en") -> list[Stray]:
         """The entries for the status document."""
         return [
             {

@@ -25,13 +25,12 @@ from orchestrator.service.bayrecord import BayRecord
 from orchestrator.service.boot import boot_id, boottime
 from orchestrator.service.closing import close_all
 from orchestrator.service.console import Console
-from orchestrator.service.control import ControlSocket
 from orchestrator.service.guarded import GuardianLink
 from orchestrator.service.journal import Journal
 from orchestrator.service.past import Place
 from orchestrator.service.ports import REQUESTS, ChargerPorts
 from orchestrator.service.reload import Reload
-from orchestrator.service.request_handler import RequestHandler
+from orchestrator.service.sockets import Sockets
 from orchestrator.service.starts import Starts
 from orchestrator.service.store import Store
 from orchestrator.service.strays import Strays
@@ -75,12 +74,10 @@ class Supervisor:
         stray = partial(stray_port, self._guardian, partial(self._wake.put, None))
         self._strays = Strays(self._store, stray, self._say)
         self._reload, self._reload_asked = Reload(station, self._bays, self._say), False
-        self._handler = RequestHandler(
-            station, self._bays, self._journal, self._store, self._strays, self._reload, monotonic, time,
-            self._wake.put, self._feeds,
+        self._sockets = Sockets(
+            station, self._bays, self._journal, self._store, self._strays, self._feeds, self._reload,
+            self._wake.put, self._say,
         )  # fmt: skip
-        answer, refused = self._handler.answer, self._handler.refused
-        self._control = ControlSocket(station.control.socket, answer, monotonic, self._say, self._language, refused)
 
     def _build(self, ports: ChargerPorts) -> None:
         """Create the devices for every bay; nothing is opened yet."""
@@ -136,7 +133,7 @@ class Supervisor:
         self._journal.start()
         self._recorder.start()
         self._reload.start()
-        self._control.start()
+        self._sockets.start()
         if not known and self._store.wait(LOAD_S):
             self._strays.begin()
         for bus in self._buses:
@@ -205,7 +202,7 @@ class Supervisor:
         """Tell the guardian that every loop makes progress; end if the guardian is gone."""
         devices: tuple[ChargerPort | BatteryBus, ...] = (*self._ports, *self._buses)
         writers = (self._journal, self._recorder, self._store)
-        well = not any(worker.stalled(now_s) for worker in (*devices, self._control, *writers))
+        well = not any(worker.stalled(now_s) for worker in (*devices, self._sockets, *writers))
         self._beat_s = now_s
         self._lost = self._guardian.beat(now_s, well=well)
         self._ending = self._ending or self._lost
@@ -229,7 +226,7 @@ class Supervisor:
         self._run_all()
         while monotonic() < end_s and (self._unverified() or any(bay.owes for bay in self._bays)):
             self._turn()
-        close_all([self._control.close], CONTROL_S)  # no request is *accepted* from now on …
+        close_all([self._sockets.close], CONTROL_S)  # no request is *accepted* from now on …
         self._run_all()  # … and earlier ones are handled
         unverified = self._unverified()
         for bay in self._bays:

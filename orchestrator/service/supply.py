@@ -23,8 +23,10 @@ from orchestrator.core.memory import Memory
 from orchestrator.core.rules import Rules
 from orchestrator.core.supply import Held, Load, Supplies, Want
 from orchestrator.model import Cause, Decision, Snapshot
+from orchestrator.model.bay_document import Shared, Supplied
+from orchestrator.model.document import SupplyFields
 from orchestrator.service.wallclock import WallClock
-from orchestrator.text.catalogue import fields, say
+from orchestrator.text.catalogue import as_told
 
 #: How often the supplies are divided.
 EVERY_S = 0.5
@@ -87,19 +89,20 @@ class Feed:
             self.why = why
         return other
 
-    def status(self, clock: WallClock, language: str) -> dict[str, object]:
-        """Its part of the bay's status."""
-        if self.load is None:
+    def status(self, clock: WallClock, language: str) -> Supplied:
+        """Its part of the bay's status. Any thread: what is held is taken once, as the control loop replaces it."""
+        load, held, why = self.load, self.held, self.why
+        if load is None or why is None:
             return {}
-        draw_w, why = self.load.draw_w, clock.told(self.why)
+        told = as_told(clock.told(why), language)
         return {
             "supply": {
-                "name": self.load.supply,
-                "granted": self.held.granted,
-                "granted_w": draw_w[self.held.granted],
-                "counted_w": draw_w[self.held.counted],
-                "cause": fields(why, language),
-                "text": say(why, language),
+                "name": load.supply,
+                "granted": held.granted,
+                "granted_w": load.draw_w[held.granted],
+                "counted_w": load.draw_w[held.counted],
+                "cause": told,
+                "text": told["text"],
             }
         }
 
@@ -164,12 +167,12 @@ class Feeds:
         place = next(supply.place for supply in self.supplies.supplies if supply.name == name)
         return Cause.of("supply_asks", key=f"supplies.{name}.limit_w", place=place, supply=name)
 
-    def status(self, language: str) -> dict[str, object]:
+    def status(self, language: str) -> Shared:
         """What each supply has promised, and which bays wait in it; nothing where there are none."""
         feeds = [self.feeds[number] for number in self.fed]
         used_w = ledger.used_w(self.supplies, [feed.held for feed in feeds])
         members = list(zip(self.supplies.loads, self.supplies.paths, feeds, strict=True))
-        shown = []
+        shown = list[SupplyFields]()
         for number, (supply, limit_w) in enumerate(zip(self.supplies.supplies, self.supplies.limits_w, strict=True)):
             waiting = tuple(
                 load.bay for load, path, feed in members if number in path and feed.want.top and not feed.held.granted
@@ -179,8 +182,9 @@ class Feeds:
                 supply=supply.name, used_w=used_w[number], limit_w=limit_w,
             )  # fmt: skip
             promises = promises.with_(then=Cause.of("supply_waiting", bays=waiting)) if waiting else promises
+            told = as_told(promises, language)
             shown.append({
                 "name": supply.name, "within": supply.within, "limit_w": limit_w, "promised_w": used_w[number],
-                "waiting": list(waiting), "cause": fields(promises, language), "text": say(promises, language),
+                "waiting": list(waiting), "cause": told, "text": told["text"],
             })  # fmt: skip
         return {"supplies": shown} if shown else {}

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from math import ceil
 from time import localtime, strftime
+from typing import overload
 
 from orchestrator.model import Cause
 from orchestrator.text.moments import MOMENT, UNIX, with_moments
@@ -21,6 +22,15 @@ class WallClock:
     def unix_s(self, t_s: float) -> float:
         """The Unix time of a monotonic moment."""
         return self.wall_s - (self.now_s - t_s)
+
+    @overload
+    def told(self, cause: Cause) -> Cause: ...
+
+    @overload
+    def told(self, cause: None) -> None: ...
+
+    @overload
+    def told(self, cause: Cause | None) -> Cause | None: ...
 
     def told(self, cause: Cause | None) -> Cause | None:
         """The cause with its moments as the time of day, here."""

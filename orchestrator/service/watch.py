@@ -1,4 +1,8 @@
-"""`orchestrator status --watch`: the status again and again, on a terminal in place and never longer than it."""
+"""`orchestrator status --watch`: the status again and again, on a terminal in place and never longer than it.
+
+The service tells what changes (`watch`). One that does not, because it is older or because many watch already, is asked
+for its status again and again; so is any for what only an answer has: everything about one bay.
+"""
 
 import argparse
 import sys
@@ -13,34 +17,68 @@ from orchestrator.errors import NoServiceError, ServiceError
 from orchestrator.model import Cause
 from orchestrator.model.cause import said
 from orchestrator.page import PLAIN, Block, fitted, painted
-from orchestrator.service.status_verb import CLOCK, look, overview
+from orchestrator.service.followed import Followed, Refused
+from orchestrator.service.status_verb import CLOCK, look, meant, named, overview
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import language_of_answer
 
-#: The refresh interval, and how long to wait for an answer before saying that there is none.
-WATCH_S, WITHIN_S = 1.0, 3.0
+#: The refresh interval, on a terminal after a change, and how long to wait for an answer before saying there is none.
+WATCH_S, SOON_S, WITHIN_S = 1.0, 0.25, 3.0
 #: Terminal codes: to the first line; clear this line; clear all below.
 HOME, LINE, BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 
 
 def watch(path: Path, arguments: argparse.Namespace) -> NoReturn:
     """Until Ctrl-C, or until nobody reads it. ServiceError if the service does not answer the first time."""
-    view = _View(arguments)
+    view, source = _View(arguments), _Source(path, arguments)
     try:
         while True:
             try:
-                document = look(path, arguments, WITHIN_S)
+                document = source.look()
             except ServiceError as error:
                 if not view.answered_at:  # one that has never answered may be the wrong one
                     raise
                 view.show_lost(error)
             else:
                 view.show(document)
-            time.sleep(WATCH_S)
+            source.wait()
     except KeyboardInterrupt:
         view.leave()
         raise
+
+
+class _Source:
+    """Where the status comes from."""
+
+    def __init__(self, path: Path, arguments: argparse.Namespace) -> None:
+        self._path, self._arguments = path, arguments
+        self._followed: Followed | None = None
+        self._asks = arguments.json and named(arguments) is not None  # not followed
+
+    def look(self) -> dict[str, object]:
+        """The present status. ServiceError without an answer."""
+        if self._followed is None and not self._asks:
+            try:
+                self._followed = Followed(self._path, WITHIN_S)
+            except Refused:
+                self._asks = True
+            except (OSError, ValueError, LookupError):
+                pass  # whoever is asked below says why
+        if self._followed is not None:
+            return meant(self._followed.document, self._arguments)
+        return look(self._path, self._arguments, WITHIN_S)
+
+    def wait(self) -> None:
+        """Until it is time to look again."""
+        if self._followed is None:
+            time.sleep(WATCH_S)
+            return
+        try:
+            self._followed.wait(SOON_S if own_height() else WATCH_S, WATCH_S)
+        except (OSError, ValueError, LookupError):
+            self._followed.close()
+            self._followed = None
 
 
 @dataclass(slots=True)

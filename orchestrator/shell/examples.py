@@ -63,6 +63,11 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
         ("estop /etc/orchestrator/station.yaml", "of this station"),
         ("estop --port /dev/charger/bay-1", "without any file"),
     ),
+    "serve": (("serve northbound.yaml", "the page of a station; its first line says where"),),
+    "user": (
+        ("user add kim --role operator", "asks for the password twice"),
+        ("user add screen --role viewer --file users.yaml", "who may look; < FILE takes the password from a file"),
+    ),
     "check": (
         ("check station.yaml", "its policies and maps as well"),
         ("check my-policy.yaml --exhaustive", "also explore all that can happen under it"),
@@ -90,6 +95,7 @@ EXAMPLES: Mapping[str, tuple[Example, ...]] = {
     "diagram": (("diagram --policy my-policy.yaml --format svg --out states.svg", "the states with its thresholds"),),
     "demo": (
         ("demo", "a charge in about a minute"),
+        ("demo --page", "the same, and in a browser"),
         ("demo --fault list", "the faults that can be injected"),
     ),
     "completion": (

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 from orchestrator.model import Cause
 from orchestrator.model.cause import plain
+from orchestrator.model.told import ToldCause
 from orchestrator.text.en.advice import ADVICE as EN_ADVICE
 from orchestrator.text.en.bays import TEXTS as EN_BAYS
 from orchestrator.text.en.codes import CODES as EN_CODES
@@ -27,6 +28,7 @@ from orchestrator.text.en.faults import TEXTS as EN_FAULTS
 from orchestrator.text.en.health import TEXTS as EN_HEALTH
 from orchestrator.text.en.limits import TEXTS as EN_LIMITS
 from orchestrator.text.en.links import TEXTS as EN_LINKS
+from orchestrator.text.en.northbound import TEXTS as EN_NORTHBOUND
 from orchestrator.text.en.pages import TEXTS as EN_PAGES
 from orchestrator.text.en.records import TEXTS as EN_RECORDS
 from orchestrator.text.en.service import TEXTS as EN_SERVICE
@@ -39,6 +41,7 @@ from orchestrator.text.ko.faults import TEXTS as KO_FAULTS
 from orchestrator.text.ko.health import TEXTS as KO_HEALTH
 from orchestrator.text.ko.limits import TEXTS as KO_LIMITS
 from orchestrator.text.ko.links import TEXTS as KO_LINKS
+from orchestrator.text.ko.northbound import TEXTS as KO_NORTHBOUND
 from orchestrator.text.ko.pages import TEXTS as KO_PAGES
 from orchestrator.text.ko.particles import resolved
 from orchestrator.text.ko.records import TEXTS as KO_RECORDS
@@ -82,13 +85,33 @@ def _language(
 
 LANGUAGES: Mapping[str, Language] = {
     "en": _language(
-        {**EN_FAULTS, **EN_BAYS, **EN_LIMITS, **EN_LINKS, **EN_SERVICE, **EN_PAGES, **EN_HEALTH, **EN_RECORDS},
+        {
+            **EN_FAULTS,
+            **EN_BAYS,
+            **EN_LIMITS,
+            **EN_LINKS,
+            **EN_SERVICE,
+            **EN_PAGES,
+            **EN_HEALTH,
+            **EN_RECORDS,
+            **EN_NORTHBOUND,
+        },
         EN_ADVICE,
         {**EN_WORDS, **EN_CODES},
         EN_FRAMES,
     ),
     "ko": _language(
-        {**KO_FAULTS, **KO_BAYS, **KO_LIMITS, **KO_LINKS, **KO_SERVICE, **KO_PAGES, **KO_HEALTH, **KO_RECORDS},
+        {
+            **KO_FAULTS,
+            **KO_BAYS,
+            **KO_LIMITS,
+            **KO_LINKS,
+            **KO_SERVICE,
+            **KO_PAGES,
+            **KO_HEALTH,
+            **KO_RECORDS,
+            **KO_NORTHBOUND,
+        },
         KO_ADVICE,
         {**KO_WORDS, **KO_CODES},
         KO_FRAMES,
@@ -111,9 +134,14 @@ def say(cause: Cause | None, language: str = "en", otherwise: str = "") -> str:
         return otherwise or _data(cause, texts)
 
 
-def fields(cause: Cause | None, language: str = "en") -> dict[str, object] | None:
+def fields(cause: Cause | None, language: str = "en") -> ToldCause | None:
     """A cause with its sentence, as in JSON."""
-    return {**plain(cause), "text": say(cause, language)} if cause is not None else None
+    return as_told(cause, language) if cause is not None else None
+
+
+def as_told(cause: Cause, language: str = "en") -> ToldCause:
+    """The same where there is one."""
+    return {**plain(cause), "text": say(cause, language)}
 
 
 def advise(id_: str, language: str = "en") -> str:

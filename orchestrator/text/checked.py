@@ -8,6 +8,7 @@ THINGS = {
     "policy": ("policy", "policies"),
     "map": ("object map", "object maps"),
     "scenario": ("scenario", "scenarios"),
+    "northbound": ("northbound file", "northbound files"),
     "file": ("file", "files"),  # where nothing in it could be counted
     "error": ("error", "errors"),
     "warning": ("warning", "warnings"),
@@ -18,6 +19,7 @@ THINGS_KO = {
     "policy": ("정책", "개"),
     "map": ("객체 맵", "개"),
     "scenario": ("시나리오", "개"),
+    "northbound": ("상위 연계 파일", "개"),
     "file": ("파일", "개"),
     "error": ("오류", "건"),
     "warning": ("경고", "건"),

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from orchestrator.cli import main
-from orchestrator.config.files import KINDS, Kind
+from orchestrator.config.files import KINDS, STATION, Kind
 from orchestrator.config.json_schema import json_schema
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,7 +41,7 @@ def read(path: Path) -> Any:
 
 
 def kind_of(document: Any) -> Kind | None:
-    return next((kind for kind in KINDS if kind.key in document), None)
+    return next((kind for kind in KINDS if kind.mark in document), None)
 
 
 def complaints(path: Path, kind: Kind) -> list[str]:
@@ -79,6 +79,6 @@ def test_every_shipped_file_names_its_schema(path: Path) -> None:
 
 
 def test_each_key_says_what_it_means_and_where_its_bounds_are() -> None:
-    sweep = json_schema(KINDS[2])["properties"]["bays"]["items"]["properties"]["battery"]["properties"]["sweep_s"]
+    sweep = json_schema(STATION)["properties"]["bays"]["items"]["properties"]["battery"]["properties"]["sweep_s"]
     assert sweep["description"].endswith("(0.02 … 0.5 s)")
     assert (sweep["minimum"], sweep["maximum"], sweep["default"]) == (0.02, 0.5, 0.05)

@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.config.amperes import max_hours, row_a
 from orchestrator.config.load import check, load_map, load_policy, load_scenario, load_station
+from orchestrator.config.northbound import Northbound, Page, Tls, User
 from orchestrator.config.policy import (
     Finish,
     Full,
@@ -32,6 +33,7 @@ POLICIES = (
 )  # fmt: skip
 MAPS = ("tabos", "tabos-lsb")
 STATIONS = ("one-bay", "two-bays-rs485")
+NORTHBOUND = ("page",)
 SCENARIOS = ("aged-pack", "agv-day", "cold-morning", "deep-discharge", "faulty-sensor", "hot-afternoon")
 
 
@@ -40,12 +42,13 @@ def test_the_shipped_names_are_these() -> None:
     assert shipped_names("configs/maps") == MAPS
     assert shipped_names("configs/stations") == STATIONS
     assert shipped_names("configs/scenarios") == SCENARIOS
+    assert shipped_names("configs/northbound") == NORTHBOUND
 
 
 def test_all_shipped_files_pass_the_check() -> None:
-    folders = ("policies", "configs/maps", "configs/stations", "configs/scenarios")
+    folders = ("policies", "configs/maps", "configs/stations", "configs/scenarios", "configs/northbound")
     files = [path for folder in folders for path in _files(folder)]
-    assert len(files) == len(POLICIES) + len(MAPS) + len(STATIONS) + len(SCENARIOS)
+    assert len(files) == len(POLICIES) + len(MAPS) + len(STATIONS) + len(SCENARIOS) + len(NORTHBOUND)
     assert check(files) == []
 
 
@@ -69,6 +72,13 @@ def test_one_scenario_shows_every_key() -> None:
     """Where keys are explained, none is left out, be it in a comment."""
     text = (shipped_dir() / "configs/scenarios/cold-morning.yaml").read_text(encoding="utf-8")
     for record in (Scenario, ChargerModel, BatteryModel, Weather, Visit, SensorFault, Ask):
+        for name in slots(record):
+            assert re.search(rf"\b{name}\b", text), name
+
+
+def test_the_northbound_file_shows_every_key() -> None:
+    text = (shipped_dir() / "configs/northbound/page.yaml").read_text(encoding="utf-8")
+    for record in (Northbound, Page, Tls, User):
         for name in slots(record):
             assert re.search(rf"\b{name}\b", text), name
 

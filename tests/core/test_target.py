@@ -145,7 +145,7 @@ def test_it_outlives_a_pause_and_a_restart_and_ends_with_a_stop() -> None:
     world.until(S.SUSPENDED)
     world.memory = Persisted.of(world.memory, world.now_s).aged(5.0).memory(world.now_s)
     world.until(S.SUSPENDED)
-    assert world.memory.operator.target_by == KIM
+    assert (world.memory.operator.target_pct, world.memory.operator.target_by) == (100.0, KIM)
     assert world.ask(Request.START) == ""
     world.charging()
     rises(world, 99.5)
@@ -170,6 +170,25 @@ def test_another_battery_is_not_meant() -> None:
     world.arrive(soc_pct=99.0)
     world.run(30)
     assert world.is_in(S.IDLE)
+
+
+def test_a_battery_that_may_be_another_is_not_meant() -> None:
+    """It was not seen to leave, but tells another serial number."""
+    world = resting(99.0)
+    world.battery_link = replace(world.battery_link, serial=7)
+    world.tick()
+    world.ours["waits"] = Cause.of("waits_for_turn", other="bay-2")
+    assert ask(world, 100.0) == ""
+    world.battery_link = replace(world.battery_link, serial=8)
+    world.tick()
+    assert world.memory.operator == Operator(), "nothing is left of it, nor of who asked"
+
+
+def test_a_charge_to_a_target_begins_with_that_as_its_reason() -> None:
+    world = resting(99.0)
+    ask(world, 100.0)
+    assert world.is_in(S.QUALIFYING)
+    assert reason_of(world.decision) == "SOC 99.0 % is below 100 %: charges once to 100 %, asked by kim at 7 s"
 
 
 def test_a_limit_of_the_policy_holds_all_the_same() -> None:
@@ -197,3 +216,6 @@ def test_a_target_is_told_with_whoever_asked_for_it() -> None:
     told = once(Operator(target_pct=60.0, target_by=KIM))
     assert told is not None
     assert (told.id, told.param("target_pct"), told.param("who")) == ("charges_once_by", 60.0, "kim")
+    because = once(Operator(target_pct=60.0, target_by=Cause(KIM.id, (*KIM.params, ("because", "cold store")))))
+    assert because is not None
+    assert because.param("because") == "cold store"

@@ -106,7 +106,8 @@ CATALOGUE: tuple[Entry, ...] = (
     Entry("P5", "start while latched or unknown", "`core/operator.py`: refused, with the cause"),
     Entry("P6", "resets without a remedy", "`core/operator.py`: the fourth within an hour is refused, with the time"),
     Entry("P7", "control socket: strangers, floods",
-          "`service/control.py`: owner and root only; stops first, 256 clients at once; rejected users are reported"),
+          "`service/doorkeeper.py`: owner, root and a named group only, the others are reported; `service/control.py`: "
+          "stops first, 256 clients at once; `service/viewer.py`: the view socket takes no commands"),
     Entry("P8", "pairing not proved", "`service/starts.py`: charges of one station begin one after another"),
     Entry("P9", "not persisted", "`service/store.py`: a change not on disk after 2 s lets no charge begin"),
     Entry("P10", "bay without its past", "`service/past.py`: held; a person starts it"),

@@ -218,7 +218,7 @@ def ask(made: World, directory: Path, questions: Callable[[], list[str]]) -> lis
     wait_until(lambda: time.time() >= told_s, 2 * LEAD_S, "the time that the station tells", every_s=0.1)
 
     def answer(request: Mapping[str, object]) -> object:
-        found = made.supervisor._handler.answer(request)
+        found = made.supervisor._sockets.handler.answer(request)
         for bay in made.bays:
             if bay._requests:
                 bay.run(made.time.now_s)

@@ -9,7 +9,7 @@ from orchestrator.config.shipped import shipped_names
 from orchestrator.core.faults import FAULTS
 from orchestrator.text.catalogue import LANGUAGES
 from orchestrator.workbench.draw.diagram import diagram, mermaid
-from tests.docs import cause_page, operating_page
+from tests.docs import cause_page, operating_page, status_page
 from tests.docs.catalogue import CATALOGUE
 from tests.docs.fault_page import page, rows_of
 
@@ -25,6 +25,11 @@ def test_the_page_of_faults_is_the_table() -> None:
 def test_the_page_of_causes_is_the_catalogue() -> None:
     written = (DOCS / "causes.md").read_text(encoding="utf-8")
     assert written == cause_page.page(), "python -m tests.docs.cause_page > docs/causes.md"
+
+
+def test_the_page_of_the_status_is_its_records() -> None:
+    written = (DOCS / "status.md").read_text(encoding="utf-8")
+    assert written == status_page.page(), "python -m tests.docs.status_page > docs/status.md"
 
 
 def test_the_picture_in_the_readme_is_the_machine() -> None:

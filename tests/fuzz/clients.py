@@ -33,7 +33,7 @@ ANSWER_S = 60.0  #: for an honest client, on a machine that may stall
 
 def _handle(request: dict[str, object]) -> reception.Answer | reception.Later:
     LOOP.stepped.clear()
-    return SUPERVISOR._handler.answer(request)
+    return SUPERVISOR._sockets.handler.answer(request)
 
 
 PATH = scratch() / "control.sock"

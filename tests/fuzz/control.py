@@ -59,7 +59,7 @@ def _service() -> tuple[Supervisor, Loop]:
     supervisor = Supervisor(station, guardian, ChargerPorts(station, guardian))
     supervisor._store.persisted_revision = sys.maxsize  # the disk is instantaneous
     loop = Loop(supervisor)
-    supervisor._handler._wake = loop.put
+    supervisor._sockets.handler._wake = loop.put
     return supervisor, loop
 
 
@@ -90,7 +90,7 @@ def one(data: bytes) -> None:
 
 def _answered(ours: socket.socket, theirs: socket.socket) -> bytes:
     """The answer after the control socket's turns."""
-    server = SUPERVISOR._control
+    server = SUPERVISOR._sockets.control
     one = client.Client(ours, monotonic())
     server._clients.add(one)
     server._selector.register(one, EVENT_READ)

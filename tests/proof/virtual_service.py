@@ -41,6 +41,7 @@ from orchestrator.model import Cause, ControlMode, Decision, Request
 from orchestrator.service import asked as asked_module
 from orchestrator.service import ports as ports_module
 from orchestrator.service import reload as reload_module
+from orchestrator.service import sockets as sockets_module
 from orchestrator.service import supervisor as supervisor_module
 from orchestrator.service import supply as supply_module
 from orchestrator.service import wiring as wiring_module
@@ -173,7 +174,7 @@ class Shelf:
 class Silence:
     """A control socket that nobody uses."""
 
-    def __init__(self, *_: object) -> None:
+    def __init__(self, *_: object, **__: object) -> None:
         """Any argument."""
 
     def start(self) -> None:
@@ -183,6 +184,13 @@ class Silence:
 
     def stalled(self, _now_s: float) -> bool:
         return False
+
+
+class Watching(Silence):
+    """The readers of its status: there are none."""
+
+    def take(self, client: object) -> None:
+        """Nobody comes here, either."""
 
 
 def station(
@@ -310,10 +318,11 @@ class World:
             ports_module: {"monotonic": time.clock, "SimpleQueue": _Queues(time), "signal": SIGNALS},
             supervisor_module: {
                 "monotonic": time.clock, "boottime": time.clock,
-                "Journal": Notebook, "Console": Notebook, "ControlSocket": Silence,
+                "Journal": Notebook, "Console": Notebook,
                 "Store": partial(Shelf, self._kept), "boot_id": lambda: "virtual", "close_all": _close_all,
                 "signal": SIGNALS,
             },
+            sockets_module: {"monotonic": time.clock, "ControlSocket": Silence, "Streams": Watching},
             asked_module: {"Event": event},
             supply_module: {"monotonic": time.clock},
             reload_module: {"threading": SimpleNamespace(Event=event, Thread=thread)},

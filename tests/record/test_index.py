@@ -378,3 +378,15 @@ def test_nobody_is_told_of_a_folder_that_is_not_there(tmp_path: Path) -> None:
     assert list(Charges(tmp_path / "sessions", said.append).listed()) == []
     assert said == []
     assert not list(tmp_path.iterdir())
+
+
+def test_whoever_may_not_write_beside_the_files_keeps_an_index_elsewhere(folder: Folder, tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    folder.add(NOVEMBER, end(1, 1))
+    for number in (2, 3):
+        folder.add(NOVEMBER, end(number, 1))
+        assert len(list(Charges(folder.path, folder.say, home).listed())) == number
+    assert (home / index.NAME).exists()
+    assert not (folder.path / index.NAME).exists()
+    assert folder.said == []

@@ -3,14 +3,15 @@
 import json
 import socket
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 
 from orchestrator.errors import RequestError
 from orchestrator.lastresort.asking import ask
-from orchestrator.service.client import CLIENT_S
+from orchestrator.model import Cause
+from orchestrator.service.client import CLIENT_S, Client
 from orchestrator.service.control import ControlSocket
 from orchestrator.service.reception import Answer, Handler, Later
 from tests.core.said import cause
@@ -26,8 +27,10 @@ def answer(request: Mapping[str, object]) -> Mapping[str, object]:
 
 
 @contextmanager
-def listening(path: Path, handler: Handler = answer) -> Iterator[ControlSocket]:
-    control = ControlSocket(path, handler, time.monotonic)
+def listening(
+    path: Path, handler: Handler = answer, watch: Callable[[Client], Cause | None] | None = None
+) -> Iterator[ControlSocket]:
+    control = ControlSocket(path, handler, time.monotonic, watch=watch)
     control.start()
     try:
         yield control

@@ -307,7 +307,7 @@ def test_an_end_during_the_start_leaves_no_hold_behind(bench: Bench, steps: int)
 def test_it_begins_with_what_was_kept(tmp_path: Path) -> None:
     bench = Bench(tmp_path, Persisted(running=True))
     assert bench.step(30) is State.HELD
-    assert [fault["id"] for fault in bench.bay.status()["faults"]] == ["found_running"]  # type: ignore[attr-defined]  # a JSON document
+    assert [fault["id"] for fault in bench.bay.status()["faults"]] == ["found_running"]
     assert bench.ask(Request.START) == ""
     bench.until(State.CHARGING)
 
@@ -316,7 +316,7 @@ def test_it_begins_with_what_was_kept(tmp_path: Path) -> None:
 
 
 def faults(bench: Bench) -> dict[str, str]:
-    return {fault["id"]: fault["text"] for fault in bench.bay.status()["faults"]}  # type: ignore[attr-defined]  # a JSON document
+    return {fault["id"]: fault["text"] for fault in bench.bay.status()["faults"]}
 
 
 @pytest.mark.parametrize(("missed_s", "said"), [(0.8, set()), (1.0, {"late"}), (1.6, {"late", "overrun"})])

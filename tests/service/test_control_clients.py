@@ -14,7 +14,8 @@ import pytest
 from orchestrator.errors import ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.service.client import CLIENT_S, Client
-from orchestrator.service.control import MAX_CLIENTS, REST_S, SAY_S, ControlSocket
+from orchestrator.service.control import MAX_CLIENTS, REST_S, ControlSocket
+from orchestrator.service.doorkeeper import SAY_S
 from tests.core.said import into
 from tests.service.control_bench import (
     SOON_S,

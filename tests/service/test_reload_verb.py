@@ -12,6 +12,7 @@ from orchestrator.model import Request
 from orchestrator.service import request_handler
 from orchestrator.service.reception import Answer
 from orchestrator.service.request_handler import RequestHandler
+from orchestrator.service.station_status import StationStatus
 from orchestrator.service.strays import Strays
 from orchestrator.service.supply import Feeds
 from tests.service.bench import fields_of
@@ -28,9 +29,14 @@ class Asking:
         self.site, bench = site, site.bench
         site.reload.start()
         station = load_station(site.station_file)
+        strays = cast("Strays", None)
+        feeds = Feeds.of(station, lambda _: None)
+        shown = StationStatus(
+            station, [bench.bay], bench.journal, bench.store, strays, feeds, lambda: bench.now_s, lambda: 1.8e9
+        )
         self.handler = RequestHandler(
-            station, [bench.bay], bench.journal, bench.store, cast("Strays", None), site.reload,
-            lambda: bench.now_s, lambda: 1.8e9, lambda _: None, Feeds.of(station, lambda _: None),
+            shown, [bench.bay], bench.journal, bench.store, strays, site.reload,
+            lambda: bench.now_s, lambda: 1.8e9, lambda _: None,
         )  # fmt: skip
 
     def ask(self, request: Mapping[str, object] = ASK) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Bays on one supply in the running service: what their chargers really draw, and what the service says of it."""
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,9 +20,11 @@ from orchestrator.service import supply as supply_module
 from orchestrator.service.supply import Feeds
 from orchestrator.sim.presets import PACKS
 from orchestrator.text.catalogue import say
+from orchestrator.text.document import in_language
 from tests.core.edges import NOW_S, Edge
 from tests.proof.virtual_rig import Nature
 from tests.proof.virtual_service import World, station, world
+from tests.service.test_status_document import SCHEMA
 
 NAMES = ("bay-1", "bay-2", "bay-3")
 #: 30 W in standby, 213 W on the lowest step: enough for two of the three.
@@ -70,6 +73,33 @@ def test_three_bays_take_turns_on_a_feed_for_two() -> None:
     assert max(drawn) == 2 * 213 + 30
     assert charged(states) == {0, 1, 2}
     assert any("granted no step yet: supply hall: 456 of 460 W are promised" in text for text in said)
+
+
+def test_everything_that_shows_the_status_is_told_of_supplies_and_the_bay_that_waits_of_its_limit() -> None:
+    found: list[tuple[dict[str, Any], dict[str, Any]]] = []
+
+    def look(on: World) -> None:
+        vars(on.journal)["problem"] = lambda _now_s: None
+        ask = on.supervisor._sockets.handler.answer
+        whole = cast("dict[str, Any]", ask({"verb": "status"}))
+        waiting = whole["supplies"][0]["waiting"][0]
+        found.append((whole, cast("dict[str, Any]", ask({"verb": "status", "bay": waiting}))["bays"][0]))
+
+    with metered(three(), 12.0) as (on, _, _):
+        on.time.call_later(11.0, lambda: look(on))
+        assert on.run() == 0
+    ((whole, waiting),) = found
+    assert [error.message for error in SCHEMA.iter_errors(json.loads(json.dumps(whole)))] == []
+    assert [bay["supply"]["granted"] for bay in whole["bays"] if bay["state"] == "CHARGING"] == [1, 1]
+    first, *others = waiting["limits"]
+    assert waiting["state"] == "SUSPENDED"
+    assert (first["allowed_a"], first["binds"], first["cause"]["key"]) == (0.0, True, "supplies.hall.limit_w")
+    assert first["text"] == waiting["supply"]["text"]
+    assert first["text"].startswith("supply hall: 456 of 460 W are promised (<station>); waits for bay-")
+    assert not any(one["binds"] for one in others)
+    korean = in_language({**whole, "bays": [waiting]}, "ko")
+    assert "460 W 중 456 W" in korean["bays"][0]["limits"][0]["text"]
+    assert "460 W 중 456 W" in korean["supplies"][0]["text"]
 
 
 def test_a_line_that_is_cut_counts_with_the_most_until_its_charger_is_seen_again() -> None:

@@ -53,6 +53,13 @@ def told(cause: Cause | None, wall_s: float = AT_S, language: str = "en") -> str
         ({"uid": 0, "sudo_user": 5, "because": ["x"]}, "stopped by root at 21:09"),
         ({"uid": 0, "sudo_user": "kim", "means": "estop"}, "stopped by estop (root for kim) at 21:09"),
         ({"uid": 0, "because": "{who} {0!r}"}, "stopped by root at 21:09: {who} {0!r}"),
+        (
+            {"uid": NOBODY_S_UID, "by": "page, lee, 10.0.0.7"},
+            f"stopped by uid {NOBODY_S_UID} for page, lee, 10.0.0.7 at 21:09",
+        ),
+        ({"uid": 0, "sudo_user": "kim", "by": "page"}, "stopped by root for kim for page at 21:09"),
+        ({"uid": 0, "by": {"door": "page"}}, "stopped by root at 21:09"),
+        ({"by": "page, lee"}, ""),
         ({}, ""),
     ],
 )
@@ -177,6 +184,26 @@ def test_who_holds_it_may_start_it(by: Asker, spared: bool) -> None:
     assert held_by_others(Operator(hold=Cause("operator_stop")), by.person) is None, "nobody knows whose"
 
 
+def passing(by: str) -> Asker:
+    return asker({"uid": NOBODY_S_UID, "by": by})
+
+
+def test_a_program_that_passes_on_is_as_many_people(bench: Bench) -> None:
+    bench.charging()
+    assert ask(bench, Request.STOP, passing("page, kim")) == ""
+    bench.until(State.HELD)
+    for other in (passing("page, lee"), asker({"uid": NOBODY_S_UID}), lee()):
+        assert ask(bench, Request.START, other, spares=True).startswith(
+            f"left alone: stopped by uid {NOBODY_S_UID} for page, kim"
+        )
+    assert "page, kim" in str(bench.bay.status()["reason"])
+    assert ask(bench, Request.START, passing("page, kim"), spares=True) == ""
+
+
+def test_whose_wish_it_is_has_a_bound() -> None:
+    assert len(passing("x" * 1000).by) == MOST_BECAUSE
+
+
 # --- in the journal ---------------------------------------------------------------------------------------------------
 
 
@@ -190,9 +217,17 @@ def test_a_program_that_asks_without_end_fills_no_journal(bench: Bench) -> None:
     assert len(lines) == BURST + 1
     assert lines[-1] == {
         "request": "stop", "by": "root for kim", "uid": 0, "user": "root", "sudo_user": "kim", "because": "wet floor",
-        "means": "", "accepted": True, "answer": "", "cause": None, "left_out": 500,
+        "passed_on": "", "means": "", "accepted": True, "answer": "", "cause": None, "left_out": 500,
     }  # fmt: skip
 
 
 def test_our_own_name_is_the_system_s() -> None:
     assert asker({"uid": os.getuid()}).person == user_name(os.getuid())
+
+
+def test_the_record_has_the_user_and_whose_wish_it_was(bench: Bench) -> None:
+    RequestLog(bench.journal, lambda: bench.now_s, "en").write("bay-1", "stop", passing("page, lee"), None)
+    (line,) = [fields_of(line) for _, _, _, line in bench.journal._waiting[False] if line[0] == "request"]
+    user = f"uid {NOBODY_S_UID}"
+    assert (line["uid"], line["user"], line["by"]) == (NOBODY_S_UID, user, f"{user} for page, lee")
+    assert line["passed_on"] == "page, lee"

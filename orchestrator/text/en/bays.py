@@ -119,6 +119,7 @@ TEXTS: Mapping[str, str] = {
     "once_not_below": "SOC {soc_pct:.1f} % is not below {target_pct:g} %: {what}",
     "once_reached": "SOC {soc_pct:.1f} % reached {target_pct:g} %: {what}",
     "on_behalf": "{user} for {person}",
+    "passed_on": "{user} for {by}",
     "held_by_others": "left alone: {what}; if it may charge: orchestrator start {bay}, or --force",
     "not_running": "not running: {what}",
     "out_of_control": "the charger was not seen to stop: cut its mains; nothing can be started or reset here before it "

@@ -120,6 +120,7 @@ TEXTS: Mapping[str, str] = {
     "once_not_below": "SOC {soc_pct:.1f} %가 {target_pct:g} % 이상입니다: {what}",
     "once_reached": "SOC {soc_pct:.1f} %가 {target_pct:g} %에 도달했습니다: {what}",
     "on_behalf": "{person}({user} 권한)",
+    "passed_on": "{by}({user}을(를) 통해)",
     "held_by_others": "그대로 두었습니다: {what}. 충전해도 된다면: orchestrator start {bay}, 또는 --force",
     "not_running": "동작 중이 아닙니다: {what}",
     "out_of_control": "충전기의 정지가 확인되지 않았습니다: 주전원을 차단하십시오. {lasts_s:g}초 동안 대기 상태가 유지되기 "

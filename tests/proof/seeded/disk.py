@@ -86,7 +86,8 @@ DISK: tuple[Seed, ...] = (
         (
             f"{SERVICE}store.py",
             "        stamp = self._stamp()\n        with self._lock:\n",
-            '        stamp = self._stamp()\n        os.write(2, b"keeping\\n" * 1000)\n        with self._lock:\n',
+            '        stamp = self._stamp()\n        import os; os.write(2, b"keeping\\n" * 1000)\n'
+            "        with self._lock:\n",
         ),
     ),
     scene(

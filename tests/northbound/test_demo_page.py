@@ -1,0 +1,24 @@
+"""`orchestrator demo --page`: the demo in a browser, until Ctrl-C."""
+
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from urllib.request import urlopen
+
+from tests.waiting import wait_until
+from tests.whole.station import die_with_parent
+
+
+def test_it_says_where_and_ends_on_ctrl_c(tmp_path: Path) -> None:
+    command = [sys.executable, "-P", "-m", "orchestrator", "demo", "--page", "--plain"]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path, preexec_fn=die_with_parent
+    ) as process:
+        assert process.stdout is not None
+        address = next(found[0] for line in process.stdout if (found := re.search(r"http://127\.0\.0\.1:\d+/", line)))
+        wait_until(lambda: b'"bay-1"' in urlopen(f"{address}api/status", timeout=5).read(), 10, "the bay", 0.05)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+    assert (process.returncode, errors) == (0, "")

@@ -1,0 +1,139 @@
+"""The page in Chromium: the real server, the real control socket, and documents of an emulated station."""
+
+import json
+import re
+from collections.abc import Iterator
+
+import pytest
+
+from tests.northbound.browser import PROGRAM, Browser, Tab
+from tests.northbound.shown_station import STATES, Shown, shown
+
+pytestmark = pytest.mark.skipif(PROGRAM is None, reason="no chromium here: apt-get install chromium")
+
+TILES = "document.querySelectorAll('.tile').length"
+FIRST = f"{TILES} > 0"
+HANGUL = re.compile("[가-힣]")
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("profile")) as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:
+    with shown(tmp_path_factory.mktemp("northbound")) as station:
+        yield station
+
+
+@pytest.fixture
+def station(served: Shown) -> Shown:
+    served.document = served.before
+    served.asked.clear()
+    return served
+
+
+@pytest.fixture
+def tab(chromium: Browser, station: Shown) -> Iterator[Tab]:
+    tab = chromium.tab()
+    yield tab
+    tab.value("localStorage.clear()")
+    tab.close()
+
+
+def test_the_first_state_takes_four_requests_and_shows_every_bay(tab: Tab, station: Shown) -> None:
+    tab.open(station.address, FIRST)
+    paths = [url.removeprefix(station.address.rstrip("/")) for url in tab.requests()]
+    needed = [path for path in paths if path != "/static/icon.svg"]  # which nothing waits for
+    assert needed == ["/", "/static/page.css", "/static/page.js", "/api/stream?language=en"]
+    assert tab.value("[...document.querySelectorAll('.tile')].map((one) => one.dataset.state)") == list(STATES)
+    assert [tab.text(f".tile:nth-child({n}) .state").replace("\u00ad", "") for n in (1, 4)] == [
+        "Charging", "Uncontrollable",
+    ]  # fmt: skip
+    danger = next(one for one in station.before["bays"] if one["alarm"] == "danger")
+    assert danger["reason"] in tab.text(".alarms li:first-child")
+    assert tab.complaints() == []
+
+
+def test_stop_is_one_press_away_and_is_followed_to_the_charger(tab: Tab, station: Shown) -> None:
+    tab.open(station.address, FIRST)
+    width, height = tab.value(
+        "(({width, height}) => [width, height])(document.querySelector('.stop').getBoundingClientRect())"
+    )
+    assert min(width, height) >= 48
+    tab.click(".tile:first-child .stop")
+    tab.wait("document.querySelector('.tile:first-child .asked').textContent.includes('● seen at the charger')")
+    (asked,) = station.asked
+    assert (asked["verb"], asked["bays"]) == ("stop", ["bay-1"])
+    assert tab.value("location.pathname") == "/"
+
+
+def test_a_reset_is_held_for_a_second_by_mouse_or_key(tab: Tab, station: Shown) -> None:
+    tab.open(f"{station.address}bay/bay-2", "document.querySelector('button.hold')")
+    assert "bay-2" in tab.text(".acts .hint")
+    tab.mouse("button.hold", "mousePressed")
+    tab.value("new Promise((done) => setTimeout(done, 300))")
+    tab.mouse("button.hold", "mouseReleased")
+    assert station.asked == []
+    tab.value("document.querySelector('button.hold').focus()")
+    tab.key("Enter", 13, "rawKeyDown")
+    tab.wait("document.querySelector('.foot .asked').textContent.includes('● accepted')")
+    tab.key("Enter", 13, "keyUp")
+    assert [one["verb"] for one in station.asked] == ["reset"]  # nothing by the short press
+
+
+def test_every_limit_is_a_line_with_its_place(tab: Tab, station: Shown) -> None:
+    texts = json.dumps([one["text"] for one in station.before["bays"][1]["limits"]])
+    shown_texts = "[...document.querySelectorAll('.limits .text')].map((one) => one.textContent)"
+    tab.open(f"{station.address}bay/bay-2", f"JSON.stringify({shown_texts}) === JSON.stringify({texts})")
+    assert tab.value("document.querySelectorAll('.limits .blocking').length") >= 1
+
+
+def test_korean_is_chosen_in_the_browser_and_kept(tab: Tab, station: Shown) -> None:
+    tab.open(station.address, FIRST)
+    tab.click(".tools button")
+    tab.wait(
+        "document.documentElement.lang === 'ko' && /[가-힣]/.test(document.querySelector('.tile .why').textContent)"
+    )
+    assert HANGUL.search(tab.text("nav")) and HANGUL.search(tab.text(".tile .state"))
+    tab.open(f"{station.address}station", "document.querySelector('.policy')")
+    assert tab.text("h1") == "스테이션"
+
+
+def test_three_tabs_have_one_stream(chromium: Browser, station: Shown) -> None:
+    tabs = [chromium.tab().open(station.address, FIRST) for _ in range(3)]
+    assert sum("/api/stream" in url for tab in tabs for url in tab.requests()) == 1
+    tabs.pop(0).close()
+    station.document = station.after
+    for tab in tabs:  # another one leads now
+        tab.wait("document.querySelector('.tile').dataset.state === 'HELD'")
+        assert not tab.value("document.body.classList.contains('stale')")
+        tab.close()
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_128_bays_fit_a_phone_and_a_wall(chromium: Browser, station: Shown, *, dark: bool) -> None:
+    station.document = station.many(128)
+    width = 1920 if dark else 360
+    tab = chromium.tab(width=width, height=1080 if dark else 740, dark=dark)
+    tab.open(station.address, f"{TILES} === 128")
+    assert tab.value("document.documentElement.scrollWidth") <= width
+    assert tab.value(
+        "[...document.querySelectorAll('.stop')].every((one) => one.offsetWidth >= 48 && one.offsetHeight >= 48)"
+    )
+    tab.value("document.querySelector('input[type=search]').focus()")
+    tab.ask("Input.insertText", text="bay-77")
+    assert tab.value("[...document.querySelectorAll('.tile')].filter((one) => !one.hidden).length") == 1
+    tab.close()
+
+
+def test_what_is_old_says_so_at_once(tab: Tab, station: Shown) -> None:
+    tab.open(station.address, FIRST)
+    station.kill()
+    tab.wait(r"/^Not connected for \d+ s: values are old$/.test(document.querySelector('.lost').textContent)")
+    assert tab.value("document.body.classList.contains('stale')")
+    assert tab.value("getComputedStyle(document.querySelector('main')).filter") == "grayscale(1)"
+    tab.click(".tile:first-child .stop")
+    tab.wait("document.querySelector('.tile:first-child .asked').textContent.includes('Not delivered')")
