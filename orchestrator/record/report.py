@@ -9,10 +9,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from orchestrator.model import Cause
+from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
 from orchestrator.record.sections import Row, Section, heads
 from orchestrator.record.stamp import from_fields
-from orchestrator.record.table import DASH, began, lasted, why_ended
+from orchestrator.record.table import DASH, began, why_ended
 from orchestrator.record.utc import unix_s
 from orchestrator.text.catalogue import say
 
@@ -47,9 +48,9 @@ class Sum:
         if cause_of(charge) == FULL:
             self.full_s.append(charge["lasted_s"])
 
-    def cells(self) -> Row:
+    def cells(self, language: str) -> Row:
         """As a table has it."""
-        mean = lasted(sum(self.full_s) / len(self.full_s)) if self.full_s else DASH
+        mean = say(lasting(sum(self.full_s) / len(self.full_s)), language) if self.full_s else DASH
         return str(self.charges), str(len(self.full_s)), f"{self.ah:.1f}", f"{self.wh / 1000:.2f}", mean
 
 
@@ -77,8 +78,8 @@ def report(month: str, charges: Iterable[Record], language: str) -> list[Section
     for charge in all_:
         total.add(charge)
         bays[charge["bay"]].add(charge)
-    rows = [(bay, *of.cells()) for bay, of in sorted(bays.items())]
-    everything = (say(Cause("report_total"), language), *total.cells())
+    rows = [(bay, *of.cells(language)) for bay, of in sorted(bays.items())]
+    everything = (say(Cause("report_total"), language), *total.cells(language))
     stations = tuple(sorted({charge["station"] for charge in all_}))
     title = Cause.of("report_of", month=month, stations=stations, zones=tuple(zones(all_)))
     table = (heads("report_head", language), *rows, everything)

@@ -4,10 +4,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from orchestrator.model import Cause
+from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
 from orchestrator.record.sections import Section
 from orchestrator.record.stamp import from_fields
-from orchestrator.record.table import began, ended, lasted, length_s, sentence, value_rows, why_ended
+from orchestrator.record.table import began, ended, length_s, sentence, value_rows, why_ended
 from orchestrator.text.catalogue import say
 
 #: How it is said where a battery's id is from.
@@ -21,7 +22,7 @@ def sections(charge: Record, language: str) -> list[Section]:
     try:
         return [
             Section("", [(say(cause, language),) for cause in _head(charge, language)]),
-            Section("", value_rows(charge), has_head=True),
+            Section("", value_rows(charge, language), has_head=True),
             *(
                 Section(say(Cause(id_), language), [(line,) for line in found(charge, language)])
                 for id_, found in (("charge_rules", _rules), ("charge_pauses", _pauses), ("charge_faults", _faults))
@@ -45,7 +46,7 @@ def _head(charge: Record, language: str) -> Iterator[Cause]:
     policy, by = charge["policy"], charge.get("by")
     yield Cause.of("charge_of", id=charge["id"], bay=charge["bay"], station=charge["station"])
     yield battery(charge["battery"])
-    yield Cause.of("charge_time", begin_at=began(charge), end_at=ended(charge), lasted=lasted(length_s(charge)))
+    yield Cause.of("charge_time", begin_at=began(charge), end_at=ended(charge), lasted=lasting(length_s(charge)))
     yield Cause.of("charge_ended", why=why_ended(charge, language))
     yield Cause.of("charge_took", **charge["charger"], bmu_ah=charge["bmu"]["ah"], bmu_wh=charge["bmu"]["wh"])
     yield Cause.of("charge_policy", policy=policy["name"], sha256=policy["sha256"], software=charge["software"])
@@ -57,7 +58,7 @@ def _head(charge: Record, language: str) -> Iterator[Cause]:
 
 def _rules(charge: Record, language: str) -> Iterator[str]:
     for rule in charge["rules"]:
-        what: dict[str, Any] = {"lasted": lasted(rule["s"]), "ah": rule["ah"]}
+        what: dict[str, Any] = {"lasted": lasting(rule["s"]), "ah": rule["ah"]}
         if rule["key"]:
             yield say(Cause.of("charge_rule", rule=rule["key"], at_line=rule["place"], **what), language)
         else:
@@ -66,7 +67,7 @@ def _rules(charge: Record, language: str) -> Iterator[str]:
 
 def _pauses(charge: Record, language: str) -> Iterator[str]:
     for pause in charge["pauses"]:
-        length = DASH if pause["lasted_s"] is None else lasted(pause["lasted_s"])
+        length = DASH if pause["lasted_s"] is None else say(lasting(pause["lasted_s"]), language)
         yield f"{from_fields(pause).local()}, {length}: {sentence(pause['cause'], language)}"
 
 

@@ -9,11 +9,12 @@ from typing import Any
 from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain
+from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
+from orchestrator.record.sections import heads
 from orchestrator.record.stamp import Stamp, from_fields
 from orchestrator.text.catalogue import say
 
-HEAD = ("BEGAN", "BAY", "BATTERY", "LASTED", "SOC", "AH", "KWH", "WHY IT ENDED")
 #: With less room for the reason, it goes below its charge.
 LEAST_WHY = 24
 DASH = "–"
@@ -21,13 +22,12 @@ DASH = "–"
 BOM = "\ufeff"
 #: What a spreadsheet takes for a formula, and for a number or a date.
 FORMULA, LIKE_NUMBER = ("=", "+", "-", "@", "\t", "\r"), re.compile(r"[\s.,:/]*\d[\d\s.,:/%eE+-]*")
-VALUES_HEAD = ("", "BEGIN", "END", "LOWEST", "HIGHEST")
 
 
 def table(charges: Sequence[Record], language: str, width: int) -> str:
     """One line a charge, where there is room."""
-    rows = [HEAD, *(_cells(charge, language) for charge in charges)]
-    widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
+    rows = [heads("charges_head", language), *(_cells(charge, language) for charge in charges)]
+    widths = [max(width_of(row[column]) for row in rows) for column in range(len(rows[0]) - 1)]
     lines = []
     for number, cells in enumerate(rows):
         fixed, why = beside(cells[:-1], widths, width), cells[-1]
@@ -44,7 +44,7 @@ def _cells(charge: Record, language: str) -> tuple[str, ...]:
         began(charge)[:16],
         str(charge.get("bay", DASH)),
         str(battery.get("id", DASH)),
-        lasted(length_s(charge)),
+        say(lasting(length_s(charge)), language),
         f"{soc['begin']:.0f}→{soc['end']:.0f} %" if soc else DASH,
         f"{charge['charger']['ah']:.2f}",
         f"{charge['charger']['wh'] / 1000:.3f}",
@@ -89,23 +89,15 @@ def _stamp(charge: Record, name: str) -> Stamp:
         return Stamp(0.0, 0, 0.0, "")
 
 
-def lasted(seconds: float) -> str:
-    """A length of time in two units."""
-    minutes, hours = int(seconds) // 60, int(seconds) // 3600
-    if hours:
-        return f"{hours} h {minutes % 60:02} min"
-    return f"{minutes} min" if minutes else f"{int(seconds)} s"
-
-
-def value_rows(charge: Record) -> list[tuple[str, ...]]:
+def value_rows(charge: Record, language: str) -> list[tuple[str, ...]]:
     """The measured values, as a table with its head; none if nothing was known."""
     known = charge.get("values") or {}
     rows = [
-        (name, *(f"{one[part]:g}" for part in ("begin", "end", "lowest", "highest")))
+        (say(Cause(f"row_{name}"), language), *(f"{one[part]:g}" for part in ("begin", "end", "lowest", "highest")))
         for name, one in known.items()
         if one
     ]
-    return [VALUES_HEAD, *rows] if rows else []
+    return [heads("values_head", language), *rows] if rows else []
 
 
 #: The columns of the CSV: name → where it is in a record.

@@ -10,7 +10,7 @@ from orchestrator.columns import folded, width_of
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain, without_then
 from orchestrator.page import Block, all_cut, loud
-from orchestrator.service.lasting import lasting, session_figures
+from orchestrator.record.lasting import lasting, session_figures
 from orchestrator.service.wallclock import WallClock
 from orchestrator.show import (
     Bay,

@@ -8,9 +8,9 @@ from typing import Any
 
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain, said, without_then
+from orchestrator.record.lasting import session_figures
 from orchestrator.record.utc import unix_s
 from orchestrator.service.journal_files import Fields, records_of
-from orchestrator.service.lasting import session_figures
 from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import say
 

@@ -113,7 +113,7 @@ def test_one_charge_is_shown_by_the_end_of_its_id(journal: Path, capsys: pytest.
     assert "ended: stopped by the operator" in page
     assert "Pauses:" in page
     assert "paused by the operator" in page
-    assert "soc_pct" in page
+    assert "SOC, %" in page
 
 
 def test_an_empty_record_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

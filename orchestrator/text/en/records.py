@@ -8,6 +8,15 @@ TEXTS: Mapping[str, str] = {
     "end_unseen": "nobody saw the end of this charge",
     # the charges on record
     "charge_open": "not ended",
+    "charges_head": "BEGAN|BAY|BATTERY|LASTED|SOC|AH|KWH|WHY IT ENDED",
+    "values_head": "|BEGIN|END|LOWEST|HIGHEST",
+    "row_soc_pct": "SOC, %",
+    "row_soh_pct": "SOH, %",
+    "row_pack_v": "pack, V",
+    "row_pack_a": "pack, A",
+    "row_temperature_c": "pack, °C",
+    "row_charger_v": "charger, V",
+    "row_charger_a": "charger, A",
     "charges_none": "no charge on record",
     "charges_none_such": "there are charges on record, but none of these",
     "charges_more": "the newest {shown}; there are more: --limit 0 lists all",
@@ -41,6 +50,7 @@ TEXTS: Mapping[str, str] = {
     "curve_pause": "charger not told to run; time in h:min since the begin",
     # batteries
     "batteries_head": "BATTERY|ID FROM|CHARGES|FIRST|LAST|AH|KWH|SOH",
+    "battery_sources": "{sources:word}",
     "battery_unknown": "no charge of a battery {battery} is on record; orchestrator battery lists those that are",
     "battery_life": "battery {battery}, {begin_at} to {end_at}; charges: {charges}, {ah:.1f} Ah, {wh:.0f} Wh",
     "battery_ids": "Where its id is from:",

@@ -8,6 +8,15 @@ TEXTS: Mapping[str, str] = {
     "end_unseen": "이 충전의 종료가 확인되지 않았습니다",
     # the charges on record
     "charge_open": "종료되지 않음",
+    "charges_head": "시작|베이|배터리|소요 시간|SOC|AH|KWH|종료 이유",
+    "values_head": "|시작|종료|최저|최고",
+    "row_soc_pct": "SOC(%)",
+    "row_soh_pct": "SOH(%)",
+    "row_pack_v": "팩(V)",
+    "row_pack_a": "팩(A)",
+    "row_temperature_c": "팩(°C)",
+    "row_charger_v": "충전기(V)",
+    "row_charger_a": "충전기(A)",
     "charges_none": "충전 기록이 없습니다",
     "charges_none_such": "해당하는 충전 기록이 없습니다. 다른 기록은 있습니다",
     "charges_more": "최근 {shown}건입니다. 모두 보려면 --limit 0",
@@ -41,6 +50,7 @@ TEXTS: Mapping[str, str] = {
     "curve_pause": "충전기에 운전 명령이 없던 구간. 시간은 시작부터의 시:분",
     # batteries
     "batteries_head": "배터리|ID 출처|충전|처음|최근|AH|KWH|SOH",
+    "battery_sources": "{sources:word}",
     "battery_unknown": "배터리 {battery}의 충전 기록이 없습니다. 기록이 있는 배터리는 orchestrator battery로 볼 수 있습니다",
     "battery_life": "배터리 {battery}: {begin_at} ~ {end_at} 충전 {charges}회, {ah:.1f} Ah, {wh:.0f} Wh",
     "battery_ids": "ID 출처:",
