@@ -135,7 +135,7 @@ class BayRunner:
         before, clock = self._revision, WallClock(now_s, time())
         due = self._timer.due(clock)  # in any case: the first time reads what was kept
         asked = self._requests.take() or (due if self.decision is not None else ())
-        taken = self._taken = self._timer.take(Taken.of(asked, self._memory, self.name), self.decision)
+        taken = self._taken = self._timer.take(Taken.of(asked, self._memory, self.name), self.decision, clock)
         try:
             self._step(now_s, asleep_s, taken.request)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
@@ -236,7 +236,7 @@ class BayRunner:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
         decision = told(self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER), *known)
-        contactor = self._contactor
+        decision, contactor = self._timer.told(decision), self._contactor
         return {
             **bay_status(self.name, self._snapshot, decision, clock.now_s, clock.wall_s, self._language),
             **outlook(decision, *known, clock, self._language, closely=closely),

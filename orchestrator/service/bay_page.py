@@ -143,8 +143,9 @@ def _devices(bay: Bay, language: str) -> Iterator[Line]:
     if bay["step"] is not None:
         shown.append(f"STEP {step_of(bay['step'], bay.get('step_current_a'))}")
     yield "page_charger", "", ", ".join([*shown, *([str(bay["port"])] if bay.get("port") else [])]) or "–"
+    coming = cast("Mapping[str, object]", bay.get("next") or {}).get("text")
     notes = below({**bay, "faults": []}, language)  # as below its line in the table
-    yield from (("page_notes", "", text) for text in notes)
+    yield from (("page_notes", "", text) for text in notes if text != coming)
 
 
 def _figures(part: Mapping[str, object], forms: Mapping[str, str], old: Container[str], language: str) -> Iterator[str]:

@@ -87,6 +87,7 @@ TEXTS: Mapping[str, str] = {
     # requests
     "operator_stop": "stopped by the operator",
     "operator_pause": "paused by the operator",
+    "operator_start": "started by the operator",
     "operator_reset": "reset by the operator",
     "stopped_by": "stopped by {who} at {asked_at}",
     "estopped_by": "stopped by estop ({who}) at {asked_at}",
@@ -98,6 +99,8 @@ TEXTS: Mapping[str, str] = {
     "started_later_to_by": "started at {start_at}, as {who} asked at {asked_at}, once to {target_pct:g} %",
     "starts_at": "starts at {start_at} (asked by {who} at {asked_at})",
     "starts_at_to": "starts at {start_at} and charges once to {target_pct:g} % (asked by {who} at {asked_at})",
+    "start_tried": "was to start at {start_at} (asked by {who} at {asked_at}) and is tried again until {until_at}: {why}",
+    "start_cancelled": "the start at {start_at}, asked by {who} at {asked_at}, is cancelled: {why}",
     "start_not_made": "the start at {start_at}, asked by {who} at {asked_at}, was not made: {why}",
     "start_it_now": "to start it now: orchestrator start {bay}",
     "start_too_late": "it could only be made {late_min:.0f} min late",

@@ -87,6 +87,7 @@ TEXTS: Mapping[str, str] = {
     # requests
     "operator_stop": "작업자가 정지했습니다",
     "operator_pause": "작업자가 일시 정지했습니다",
+    "operator_start": "작업자가 시작했습니다",
     "operator_reset": "작업자가 리셋했습니다",
     "stopped_by": "{who}이(가) {asked_at}에 정지했습니다",
     "estopped_by": "{who}이(가) {asked_at}에 estop으로 정지했습니다",
@@ -99,6 +100,8 @@ TEXTS: Mapping[str, str] = {
     "충전합니다",
     "starts_at": "{start_at}에 시작합니다({who}, {asked_at} 요청)",
     "starts_at_to": "{start_at}에 시작하여 한 번 {target_pct:g} %까지 충전합니다({who}, {asked_at} 요청)",
+    "start_tried": "{start_at}에 시작할 예정이었으며({who}, {asked_at} 요청) {until_at}까지 다시 시도합니다: {why}",
+    "start_cancelled": "{who}이(가) {asked_at}에 요청한 {start_at} 시작이 취소되었습니다: {why}",
     "start_not_made": "{who}이(가) {asked_at}에 요청한 {start_at} 시작을 실행하지 않았습니다: {why}",
     "start_it_now": "지금 시작하려면: orchestrator start {bay}",
     "start_too_late": "{late_min:.0f}분 늦게야 실행할 수 있었습니다",
