@@ -10,15 +10,13 @@ from dataclasses import dataclass, field
 
 from orchestrator.model import Cause
 from orchestrator.record.lasting import lasting
-from orchestrator.record.lines import Record
+from orchestrator.record.lines import FULL, Record
 from orchestrator.record.sections import Row, Section, heads
 from orchestrator.record.stamp import from_fields
 from orchestrator.record.table import DASH, began, why_ended
 from orchestrator.record.utc import unix_s
 from orchestrator.text.catalogue import say
 
-#: How a charge ends that was not cut short.
-FULL = "full"
 #: Faults of these effects are of account, …
 GRAVE = frozenset({"STOP", "TRIP"})
 #: … a pack below this is commonly called worn out, …

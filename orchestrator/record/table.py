@@ -11,6 +11,7 @@ from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain
 from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
+from orchestrator.record.row import open_pause
 from orchestrator.record.sections import heads
 from orchestrator.record.stamp import Stamp, from_fields
 from orchestrator.text.catalogue import say
@@ -53,9 +54,14 @@ def _cells(charge: Record, language: str) -> tuple[str, ...]:
 
 
 def why_ended(charge: Record, language: str) -> str:
-    """The sentence for its result; of an open charge that it goes on."""
-    result = charge.get("result")
-    return sentence(result, language) if result else say(Cause("charge_open"), language)
+    """The sentence for its result; of an open charge since when it has paused and why, or when it last was recorded."""
+    if result := charge.get("result"):
+        return sentence(result, language)
+    pause = charge["pause"] if "pause" in charge else open_pause(charge)
+    if pause is None:
+        return say(Cause.of("charge_open", last_at=ended(charge)), language)
+    since = from_fields(pause).local()
+    return say(Cause.of("charge_paused", begin_at=since, why=sentence(pause["cause"], language)), language)
 
 
 def sentence(cause: object, language: str) -> str:

@@ -17,7 +17,7 @@ from orchestrator.record.monthfile import DAMAGED, Known, Reader, is_continued, 
 from orchestrator.record.row import COLUMNS, TYPES, as_row
 
 #: Of these tables; another one is built anew.
-VERSION = 1
+VERSION = 2
 _CHARGES = ", ".join(f"{column} {TYPES[kind]}" for column, (kind, _) in COLUMNS.items())
 SCHEMA = f"""
 CREATE TABLE files (name TEXT PRIMARY KEY, read INTEGER, crc INTEGER, tail INTEGER) WITHOUT ROWID;

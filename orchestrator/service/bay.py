@@ -187,7 +187,7 @@ class BayRunner:
         self._timer.decided(self._taken, decision.answer, clock)
         self._keep(self._memory, now_s)
         if self._record is not None:
-            self._record.take(clock, snapshot, decision, self.policy.rules.bay, self.identified.identity)
+            self._record.take(clock, snapshot, decision, self.policy.rules, self.identified.identity, self._memory)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """Everything known about the bay now."""
