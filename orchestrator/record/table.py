@@ -8,7 +8,7 @@ from typing import Any
 
 from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
-from orchestrator.model.cause import from_plain
+from orchestrator.model.cause import from_plain, without_then
 from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
 from orchestrator.record.row import open_pause
@@ -65,9 +65,9 @@ def why_ended(charge: Record, language: str) -> str:
 
 
 def sentence(cause: object, language: str) -> str:
-    """The sentence for a cause in a record; its data where it is not understood here."""
+    """The sentence for a cause in a record, without what came next; its data where it is not understood here."""
     try:
-        return say(from_plain(cause), language)
+        return say(without_then(from_plain(cause)), language)
     except ValueError:
         return str(cause)
 

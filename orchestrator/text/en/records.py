@@ -82,6 +82,7 @@ TEXTS: Mapping[str, str] = {
     "look_faults": "faults stopped its charges, {times} in all: {faults:word}",
     "look_soh": "its BMU reports SOH {soh_pct:.0f} %, below {least_pct:.0f} %",
     "look_amounts": "{ah:.1f} Ah by the charger, {bmu_ah:.1f} Ah by its BMU: check which of them measures wrong",
+    "output_failed": "the output could not be written, and is not complete: {error:word}",
     "page_not_written": "{file} cannot be written: {error}",
     # the index
     "index_damaged": "the index of the records was damaged ({error}): it is kept as {file}, and a new one was built",

@@ -82,6 +82,7 @@ TEXTS: Mapping[str, str] = {
     "look_faults": "고장으로 충전이 모두 {times}회 중단되었습니다: {faults:word}",
     "look_soh": "BMU가 보고한 SOH가 {soh_pct:.0f} %로 {least_pct:.0f} % 미만입니다",
     "look_amounts": "충전기 기준 {ah:.1f} Ah, BMU 기준 {bmu_ah:.1f} Ah입니다. 어느 쪽의 측정이 틀렸는지 확인하십시오",
+    "output_failed": "출력을 쓸 수 없어 완전하지 않습니다: {error:word}",
     "page_not_written": "{file}을(를) 쓸 수 없습니다: {error}",
     # the index
     "index_damaged": "기록의 색인이 손상되어({error}) {file}(으)로 옮겨 두고 새로 만들었습니다",
