@@ -47,12 +47,13 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -
 
 
 def test_the_table_has_the_newest_charge_first(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    head, newest, stopped, full = said(capsys, "--journal", str(journal)).splitlines()
+    head, newest, stopped, full, total = said(capsys, "--journal", str(journal)).splitlines()
     assert head.split()[:4] == ["BEGAN", "BAY", "BATTERY", "LASTED"]
     assert "  not ended; last recorded at 2026-11-28 " in newest
     assert stopped.endswith("stopped by the operator")
     assert "50→100 %" in full
     assert "full: SOC 100 %" in full
+    assert re.fullmatch(r"3 charges: \d\.\d\d Ah, 0\.\d{3} kWh", total)
 
 
 def test_the_table_fits_a_terminal(

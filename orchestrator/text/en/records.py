@@ -20,6 +20,7 @@ TEXTS: Mapping[str, str] = {
     "row_charger_a": "charger, A",
     "charges_none": "no charge on record",
     "charges_none_such": "there are charges on record, but none of these",
+    "charges_total": "{charges} charges: {ah:.2f} Ah, {kwh:.3f} kWh",
     "charges_more": "the newest {shown}; there are more: --limit 0 lists all",
     "charges_unreadable": "{folder} cannot be read: {error}",
     "charge_unknown": "no charge on record has an id that ends with {id}",

@@ -20,6 +20,7 @@ TEXTS: Mapping[str, str] = {
     "row_charger_a": "충전기(A)",
     "charges_none": "충전 기록이 없습니다",
     "charges_none_such": "해당하는 충전 기록이 없습니다. 다른 기록은 있습니다",
+    "charges_total": "충전 {charges}건: {ah:.2f} Ah, {kwh:.3f} kWh",
     "charges_more": "최근 {shown}건입니다. 모두 보려면 --limit 0",
     "charges_unreadable": "{folder}을(를) 읽을 수 없습니다: {error}",
     "charge_unknown": "ID가 {id}(으)로 끝나는 충전 기록이 없습니다",
