@@ -112,8 +112,13 @@ def _end_v(charge: Charge) -> float | None:
 
 
 def resumed(charge: Charge, look: Look, session: Session) -> Charge:
-    """The charge of an earlier run of the service, after the first decision of this one."""
-    pauses = pause.died(charge.pauses, charge.last, _died(charge))
+    """The charge of an earlier run of the service, after the first decision of this one.
+
+    By the core's counters it has gone on after its last record: the pause began no earlier.
+    """
+    more_s = max(session.energised_s - charge.amounts.counted.energised_s, 0.0)
+    seen = replace(charge, last=charge.last.back(-more_s))
+    pauses = pause.died(charge.pauses, seen.last, _died(seen))
     then = replace(charge, pauses=pauses, started_s=session.started_s, written=look.stamp, due=True)
     return follow(then, look, resumed=True)
 

@@ -178,6 +178,7 @@ def test_a_running_charge_is_recorded_again_and_again(kept: Kept) -> None:
 def test_a_death_of_the_service_is_a_pause_of_the_same_charge(kept: Kept) -> None:
     kept.bench.charging()
     kept.bench.step(400)  # beyond a checkpoint
+    died_s = kept.wall()
     persisted = kept.persisted()
     assert persisted.session is not None
     before_ah = persisted.session.charged_ah
@@ -202,6 +203,7 @@ def test_a_death_of_the_service_is_a_pause_of_the_same_charge(kept: Kept) -> Non
     (pause,) = end["pauses"]
     assert pause["cause"]["id"] == "service_died"
     assert pause["lasted_s"] > 60
+    assert pause["unix_s"] == pytest.approx(died_s, abs=1.0), "by the core's counters, not at the last record"
     assert end["charger"]["ah"] > before_ah
     assert end["charger"]["ah"] == pytest.approx(end["counted"][0], abs=1e-5)
 

@@ -181,10 +181,10 @@ def test_the_usual_table_is_the_newest_fifty(
     def lines(*arguments: str) -> list[str]:
         return said(capsys, "--journal", str(tmp_path), *arguments).splitlines()
 
-    assert len(lines()) == 52
+    assert len(lines()) == 53
     assert lines()[-1] == "the newest 50; there are more: --limit 0 lists all"
-    assert len(lines("--limit", "50")) == 51
-    assert len(lines("--limit", "0")) == len(lines("--since", "2026-11-01")) == len(lines("--csv")) == 61
+    assert len(lines("--limit", "50")) == 52
+    assert len(lines("--limit", "0")) == len(lines("--since", "2026-11-01")) == 1 + len(lines("--csv")) == 62
 
 
 def test_the_index_is_built_anew_when_asked(
