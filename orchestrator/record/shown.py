@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from orchestrator.model import Cause
+from orchestrator.model.cause import said
 from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
 from orchestrator.record.sections import Section
@@ -47,7 +48,8 @@ def _head(charge: Record, language: str) -> Iterator[Cause]:
     yield Cause.of("charge_of", id=charge["id"], bay=charge["bay"], station=charge["station"])
     yield battery(charge["battery"])
     yield Cause.of("charge_time", begin_at=began(charge), end_at=ended(charge), lasted=lasting(length_s(charge)))
-    yield Cause.of("charge_ended", why=why_ended(charge, language))
+    why = why_ended(charge, language)
+    yield Cause.of("charge_ended", why=why) if charge.get("result") else said(why)
     yield Cause.of("charge_took", **charge["charger"], bmu_ah=charge["bmu"]["ah"], bmu_wh=charge["bmu"]["wh"])
     yield Cause.of("charge_policy", policy=policy["name"], sha256=policy["sha256"], software=charge["software"])
     for change in charge.get("changes", ()):
