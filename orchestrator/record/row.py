@@ -15,7 +15,7 @@ COLUMNS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "id": (NAME, ("id",)), "type": (NAME, ("type",)), "station": (NAME, ("station",)), "bay": (NAME, ("bay",)),
     "port": (NAME, ("port",)), "battery": (NAME, ("battery", "id")), "battery_source": (NAME, ("battery", "source")),
     "policy": (NAME, ("policy", "name")), "policy_sha256": (NAME, ("policy", "sha256")),
-    "software": (NAME, ("software",)), "by": (JSON, ("by",)),
+    "capacity_ah": (KNOWN, ("policy", "capacity_ah")), "software": (NAME, ("software",)), "by": (JSON, ("by",)),
     "begin_utc": (NAME, ("begin", "utc")), "begin_unix_s": (NUMBER, ("begin", "unix_s")),
     "begin_offset_min": (NUMBER, ("begin", "offset_min")),
     "last_utc": (NAME, ("last", "utc")), "last_unix_s": (NUMBER, ("last", "unix_s")),
@@ -29,6 +29,7 @@ COLUMNS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "temperature_highest_c": (KNOWN, ("values", "temperature_c", "highest")),
     "step_changes": (NUMBER, ("step_changes",)), "stop_verified_ms": (KNOWN, ("stop_verified_ms",)),
     "result": (JSON, ("result",)), "pause": (JSON, ("pause",)), "faults": (JSON, ("faults",)),
+    "stretch": (JSON, ("measured", "stretch")),
 }  # fmt: skip
 #: Of each fault; its cause stands in the record.
 FAULT = ("id", "effect", "times")
@@ -48,6 +49,8 @@ def as_row(record: Record) -> tuple[object, ...]:
             "result": record.get("result"),
             "pause": open_pause(record),
             "faults": faults,
+            "policy": {"capacity_ah": None, **record["policy"]},  # earlier versions have neither this …
+            "measured": record.get("measured") or {"stretch": None},  # … nor that
         }
         return tuple(_value(kind, path, said) for kind, path in COLUMNS.values())
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:

@@ -9,6 +9,7 @@ from typing import Any
 from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain, without_then
+from orchestrator.model.identity import Source
 from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
 from orchestrator.record.row import open_pause
@@ -106,7 +107,7 @@ def value_rows(charge: Record, language: str) -> list[tuple[str, ...]]:
     return [heads("values_head", language), *rows] if rows else []
 
 
-#: The columns of the CSV: name → where it is in a record.
+#: The columns of the CSV: name → where it is in a record. The last ones are named as in OCPP 2.1's BatteryData.
 COLUMNS = {
     "id": ("id",), "station": ("station",), "bay": ("bay",), "battery": ("battery", "id"),
     "battery_source": ("battery", "source"), "begin": ("begin", "utc"), "end": ("end", "utc"),
@@ -116,6 +117,7 @@ COLUMNS = {
     "soh_pct": ("values", "soh_pct", "end"), "temperature_highest_c": ("values", "temperature_c", "highest"),
     "step_changes": ("step_changes",), "policy": ("policy", "name"), "policy_sha256": ("policy", "sha256"),
     "by": ("by",), "result": ("result", "id"), "stop_verified_ms": ("stop_verified_ms",),
+    "serialNumber": ("serialNumber",), "soC": ("values", "soc_pct", "end"), "soH": ("values", "soh_pct", "end"),
 }  # fmt: skip
 
 
@@ -123,8 +125,14 @@ def as_csv(charges: Iterable[Record], language: str) -> Iterator[str]:
     """RFC 4180, line by line; causes are sentences, and the last column is why it ended."""
     yield BOM + _line([*COLUMNS, "why"])
     for charge in charges:
-        found = [*(_found(charge, path) for path in COLUMNS.values()), why_ended(charge, language)]
+        named = {**charge, "serialNumber": _serial_number(charge.get("battery") or {})}
+        found = [*(_found(named, path) for path in COLUMNS.values()), why_ended(charge, language)]
         yield _line([_guarded(sentence(value, language) if isinstance(value, dict) else value) for value in found])
+
+
+def _serial_number(battery: Record) -> str | None:
+    """The battery's, as its BMU tells it: what somebody has typed, or is assumed, is none."""
+    return str(battery.get("id")) if battery.get("source") == Source.SERIAL_NUMBER.value else None
 
 
 def _line(cells: Sequence[object]) -> str:

@@ -23,6 +23,7 @@ CREATE TABLE files (name TEXT PRIMARY KEY, read INTEGER, crc INTEGER, tail INTEG
 CREATE TABLE pieces (id TEXT, type TEXT, n INTEGER, file TEXT, at INTEGER, length INTEGER, PRIMARY KEY (id, type))
 WITHOUT ROWID;
 CREATE TABLE charges ({_CHARGES}, PRIMARY KEY (id)) WITHOUT ROWID;
+CREATE INDEX charges_of_battery ON charges (battery);
 PRAGMA user_version = {VERSION};
 """
 _INSERT = f"INSERT OR REPLACE INTO charges VALUES ({', '.join('?' * len(COLUMNS))})"  # noqa: S608 - question marks

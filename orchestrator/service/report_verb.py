@@ -7,7 +7,7 @@ from orchestrator.columns import json_text, own_width
 from orchestrator.errors import UsageError
 from orchestrator.model import Cause
 from orchestrator.record.charges import Charges
-from orchestrator.record.health import YEAR_S, health
+from orchestrator.record.health import YEAR_S, for_capacity, health
 from orchestrator.record.health_shown import warning
 from orchestrator.record.lines import Record
 from orchestrator.record.report import MONTH, as_fields, is_of, report, span_s
@@ -45,9 +45,8 @@ def _warnings(charges: Charges, month: str, of: Sequence[Record]) -> Mapping[str
     """What the health of these charges' batteries was at the month's end, if somebody must look at them."""
     end_s, found = span_s(month)[1], dict[str, Sequence[Cause]]()
     for battery in {str(charge["battery"]["id"]) for charge in of}:
-        year = charges.listed(battery=battery, began_s=(end_s - YEAR_S, end_s))
-        whole = charges.whole([charge["id"] for charge in year])
-        if (cause := warning(health(battery, whole))) is not None:
+        year = charges.listed(battery=battery, began_s=(end_s - YEAR_S, end_s))  # whole records would take minutes
+        if (cause := warning(health(battery, map(for_capacity, year)))) is not None:
             found[battery] = (cause,)
     return found
 

@@ -13,6 +13,7 @@ from orchestrator.columns import width_of
 from orchestrator.model import Request, State
 from orchestrator.record import index
 from orchestrator.record.lines import encoded
+from orchestrator.record.table import as_csv
 from tests.record.kept import Kept
 from tests.record.made import end
 
@@ -104,6 +105,11 @@ def test_csv_is_what_a_spreadsheet_reads(journal: Path, capsys: pytest.CaptureFi
     assert full["begin"].endswith("Z")
     assert full["end"].endswith("Z")
     assert float(full["charger_ah"]) > 0
+    assert (full["soC"], full["soH"], full["serialNumber"]) == (full["soc_end_pct"], full["soh_pct"], ""), (
+        "OCPP's names"
+    )
+    told = {**end(1, 1), "battery": {"id": "SN-7", "source": "serial_number"}}
+    assert list(csv.DictReader(io.StringIO("".join(as_csv([told], "en")))))[0]["serialNumber"] == "SN-7"
 
 
 def test_one_charge_is_shown_by_the_end_of_its_id(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
