@@ -109,7 +109,8 @@ def test_csv_is_what_a_spreadsheet_reads(journal: Path, capsys: pytest.CaptureFi
         "OCPP's names"
     )
     told = {**end(1, 1), "battery": {"id": "SN-7", "source": "serial_number"}}
-    assert list(csv.DictReader(io.StringIO("".join(as_csv([told], "en")))))[0]["serialNumber"] == "SN-7"
+    (row,) = csv.DictReader(io.StringIO("".join(as_csv([told], "en"))))
+    assert row["serialNumber"] == "SN-7"
 
 
 def test_one_charge_is_shown_by_the_end_of_its_id(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
