@@ -141,7 +141,7 @@ def _devices(bay: Bay, language: str) -> Iterator[Line]:
     yield "page_battery", "", ", ".join(shown) or "–"
     shown = list(_figures(charger, CHARGER, tuple(CHARGER) if charger.get("old") else (), language))
     if bay["step"] is not None:
-        shown.append(f"STEP {step_of(bay['step'], bay.get('step_current_a'))}")
+        shown.append(say(Cause.of("page_step", step=step_of(bay["step"], bay.get("step_current_a"))), language))
     yield "page_charger", "", ", ".join([*shown, *([str(bay["port"])] if bay.get("port") else [])]) or "–"
     coming = cast("Mapping[str, object]", bay.get("next") or {}).get("text")
     notes = below({**bay, "faults": []}, language)  # as below its line in the table
