@@ -108,7 +108,8 @@ ANSWERS = (
     ),
     Answer(
         "Does it start by itself, and when?",
-        "NEXT says it. BATTERY begins with which one it is. If the start could not be made, NOTES says why, for a day.",
+        "NEXT says it. BATTERY begins with which one it is. "
+        "If it was not made, or a stop or a pause has cancelled it, NOTES says why, for a day.",
         "status bay-4",
     ),
     Answer(
