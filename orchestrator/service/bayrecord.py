@@ -1,7 +1,7 @@
 """One bay's charges, kept for the record: folds the bay's decisions, and has the recorder write what is due."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from time import localtime
@@ -17,7 +17,7 @@ from orchestrator.record import charge as charges
 from orchestrator.record import lines
 from orchestrator.record.charge import Charge
 from orchestrator.record.curve import Curve
-from orchestrator.record.look import Look
+from orchestrator.record.look import Foreseen, Look
 from orchestrator.record.stamp import Stamp
 from orchestrator.service.forecast import foresee
 from orchestrator.service.past import Place
@@ -49,7 +49,7 @@ class BayRecord:
         Nothing that fails here may reach the charger.
         """
         try:
-            look = replace(self._look(clock, snapshot, decision), foresee=partial(foresee, snapshot, memory, rules))
+            look = self._look(clock, snapshot, decision, partial(foresee, snapshot, memory, rules))
             self._early.append((look, rules.bay, identity))
             while self._early and self._recorder.loaded:
                 self._take(*self._early.popleft())
@@ -62,9 +62,12 @@ class BayRecord:
             self._recorder.put_curve(self._charge.id, self._curve.rest(), ended=True)
             self._put(self._charge, self._charge.last)
 
-    def _look(self, clock: WallClock, snapshot: Snapshot, decision: Decision) -> Look:
+    def _look(
+        self, clock: WallClock, snapshot: Snapshot, decision: Decision, foresee: Callable[[], Foreseen | None]
+    ) -> Look:
         offset_min = localtime(clock.wall_s).tm_gmtoff // 60
-        return Look(Stamp(clock.wall_s, offset_min, clock.now_s, self._recorder.boot), snapshot, decision, clock.told)
+        stamp = Stamp(clock.wall_s, offset_min, clock.now_s, self._recorder.boot)
+        return Look(stamp, snapshot, decision, clock.told, foresee)
 
     def _take(self, look: Look, bay: BayConfig, identity: Identity) -> None:
         session, asked = look.session, look.snapshot
