@@ -136,7 +136,7 @@ class BayRunner:
         before, clock = self._revision, WallClock(now_s, time())
         due = self._timer.due(clock)  # in any case: the first time reads what was kept
         asked = self._requests.take() or (due if self.decision is not None else ())
-        taken = self._taken = self._timer.take(Taken.of(asked, self._memory, self.name), self.decision)
+        taken = self._taken = self._timer.take(Taken.of(asked, self._memory, self.name), self.decision, clock)
         try:
             self._step(now_s, asleep_s, taken.request)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
@@ -188,7 +188,7 @@ class BayRunner:
         self._timer.decided(self._taken, decision.answer, clock)
         self._keep(self._memory, now_s)
         if self._record is not None:
-            self._record.take(clock, snapshot, decision, self.policy.rules.bay, self.identified.identity)
+            self._record.take(clock, snapshot, decision, self.policy.rules, self.identified.identity, self._memory)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """Everything known about the bay now."""
@@ -226,8 +226,7 @@ class BayRunner:
             self._say(Cause.of("policy_in_force", bay=self.name, policy=name_of(bay)))
 
     def _keep(self, memory: Memory, now_s: float) -> None:
-        persisted = self.identified.kept(Persisted.of(memory, now_s))
-        persisted = self._timer.kept(persisted)
+        persisted = self._timer.kept(self.identified.kept(Persisted.of(memory, now_s)))
         if self._waits and not persisted.hold:
             persisted = replace(persisted, hold=self._waits)
         self._revision = self._store.put(self.place, persisted)
@@ -237,6 +236,7 @@ class BayRunner:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
         decision = told(self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER), *known)
+        decision = self._timer.told(decision)
         return {
             **bay_status(self.name, self._snapshot, decision, clock.now_s, clock.wall_s, self._language),
             **outlook(decision, *known, clock, self._language, closely=closely),
