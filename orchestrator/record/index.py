@@ -41,8 +41,8 @@ class UselessError(Exception):
 def opened(folder: Path, say: Say, home: Path | None = None) -> sqlite3.Connection:
     """The index as of now, to be read only: the one on disk, or in memory. OSError if the files cannot be read.
 
-    It is beside the files, or in `home`. `say` is told each time which files are damaged: what is asked of the index has
-    not all of it.
+    It is beside the files, or in `home`. `say` is told each time which files are damaged: what is asked of the index
+    has not all of it.
     """
     if not folder.is_dir():
         return _built(":memory:", None)
