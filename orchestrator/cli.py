@@ -6,10 +6,12 @@ Each verb imports its dependencies when it runs, so that none waits for another'
 """
 
 import argparse
+import errno
 import os
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from orchestrator import __version__
@@ -35,9 +37,11 @@ if TYPE_CHECKING:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return the exit status."""
     words = sys.argv[1:] if argv is None else argv
-    arguments = _parser().parse_args(words)
+    arguments = argparse.Namespace()
     try:
-        return int(arguments.run(arguments))
+        with _delivered():
+            arguments = _parser().parse_args(words)
+            return int(arguments.run(arguments))
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 1
@@ -49,9 +53,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, e.g. `head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except OSError as error:  # usually a full disk behind our output
-        print(f"orchestrator: {error}", file=sys.stderr)
+    except OSError as error:
+        print(f"orchestrator: {_of_system(error)}", file=sys.stderr)
         return 1
+
+
+@contextmanager
+def _delivered() -> Iterator[None]:
+    """Have our output taken before this ends: that the disk is full is noticed while there is somebody to tell."""
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+
+
+def _of_system(error: OSError) -> str:
+    """What the system says of a file; one without a name is our output."""
+    from orchestrator.model import Cause
+    from orchestrator.show import own_language
+    from orchestrator.text.catalogue import say
+
+    if error.filename:
+        return f"{error.filename}: {error.strerror or error}"
+    return say(Cause.of("output_failed", error=errno.errorcode.get(error.errno or 0, str(error))), own_language())
 
 
 def _said(error: OrchestratorError, arguments: argparse.Namespace, words: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ from typing import cast
 from orchestrator.columns import beside, cut, folded, width_of
 from orchestrator.gist import counted, gist
 from orchestrator.model import Cause
-from orchestrator.show import HEAD, Bay, below, is_alarming, labelled, level_of, row, strays, urgency, what_to_do
+from orchestrator.show import Bay, below, head, is_alarming, labelled, level_of, row, strays, urgency, what_to_do
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import in_language, language_of_answer
 
@@ -118,8 +118,8 @@ def _table(bays: Sequence[Bay], language: str, width: int) -> Iterator[Block]:
     """All bays, aligned; below each its further details."""
     marked = any(map(level_of, bays))
     inner = max(width - marked * len(INDENT), 1) if width else 0
-    rows = [HEAD, *(row(bay, language) for bay in bays)]
-    widths = [max(width_of(cells[column]) for cells in rows) for column in range(len(HEAD) - 1)]
+    rows = [head(language), *(row(bay, language) for bay in bays)]
+    widths = [max(width_of(cells[column]) for cells in rows) for column in range(len(rows[0]) - 1)]
     for cells, bay in zip(rows, [None, *bays], strict=True):
         fixed, why = beside(cells[:-1], widths, inner), cells[-1]
         narrow = inner and inner - width_of(fixed) < LEAST_WHY

@@ -10,7 +10,6 @@ from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
 from orchestrator.text.language import language_of
 
-HEAD = ("BAY", "STATE", "SOC", "PACK", "CURRENT", "TEMP", "STEP", "WHY")
 #: The battery's values in the table, with their ids in the catalogue.
 BATTERY = {"soc_pct": "soc", "voltage_v": "pack_voltage", "temperature_c": "temperature"}
 #: The causes whose text begins with what to do about a disobedient charger.
@@ -157,8 +156,13 @@ def _part(bay: Bay, name: str) -> Mapping[str, object]:
     return cast("Mapping[str, object]", bay[name])
 
 
+def head(language: str) -> tuple[str, ...]:
+    """The head of the table, as the catalogue has it in one text."""
+    return tuple(say(Cause("bays_head"), language).split("|"))
+
+
 def row(bay: Bay, language: str) -> tuple[str, ...]:
-    """Its cells in the table, below `HEAD`."""
+    """Its cells in the table, below `head`."""
     battery, charger = _part(bay, "battery"), _part(bay, "charger")
     old, step = _old(bay), bay["step"]
     return (

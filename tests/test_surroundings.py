@@ -164,11 +164,16 @@ def test_json_stays_what_it_is_on_every_terminal(words: tuple[str, ...], tmp_pat
         assert json.loads(ended.stdout) == json.loads(rich.stdout)
 
 
-@pytest.mark.parametrize("words", [("demo", "--fault", "list"), ("schema", "station"), ("check", "none.yaml")], ids=str)
+@pytest.mark.parametrize(
+    "words", [("demo", "--fault", "list"), ("schema", "station"), ("check", "none.yaml"), ("--version",)], ids=str
+)
 def test_an_output_that_takes_nothing_is_told_without_a_traceback(words: tuple[str, ...], tmp_path: Path) -> None:
     with Path("/dev/full").open("wb") as full:
         ended = run("module", tmp_path, *words, stdout=full.fileno())
     assert "Traceback" not in ended.stderr and "Exception ignored" not in ended.stderr
+    lines = ended.stderr.splitlines()
+    assert lines[-1:] == ["orchestrator: the output could not be written, and is not complete: No space left on device"]
+    assert ended.returncode == 1
     reader, writer = os.pipe()
     os.close(reader)
     try:

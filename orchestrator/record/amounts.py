@@ -6,7 +6,7 @@ after a restart than what was recorded before it; what they lack then is not sub
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 from orchestrator.core.states import AT_REST
 from orchestrator.model import CurrentStep, Session
@@ -16,10 +16,12 @@ from orchestrator.record.stamp import figure
 #: A gap in the BMU's readings counts only up to this.
 GAP_S = 1.5
 #: The charger chooses its own current.
-BY_ITSELF = ("", "", "")
+BY_ITSELF, NO_STEP = ("", "", ""), (0, 0.0)
 
 Rule = tuple[str, str, str]  #: a cause's id, key and place
-Share = tuple[Rule, float, float]  #: s, Ah
+Step = tuple[int, float]  #: its number, as people count, and its amperes
+Of = TypeVar("Of")
+Share = tuple[Of, float, float]  #: s, Ah
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +58,10 @@ class Amounts:
     bmu_wh: float = 0.0
     energised_s: float = 0.0
     step_changes: int = 0
-    rules: tuple[Share, ...] = ()
+    rules: tuple[Share[Rule], ...] = ()
     binding: Rule = BY_ITSELF  #: the rule that limited the current last
+    steps: tuple[Share[Step], ...] = ()
+    step: Step = NO_STEP  #: the last one
     bmu_t_s: float | None = None  #: the BMU's reading up to which its current is counted
 
 
@@ -79,6 +83,8 @@ def follow(amounts: Amounts, look: Look, *, resumed: bool = False) -> Amounts:
         step_changes=amounts.step_changes + now.step_changes - before.step_changes,
         rules=_shared(amounts.rules, amounts.binding, seconds, ah) if ah or seconds else amounts.rules,
         binding=_binding(look.decision.step) if look.runs else amounts.binding,
+        steps=_shared(amounts.steps, amounts.step, seconds, ah) if ah or seconds else amounts.steps,
+        step=_step(look.decision.step) if look.runs else amounts.step,
         bmu_t_s=bmu_t_s,
     )
 
@@ -99,16 +105,20 @@ def _binding(step: CurrentStep | None) -> Rule:
     return (step.rule.id, step.rule.key, step.rule.place) if step is not None else BY_ITSELF
 
 
-def _shared(rules: tuple[Share, ...], rule: Rule, seconds: float, ah: float) -> tuple[Share, ...]:
-    """The shares, with this much more of one rule's."""
-    for at, (known, known_s, known_ah) in enumerate(rules):
-        if known == rule:
-            return (*rules[:at], (rule, known_s + seconds, known_ah + ah), *rules[at + 1 :])
-    return (*rules, (rule, seconds, ah))
+def _step(step: CurrentStep | None) -> Step:
+    return (step.number, step.current_a) if step is not None else NO_STEP
+
+
+def _shared(shares: tuple[Share[Of], ...], of: Of, seconds: float, ah: float) -> tuple[Share[Of], ...]:
+    """The shares, with this much more of one rule's, or of one step's."""
+    for at, (known, known_s, known_ah) in enumerate(shares):
+        if known == of:
+            return (*shares[:at], (of, known_s + seconds, known_ah + ah), *shares[at + 1 :])
+    return (*shares, (of, seconds, ah))
 
 
 def as_fields(amounts: Amounts) -> dict[str, object]:
-    """As they stand in a record; `counted` and `binding` are for the service, when it goes on after a restart."""
+    """As they stand in a record; `counted`, `binding`, `step`: for the service, when it goes on after a restart."""
     counted = amounts.counted
     return {
         "energised_s": round(amounts.energised_s, 3),
@@ -119,8 +129,13 @@ def as_fields(amounts: Amounts) -> dict[str, object]:
             {"id": id_, "key": key, "place": place, "s": round(seconds, 3), "ah": round(ah, 6)}
             for (id_, key, place), seconds, ah in amounts.rules
         ],
+        "steps": [
+            {"step": number, "current_a": amps, "s": round(seconds, 3), "ah": round(ah, 6)}
+            for (number, amps), seconds, ah in amounts.steps
+        ],
         "counted": [round(counted.ah, 9), round(counted.wh, 9), round(counted.energised_s, 6), counted.step_changes],
         "binding": list(amounts.binding),
+        "step": list(amounts.step),
     }
 
 
@@ -139,8 +154,17 @@ def from_fields(record: Mapping[str, Any]) -> Amounts:
             (_rule(one["id"], one["key"], one["place"]), figure(one["s"]), figure(one["ah"])) for one in record["rules"]
         ),
         _rule(*record["binding"]),
+        tuple(
+            (_numbered(one["step"], one["current_a"]), figure(one["s"]), figure(one["ah"]))
+            for one in record.get("steps", ())  # earlier versions have none
+        ),
+        _numbered(*record.get("step", NO_STEP)),
     )
 
 
 def _rule(id_: object, key: object, place: object) -> Rule:
     return str(id_), str(key), str(place)
+
+
+def _numbered(number: object, amps: object) -> Step:
+    return int(figure(number)), figure(amps)

@@ -12,17 +12,19 @@ from dataclasses import dataclass, replace
 from orchestrator.model import Cause, Session
 from orchestrator.model.cause import plain
 from orchestrator.record import amounts as amount
+from orchestrator.record import forecast as foresight
 from orchestrator.record import measured as measuring
 from orchestrator.record import met as trouble
 from orchestrator.record import pauses as pause
 from orchestrator.record import spread
 from orchestrator.record.amounts import Amounts, Counted
+from orchestrator.record.forecast import Forecast
 from orchestrator.record.look import Look
 from orchestrator.record.measured import Measured
 from orchestrator.record.met import Trouble
 from orchestrator.record.pauses import Pauses
 from orchestrator.record.spread import Spreads
-from orchestrator.record.stamp import Stamp
+from orchestrator.record.stamp import Stamp, as_fields
 
 #: A running charge is recorded this often at least, a paused one every day: so it is never far back in the files.
 CHECKPOINT_S, PAUSED_S = 600.0, 86_400.0
@@ -32,6 +34,8 @@ SAME_S = 2.0
 OLDER_S = 300.0
 #: … and how much older than the end of a charge that the core has not persisted: that is written at once.
 ENDED_S = 60.0
+#: More changes of the policy are not kept.
+MOST_CHANGES = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,8 @@ class Charge:
     pauses: Pauses = Pauses()
     trouble: Trouble = Trouble()
     measured: Measured = Measured()
+    forecast: Forecast = Forecast()
+    changes: tuple[Mapping[str, object], ...] = ()  #: from when on another policy, or version, was in force
     closed: bool = False  #: whether the contactor was to be closed
     due: bool = False  #: something to be recorded at once
     result: Mapping[str, object] | None = None  #: why it ended; None while it has not
@@ -79,12 +85,23 @@ def follow(charge: Charge, look: Look, *, resumed: bool = False) -> Charge:
         pauses=pauses,
         trouble=trouble.follow(charge.trouble, look),
         measured=measuring.follow(charge.measured, look.now_s, point, _end_v(charge)),
+        forecast=foresight.follow(charge.forecast, look, look.stamp.since(charge.begin)),
         closed=look.decision.closed,
         due=charge.due or pauses.lasts is not before.lasts,
     )
     if session is None or session.result is None:
         return now
     return replace(now, result=look.plainly(session.result))
+
+
+def under(charge: Charge, policy: str, sha256: str, software: str, now: Stamp) -> Charge:
+    """The same, if need be with the note that from now on it goes on under this policy and this version."""
+    first, last = charge.head["policy"], charge.changes[-1] if charge.changes else None
+    known = last or {"sha256": first.get("sha256") if isinstance(first, Mapping) else "", **charge.head}
+    if (known["sha256"], known["software"]) == (sha256, software) or len(charge.changes) >= MOST_CHANGES:
+        return charge
+    change = {**as_fields(now), "policy": policy, "sha256": sha256, "software": software}
+    return replace(charge, changes=(*charge.changes, change), due=True)
 
 
 def _end_v(charge: Charge) -> float | None:
@@ -95,8 +112,13 @@ def _end_v(charge: Charge) -> float | None:
 
 
 def resumed(charge: Charge, look: Look, session: Session) -> Charge:
-    """The charge of an earlier run of the service, after the first decision of this one."""
-    pauses = pause.died(charge.pauses, charge.last, _died(charge))
+    """The charge of an earlier run of the service, after the first decision of this one.
+
+    By the core's counters it has gone on after its last record: the pause began no earlier.
+    """
+    more_s = max(session.energised_s - charge.amounts.counted.energised_s, 0.0)
+    seen = replace(charge, last=charge.last.back(-more_s))
+    pauses = pause.died(charge.pauses, seen.last, _died(seen))
     then = replace(charge, pauses=pauses, started_s=session.started_s, written=look.stamp, due=True)
     return follow(then, look, resumed=True)
 

@@ -123,6 +123,11 @@ def health(battery: str, records: Iterable[Record]) -> Health:
     )
 
 
+def for_capacity(listed: Record) -> Record:
+    """A charge as the index lists it, for `health`: its capacity and SOH, and nothing else of it, can be relied on."""
+    return {**listed, "rules": [], "measured": {**listed["measured"], "steps": [], "hot_s": 0.0, "high_s": 0.0}}
+
+
 def _ended(battery: str, records: Iterable[Record]) -> Iterator[_Charge]:
     for record in records:
         try:

@@ -6,11 +6,11 @@ from orchestrator.model import Cause
 from orchestrator.record.capacity import HIGHEST_C, LEAST, LEAST_RISE_PCT, LOWEST_C, Estimate
 from orchestrator.record.change import LEAST_A
 from orchestrator.record.health import SOURCES, Health
+from orchestrator.record.lasting import lasting
 from orchestrator.record.measured import HIGH_SHARE, HOT_C
 from orchestrator.record.resistance import LEAST as LEAST_STEPS
 from orchestrator.record.resistance import PACK_C, SOC_PCT
 from orchestrator.record.stamp import as_fields as stamp_fields
-from orchestrator.record.table import lasted
 from orchestrator.text.catalogue import say
 
 
@@ -43,7 +43,7 @@ def _said(health: Health) -> Iterator[Cause]:
         yield Cause.of("health_balance", pct=100 * health.balance)
     if (rest := health.rest) is not None:
         yield Cause.of("health_rest", pack_v=rest.pack_v, soc_pct=rest.soc_pct, begin_at=rest.at.local())
-    share_pct, high, hot = 100 * HIGH_SHARE, lasted(health.high_s), lasted(health.hot_s)
+    share_pct, high, hot = 100 * HIGH_SHARE, lasting(health.high_s), lasting(health.hot_s)
     yield Cause.of("health_stress", high=high, share_pct=share_pct, hot=hot, hot_c=HOT_C)
     yield Cause.of("health_deep", deep=health.deep_discharges, charges=health.charges)
     faults = tuple(f"{id_} ×{times}" for id_, _, times in health.faults)

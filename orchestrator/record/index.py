@@ -16,7 +16,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from orchestrator.model import Cause
-from orchestrator.record.tables import SCHEMA, VERSION, AnotherFileError, changed, update
+from orchestrator.record.tables import SCHEMA, VERSION, AnotherFileError, changed, damaged, update
 
 #: Its file, in the folder of the records; one that is being built; one that was damaged.
 NAME, NEW, DAMAGED = "index.sqlite3", "index.sqlite3.new", "index.sqlite3.damaged"
@@ -41,14 +41,21 @@ class UselessError(Exception):
 def opened(folder: Path, say: Say, home: Path | None = None) -> sqlite3.Connection:
     """The index as of now, to be read only: the one on disk, or in memory. OSError if the files cannot be read.
 
-    It is beside the files, or in `home`.
+    It is beside the files, or in `home`. `say` is told each time which files are damaged: what is asked of the index
+    has not all of it.
     """
     if not folder.is_dir():
-        return _built(":memory:", None, say)
+        return _built(":memory:", None)
     for _ in range(AGAIN):
         with suppress(FileNotFoundError):
-            return _opened(folder, home or folder, say)
-    return _opened(folder, home or folder, say)
+            return _told(_opened(folder, home or folder, say), folder, say)
+    return _told(_opened(folder, home or folder, say), folder, say)
+
+
+def _told(db: sqlite3.Connection, folder: Path, say: Say) -> sqlite3.Connection:
+    for name in damaged(db):
+        say(Cause.of("records_damaged", file=str(folder / name)))
+    return db
 
 
 def _opened(folder: Path, home: Path, say: Say) -> sqlite3.Connection:
@@ -68,17 +75,17 @@ def _opened(folder: Path, home: Path, say: Say) -> sqlite3.Connection:
         db = _connected(home / NAME, "ro")
         _check(db)
     except (UselessError, sqlite3.Error):
-        built = _built(":memory:", folder, say)
+        built = _built(":memory:", folder)
         say(Cause.of("index_not_written", folder=str(home), error=why))
         return built
-    return _current(db, folder, say)
+    return _current(db, folder)
 
 
 def rebuilt(folder: Path, say: Say) -> int:
     """Build the index anew, whatever is there; the number of charges in it. BusyError, OSError or sqlite3.Error."""
     with _locked(folder):
-        _rebuild(folder, folder, say)
-    with closing(_connected(folder / NAME, "ro")) as db:
+        _rebuild(folder, folder)
+    with closing(_told(_connected(folder / NAME, "ro"), folder, say)) as db:
         return int(db.execute("SELECT count(*) FROM charges").fetchone()[0])
 
 
@@ -106,7 +113,7 @@ def _refresh(folder: Path, home: Path, say: Say) -> None:
         with closing(_connected(path, "rw")) as db:
             _check(db)
             if changed(db, folder):
-                _update(db, folder, say)
+                _update(db, folder)
             return
     except (AnotherFileError, UselessError):
         pass
@@ -116,7 +123,7 @@ def _refresh(folder: Path, home: Path, say: Say) -> None:
             say(Cause.of("index_damaged", file=str(home / DAMAGED), error=str(error)))
         elif path.exists():
             raise
-    _rebuild(folder, home, say)
+    _rebuild(folder, home)
 
 
 def _is_damage(error: sqlite3.DatabaseError) -> bool:
@@ -124,11 +131,11 @@ def _is_damage(error: sqlite3.DatabaseError) -> bool:
     return not isinstance(error, sqlite3.OperationalError) or error.sqlite_errorcode == sqlite3.SQLITE_ERROR
 
 
-def _rebuild(folder: Path, home: Path, say: Say) -> None:
+def _rebuild(folder: Path, home: Path) -> None:
     new, path = home / NEW, home / NAME
     new.unlink(missing_ok=True)
     try:
-        _built(str(new), folder, say).close()
+        _built(str(new), folder).close()
         with new.open("rb+") as file:
             os.fsync(file.fileno())
         if os.geteuid() == 0:  # the next asker may be the service's own user
@@ -144,7 +151,7 @@ def _rebuild(folder: Path, home: Path, say: Say) -> None:
         os.close(descriptor)
 
 
-def _built(name: str, folder: Path | None, say: Say) -> sqlite3.Connection:
+def _built(name: str, folder: Path | None) -> sqlite3.Connection:
     """A new index of these files; without a folder an empty one."""
     db = sqlite3.connect(name, isolation_level=None)
     try:
@@ -152,14 +159,14 @@ def _built(name: str, folder: Path | None, say: Say) -> sqlite3.Connection:
         db.execute("PRAGMA synchronous = OFF")  # … and it is synced before it is used
         db.executescript(SCHEMA)
         if folder is not None:
-            _update(db, folder, say)
+            _update(db, folder)
     except BaseException:
         db.close()
         raise
     return db
 
 
-def _current(db: sqlite3.Connection, folder: Path, say: Say) -> sqlite3.Connection:
+def _current(db: sqlite3.Connection, folder: Path) -> sqlite3.Connection:
     """The same if it is up to date, else a copy in memory that is."""
     try:
         if not changed(db, folder):
@@ -167,15 +174,15 @@ def _current(db: sqlite3.Connection, folder: Path, say: Say) -> sqlite3.Connecti
         copy = sqlite3.connect(":memory:", isolation_level=None)
         with closing(db):
             db.backup(copy)
-        _update(copy, folder, say)
+        _update(copy, folder)
     except AnotherFileError:
-        return _built(":memory:", folder, say)
+        return _built(":memory:", folder)
     return copy
 
 
-def _update(db: sqlite3.Connection, folder: Path, say: Say) -> None:
+def _update(db: sqlite3.Connection, folder: Path) -> None:
     db.execute("BEGIN IMMEDIATE")
-    update(db, folder, say)
+    update(db, folder)
     db.execute("COMMIT")
 
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from orchestrator.record import amounts, measured, met, pauses, spread
+from orchestrator.record import amounts, forecast, measured, met, pauses, spread
 from orchestrator.record import stamp as stamps
 from orchestrator.record.charge import Charge
 from orchestrator.record.ulid import is_ulid
@@ -18,6 +18,10 @@ from orchestrator.record.ulid import is_ulid
 #: Of these records.
 VERSION = 1
 BEGIN, CHECKPOINT, END = "begin", "checkpoint", "end"
+#: How a charge ends that was not cut short.
+FULL = "full"
+#: The member that tells of other policies in mid-charge; earlier versions had none.
+CHANGES = "changes"
 
 Record = Mapping[str, Any]
 #: With what each line begins, so that most need not be decoded: one out of ten records is no checkpoint.
@@ -39,6 +43,8 @@ def end(charge: Charge) -> Record:
     lasted_s = round(charge.last.since(charge.begin), 3)
     said = {"end": stamps.as_fields(charge.last), "lasted_s": lasted_s, "result": charge.result}
     counted = {name: value for name, value in _counted(charge).items() if name != "last"}
+    if (foreseen := counted[forecast.NAME]) is not None and (charge.result or {}).get("id") == FULL:
+        counted[forecast.NAME] = {**foreseen, "took_min": forecast.took_min(charge.forecast, lasted_s)}
     return {**_name(charge, END), **_head(charge), **said, **counted}
 
 
@@ -50,7 +56,7 @@ def _head(charge: Charge) -> Record:
     return {"version": VERSION, **charge.head, "begin": stamps.as_fields(charge.begin)}
 
 
-def _counted(charge: Charge) -> Record:
+def _counted(charge: Charge) -> dict[str, Any]:
     contactor = charge.head.get("contactor_fitted")
     return {
         "last": stamps.as_fields(charge.last),
@@ -61,6 +67,8 @@ def _counted(charge: Charge) -> Record:
         **pauses.as_fields(charge.pauses),
         **met.as_fields(charge.trouble),
         **measured.as_fields(charge.measured),
+        **forecast.as_fields(charge.forecast),
+        CHANGES: list(charge.changes),
         "contactor_closed": charge.closed if contactor else None,
     }
 
@@ -86,6 +94,8 @@ def restored(first: Record, newest: Record) -> Charge:
             pauses.from_fields(newest),
             met.from_fields(newest),
             measured.from_fields(newest),
+            forecast.from_fields(newest),
+            tuple(map(dict, newest.get(CHANGES, ()))),
             newest["contactor_closed"] is True,
         )
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:

@@ -19,6 +19,19 @@ VALUES = ("soc_pct", "soh_pct", "pack_v", "pack_a", "temperature_c", "charger_v"
 
 
 @dataclass(frozen=True, slots=True)
+class Foreseen:
+    """How long a charge still takes."""
+
+    target_pct: float
+    bmu_min: float | None  #: by its BMU
+    own_min: float | None  #: by our own estimate
+
+
+def _nothing() -> None:
+    """Nothing is foreseen."""
+
+
+@dataclass(frozen=True, slots=True)
 class Look:
     """One decision, what it was made from, and when, by both clocks."""
 
@@ -26,6 +39,7 @@ class Look:
     snapshot: Snapshot
     decision: Decision
     told: Callable[[Cause], Cause | None]  #: the cause with its moments as the time of day
+    foresee: Callable[[], Foreseen | None] = _nothing
 
     @property
     def now_s(self) -> float:

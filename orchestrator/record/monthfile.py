@@ -101,6 +101,7 @@ class Reader:
     def __iter__(self) -> Iterator[bytes]:
         """Its whole lines; of a damaged file those before the damage."""
         if is_packed(self._path.name):
+            self.is_damaged = self._path.stat().st_size == 0
             try:
                 with opened(self._path) as file:
                     yield from lines(file)

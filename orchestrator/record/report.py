@@ -9,15 +9,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from orchestrator.model import Cause
-from orchestrator.record.lines import Record
+from orchestrator.record.lasting import lasting
+from orchestrator.record.lines import FULL, Record
 from orchestrator.record.sections import Row, Section, heads
 from orchestrator.record.stamp import from_fields
-from orchestrator.record.table import DASH, began, lasted, why_ended
+from orchestrator.record.table import DASH, began, why_ended
 from orchestrator.record.utc import unix_s
-from orchestrator.text.catalogue import say
+from orchestrator.text.catalogue import fields, say
 
-#: How a charge ends that was not cut short.
-FULL = "full"
 #: Faults of these effects are of account, …
 GRAVE = frozenset({"STOP", "TRIP"})
 #: … a pack below this is commonly called worn out, …
@@ -27,6 +26,8 @@ MOST_APART, ENOUGH_AH = 0.10, 5.0
 MONTH = re.compile(r"[12]\d{3}-(0[1-9]|1[0-2])")
 #: No local time is further from UTC.
 DAY_S = 86_400.0
+
+Warnings = Mapping[str, Sequence[Cause]]  #: of each battery
 
 
 @dataclass(slots=True)
@@ -47,9 +48,24 @@ class Sum:
         if cause_of(charge) == FULL:
             self.full_s.append(charge["lasted_s"])
 
-    def cells(self) -> Row:
+    @property
+    def mean_s(self) -> float | None:
+        """How long those took on average that became full."""
+        return sum(self.full_s) / len(self.full_s) if self.full_s else None
+
+    def as_fields(self) -> dict[str, object]:
+        """As JSON has it."""
+        return {
+            "charges": self.charges,
+            "full": len(self.full_s),
+            "ah": round(self.ah, 4),
+            "wh": round(self.wh, 2),
+            "mean_full_s": None if self.mean_s is None else round(self.mean_s, 1),
+        }
+
+    def cells(self, language: str) -> Row:
         """As a table has it."""
-        mean = lasted(sum(self.full_s) / len(self.full_s)) if self.full_s else DASH
+        mean = say(lasting(self.mean_s), language) if self.mean_s is not None else DASH
         return str(self.charges), str(len(self.full_s)), f"{self.ah:.1f}", f"{self.wh / 1000:.2f}", mean
 
 
@@ -70,22 +86,28 @@ def cause_of(charge: Record) -> str:
     return str((charge["result"] or {"id": "charge_open"})["id"])
 
 
-def report(month: str, charges: Iterable[Record], language: str) -> list[Section]:
-    """Of the charges of a month, the newest first."""
-    all_ = list(charges)
+def sums(charges: Iterable[Record]) -> tuple[dict[str, Sum], Sum]:
+    """What each bay's charges come to, and all of them."""
     total, bays = Sum(), defaultdict[str, Sum](Sum)
-    for charge in all_:
+    for charge in charges:
         total.add(charge)
         bays[charge["bay"]].add(charge)
-    rows = [(bay, *of.cells()) for bay, of in sorted(bays.items())]
-    everything = (say(Cause("report_total"), language), *total.cells())
+    return bays, total
+
+
+def report(month: str, charges: Iterable[Record], warnings: Warnings, language: str) -> list[Section]:
+    """Of the charges of a month, the newest first; `warnings` are of the health of their batteries."""
+    all_ = list(charges)
+    bays, total = sums(all_)
+    rows = [(bay, *of.cells(language)) for bay, of in sorted(bays.items())]
+    everything = (say(Cause("report_total"), language), *total.cells(language))
     stations = tuple(sorted({charge["station"] for charge in all_}))
     title = Cause.of("report_of", month=month, stations=stations, zones=tuple(zones(all_)))
     table = (heads("report_head", language), *rows, everything)
     return [
         Section(say(title, language), table, has_head=True),
         Section(say(Cause("report_ends"), language), _ends(all_, language), has_head=True),
-        Section(say(Cause("report_look"), language), list(_looks(all_, language))),
+        Section(say(Cause("report_look"), language), list(_looks(all_, warnings, language))),
     ]
 
 
@@ -105,13 +127,39 @@ def _ends(charges: Sequence[Record], language: str) -> list[Row]:
     return [heads("report_ends_head", language), *rows]
 
 
-def _looks(charges: Sequence[Record], language: str) -> Iterator[Row]:
+def _looks(charges: Sequence[Record], warnings: Warnings, language: str) -> Iterator[Row]:
+    for battery, causes in to_look_at(charges, warnings):
+        yield battery, "; ".join(say(cause, language) for cause in causes)
+
+
+def to_look_at(charges: Sequence[Record], warnings: Warnings) -> Iterator[tuple[str, list[Cause]]]:
+    """The batteries that need a look, and why."""
     of = defaultdict[str, list[Record]](list)
     for charge in charges:
         of[charge["battery"]["id"]].append(charge)
     for battery, mine in sorted(of.items()):
-        if why := [say(cause, language) for cause in looks(mine)]:
-            yield battery, "; ".join(why)
+        if causes := [*looks(mine), *warnings.get(battery, ())]:
+            yield battery, causes
+
+
+def as_fields(month: str, charges: Sequence[Record], warnings: Warnings, language: str) -> dict[str, object]:
+    """As JSON has it."""
+    bays, total = sums(charges)
+    newest = {cause_of(charge): charge for charge in reversed(charges)}
+    return {
+        "month": month,
+        "stations": sorted({charge["station"] for charge in charges}),
+        "bays": {bay: of.as_fields() for bay, of in sorted(bays.items())},
+        "total": total.as_fields(),
+        "ends": [
+            {"id": id_, "charges": count, "last": newest[id_]["id"], "text": why_ended(newest[id_], language)}
+            for id_, count in Counter(map(cause_of, charges)).most_common()
+        ],
+        "look_at": [
+            {"battery": battery, "causes": [fields(cause, language) for cause in causes]}
+            for battery, causes in to_look_at(charges, warnings)
+        ],
+    }
 
 
 def looks(charges: Sequence[Record]) -> Iterator[Cause]:

@@ -15,7 +15,7 @@ COLUMNS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "id": (NAME, ("id",)), "type": (NAME, ("type",)), "station": (NAME, ("station",)), "bay": (NAME, ("bay",)),
     "port": (NAME, ("port",)), "battery": (NAME, ("battery", "id")), "battery_source": (NAME, ("battery", "source")),
     "policy": (NAME, ("policy", "name")), "policy_sha256": (NAME, ("policy", "sha256")),
-    "software": (NAME, ("software",)), "by": (JSON, ("by",)),
+    "capacity_ah": (KNOWN, ("policy", "capacity_ah")), "software": (NAME, ("software",)), "by": (JSON, ("by",)),
     "begin_utc": (NAME, ("begin", "utc")), "begin_unix_s": (NUMBER, ("begin", "unix_s")),
     "begin_offset_min": (NUMBER, ("begin", "offset_min")),
     "last_utc": (NAME, ("last", "utc")), "last_unix_s": (NUMBER, ("last", "unix_s")),
@@ -28,7 +28,8 @@ COLUMNS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "soh_pct": (KNOWN, ("values", "soh_pct", "end")),
     "temperature_highest_c": (KNOWN, ("values", "temperature_c", "highest")),
     "step_changes": (NUMBER, ("step_changes",)), "stop_verified_ms": (KNOWN, ("stop_verified_ms",)),
-    "result": (JSON, ("result",)), "faults": (JSON, ("faults",)),
+    "result": (JSON, ("result",)), "pause": (JSON, ("pause",)), "faults": (JSON, ("faults",)),
+    "stretch": (JSON, ("measured", "stretch")),
 }  # fmt: skip
 #: Of each fault; its cause stands in the record.
 FAULT = ("id", "effect", "times")
@@ -46,11 +47,20 @@ def as_row(record: Record) -> tuple[object, ...]:
             "last": record.get("end") or record["last"],
             "lasted_s": record.get("lasted_s", round(last.since(begin), 3)),
             "result": record.get("result"),
+            "pause": open_pause(record),
             "faults": faults,
+            "policy": {"capacity_ah": None, **record["policy"]},  # earlier versions have neither this …
+            "measured": record.get("measured") or {"stretch": None},  # … nor that
         }
         return tuple(_value(kind, path, said) for kind, path in COLUMNS.values())
     except (ArithmeticError, AttributeError, LookupError, TypeError) as error:
         raise ValueError(f"a damaged record: {error!r}") from None
+
+
+def open_pause(record: Record) -> Record | None:
+    """The pause that has not ended; None if there is none."""
+    last = next(reversed(record["pauses"]), None)
+    return last if last is not None and last["lasted_s"] is None else None
 
 
 def _value(kind: str, path: Sequence[str], record: Record) -> object:

@@ -9,6 +9,8 @@ from orchestrator.model import Cause
 from orchestrator.text.catalogue import say
 
 Row = tuple[str, ...]
+#: The language of a page whose reader has none.
+DEFAULT = "en"
 
 #: Readable on a phone, in the dark, and on paper.
 STYLE = """
@@ -57,7 +59,7 @@ def as_page(title: str, language: str, sections: Sequence[Section], picture: str
     """A web page in one file; `picture` is SVG and stands before the sections."""
     body = "\n".join(_html(section) for section in sections if section.rows)
     return (
-        f'<!DOCTYPE html>\n<html lang="{escape(language)}">\n<head>\n<meta charset="utf-8">\n'
+        f'<!DOCTYPE html>\n<html lang="{escape(language) or DEFAULT}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
         f"<h1>{escape(title)}</h1>\n{picture}{body}\n</body>\n</html>\n"

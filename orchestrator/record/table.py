@@ -8,12 +8,15 @@ from typing import Any
 
 from orchestrator.columns import beside, folded, width_of
 from orchestrator.model import Cause
-from orchestrator.model.cause import from_plain
+from orchestrator.model.cause import from_plain, without_then
+from orchestrator.model.identity import Source
+from orchestrator.record.lasting import lasting
 from orchestrator.record.lines import Record
+from orchestrator.record.row import open_pause
+from orchestrator.record.sections import heads
 from orchestrator.record.stamp import Stamp, from_fields
 from orchestrator.text.catalogue import say
 
-HEAD = ("BEGAN", "BAY", "BATTERY", "LASTED", "SOC", "AH", "KWH", "WHY IT ENDED")
 #: With less room for the reason, it goes below its charge.
 LEAST_WHY = 24
 DASH = "–"
@@ -21,13 +24,12 @@ DASH = "–"
 BOM = "\ufeff"
 #: What a spreadsheet takes for a formula, and for a number or a date.
 FORMULA, LIKE_NUMBER = ("=", "+", "-", "@", "\t", "\r"), re.compile(r"[\s.,:/]*\d[\d\s.,:/%eE+-]*")
-VALUES_HEAD = ("", "BEGIN", "END", "LOWEST", "HIGHEST")
 
 
 def table(charges: Sequence[Record], language: str, width: int) -> str:
     """One line a charge, where there is room."""
-    rows = [HEAD, *(_cells(charge, language) for charge in charges)]
-    widths = [max(width_of(row[column]) for row in rows) for column in range(len(HEAD) - 1)]
+    rows = [heads("charges_head", language), *(_cells(charge, language) for charge in charges)]
+    widths = [max(width_of(row[column]) for row in rows) for column in range(len(rows[0]) - 1)]
     lines = []
     for number, cells in enumerate(rows):
         fixed, why = beside(cells[:-1], widths, width), cells[-1]
@@ -44,7 +46,7 @@ def _cells(charge: Record, language: str) -> tuple[str, ...]:
         began(charge)[:16],
         str(charge.get("bay", DASH)),
         str(battery.get("id", DASH)),
-        lasted(length_s(charge)),
+        say(lasting(length_s(charge)), language),
         f"{soc['begin']:.0f}→{soc['end']:.0f} %" if soc else DASH,
         f"{charge['charger']['ah']:.2f}",
         f"{charge['charger']['wh'] / 1000:.3f}",
@@ -53,15 +55,20 @@ def _cells(charge: Record, language: str) -> tuple[str, ...]:
 
 
 def why_ended(charge: Record, language: str) -> str:
-    """The sentence for its result; of an open charge that it goes on."""
-    result = charge.get("result")
-    return sentence(result, language) if result else say(Cause("charge_open"), language)
+    """The sentence for its result; of an open charge since when it has paused and why, or when it last was recorded."""
+    if result := charge.get("result"):
+        return sentence(result, language)
+    pause = charge["pause"] if "pause" in charge else open_pause(charge)
+    if pause is None:
+        return say(Cause.of("charge_open", last_at=ended(charge)), language)
+    since = from_fields(pause).local()
+    return say(Cause.of("charge_paused", begin_at=since, why=sentence(pause["cause"], language)), language)
 
 
 def sentence(cause: object, language: str) -> str:
-    """The sentence for a cause in a record; its data where it is not understood here."""
+    """The sentence for a cause in a record, without what came next; its data where it is not understood here."""
     try:
-        return say(from_plain(cause), language)
+        return say(without_then(from_plain(cause)), language)
     except ValueError:
         return str(cause)
 
@@ -89,26 +96,18 @@ def _stamp(charge: Record, name: str) -> Stamp:
         return Stamp(0.0, 0, 0.0, "")
 
 
-def lasted(seconds: float) -> str:
-    """A length of time in two units."""
-    minutes, hours = int(seconds) // 60, int(seconds) // 3600
-    if hours:
-        return f"{hours} h {minutes % 60:02} min"
-    return f"{minutes} min" if minutes else f"{int(seconds)} s"
-
-
-def value_rows(charge: Record) -> list[tuple[str, ...]]:
+def value_rows(charge: Record, language: str) -> list[tuple[str, ...]]:
     """The measured values, as a table with its head; none if nothing was known."""
     known = charge.get("values") or {}
     rows = [
-        (name, *(f"{one[part]:g}" for part in ("begin", "end", "lowest", "highest")))
+        (say(Cause(f"row_{name}"), language), *(f"{one[part]:g}" for part in ("begin", "end", "lowest", "highest")))
         for name, one in known.items()
         if one
     ]
-    return [VALUES_HEAD, *rows] if rows else []
+    return [heads("values_head", language), *rows] if rows else []
 
 
-#: The columns of the CSV: name → where it is in a record.
+#: The columns of the CSV: name → where it is in a record. The last ones are named as in OCPP 2.1's BatteryData.
 COLUMNS = {
     "id": ("id",), "station": ("station",), "bay": ("bay",), "battery": ("battery", "id"),
     "battery_source": ("battery", "source"), "begin": ("begin", "utc"), "end": ("end", "utc"),
@@ -118,6 +117,7 @@ COLUMNS = {
     "soh_pct": ("values", "soh_pct", "end"), "temperature_highest_c": ("values", "temperature_c", "highest"),
     "step_changes": ("step_changes",), "policy": ("policy", "name"), "policy_sha256": ("policy", "sha256"),
     "by": ("by",), "result": ("result", "id"), "stop_verified_ms": ("stop_verified_ms",),
+    "serialNumber": ("serialNumber",), "soC": ("values", "soc_pct", "end"), "soH": ("values", "soh_pct", "end"),
 }  # fmt: skip
 
 
@@ -125,8 +125,14 @@ def as_csv(charges: Iterable[Record], language: str) -> Iterator[str]:
     """RFC 4180, line by line; causes are sentences, and the last column is why it ended."""
     yield BOM + _line([*COLUMNS, "why"])
     for charge in charges:
-        found = [*(_found(charge, path) for path in COLUMNS.values()), why_ended(charge, language)]
+        named = {**charge, "serialNumber": _serial_number(charge.get("battery") or {})}
+        found = [*(_found(named, path) for path in COLUMNS.values()), why_ended(charge, language)]
         yield _line([_guarded(sentence(value, language) if isinstance(value, dict) else value) for value in found])
+
+
+def _serial_number(battery: Record) -> str | None:
+    """The battery's, as its BMU tells it: what somebody has typed, or is assumed, is none."""
+    return str(battery.get("id")) if battery.get("source") == Source.SERIAL_NUMBER.value else None
 
 
 def _line(cells: Sequence[object]) -> str:

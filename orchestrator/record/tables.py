@@ -4,26 +4,26 @@
 and the newest checkpoint. `charges` has a row for each charge.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from itertools import groupby
 from pathlib import Path
 from sqlite3 import Connection
 
-from orchestrator.model import Cause
 from orchestrator.record.fold import Fold, Piece
 from orchestrator.record.lines import BEGIN, CHECKPOINT, END, Record, decoded
 from orchestrator.record.monthfile import DAMAGED, Known, Reader, is_continued, is_more, is_same, opened, present
 from orchestrator.record.row import COLUMNS, TYPES, as_row
 
 #: Of these tables; another one is built anew.
-VERSION = 1
+VERSION = 2
 _CHARGES = ", ".join(f"{column} {TYPES[kind]}" for column, (kind, _) in COLUMNS.items())
 SCHEMA = f"""
-CREATE TABLE files (name TEXT PRIMARY KEY, read INTEGER, crc INTEGER, tail INTEGER) WITHOUT ROWID;
+CREATE TABLE files (name TEXT PRIMARY KEY, read INTEGER, crc INTEGER, tail INTEGER, damaged INTEGER) WITHOUT ROWID;
 CREATE TABLE pieces (id TEXT, type TEXT, n INTEGER, file TEXT, at INTEGER, length INTEGER, PRIMARY KEY (id, type))
 WITHOUT ROWID;
 CREATE TABLE charges ({_CHARGES}, PRIMARY KEY (id)) WITHOUT ROWID;
+CREATE INDEX charges_of_battery ON charges (battery);
 PRAGMA user_version = {VERSION};
 """
 _INSERT = f"INSERT OR REPLACE INTO charges VALUES ({', '.join('?' * len(COLUMNS))})"  # noqa: S608 - question marks
@@ -53,8 +53,13 @@ def changed(db: Connection, folder: Path) -> bool:
     return any(name not in there for name in known) or any(is_more(folder / name, known.get(name)) for name in there)
 
 
-def update(db: Connection, folder: Path, say: Callable[[Cause], None]) -> None:
-    """Take in what the files have and the tables lack, in the caller's transaction; `say` is told of damaged files."""
+def damaged(db: Connection) -> list[str]:
+    """The files that are damaged: what is behind the damage is lost."""
+    return [str(name) for (name,) in db.execute("SELECT name FROM files WHERE damaged ORDER BY name")]
+
+
+def update(db: Connection, folder: Path) -> None:
+    """Take in what the files have and the tables lack, in the caller's transaction."""
     there = present(folder)
     for name in _known(db):
         if name not in there:
@@ -72,9 +77,8 @@ def update(db: Connection, folder: Path, say: Callable[[Cause], None]) -> None:
         if is_more(folder / name, known.get(name)):
             reader = Reader(folder / name, known.get(name))
             fold.take(reader, name, reader.at)
-            if reader.is_damaged:
-                say(Cause.of("records_damaged", file=str(folder / name)))
-            db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?)", (name, *reader.known))
+            row = (name, *reader.known, reader.is_damaged)
+            db.execute("INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?, ?)", row)
     _write_ends(db, ends)
     _write_open(db, folder, fold)
 

@@ -30,20 +30,28 @@ def battery(arguments: argparse.Namespace) -> int:
 def _list(arguments: argparse.Namespace) -> int:
     with charges_of(journal_of("battery", arguments.journal)) as charges:
         found = list(charges.batteries())
+    language = own_language()
     if arguments.json:
         print(json_text([one._asdict() | {"sources": one.sources.split(",")} for one in found]))
     elif found:
-        print(aligned([batteries_head(own_language()), *_rows(found)], own_width()))
+        print(aligned([batteries_head(language), *_rows(found, language)], own_width()))
     else:
-        print(say(Cause("charges_none"), own_language()))
+        print(say(Cause("charges_none"), language))
     return 0
 
 
-def _rows(found: list[Battery]) -> Iterator[Row]:
+def _rows(found: list[Battery], language: str) -> Iterator[Row]:
     for one in found:
         days = (utc(moment_s)[:10] for moment_s in (one.first_s, one.last_s))
         amounts = f"{one.ah:.1f}", f"{one.wh / 1000:.2f}"
-        yield one.id, one.sources.replace("_", " "), str(one.charges), *days, *amounts, soh(one.soh_pct)
+        yield (
+            one.id,
+            say(Cause.of("battery_sources", sources=tuple(one.sources.split(","))), language),
+            str(one.charges),
+            *days,
+            *amounts,
+            soh(one.soh_pct),
+        )
 
 
 def _life(arguments: argparse.Namespace) -> int:

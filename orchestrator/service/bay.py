@@ -58,7 +58,7 @@ class BayRunner:
         self.last_s, self.due_s = 0.0, -inf  #: when the last decision was made, and when the next is due at the latest
         self.decision: Decision | None = None
         self.policy, self._language = PolicyInForce(bay), language
-        self._store, self._say = store, say
+        self._store, self._say, self._charger, self._battery = store, say, charger, battery
         self._timer = StartTimer(self.place, store, journal, say, language)
         # A start that could not be persisted is withdrawn: the bay is held, as after a stop.
         self._answers = Answers(store, lambda: self.ask(Asked(Request.STOP)), self._timer.withdraw)
@@ -68,7 +68,6 @@ class BayRunner:
         self._ending: Cause | None = None
         self._waits: Cause | None = None  # why the next run must wait for an operator
         self._asleep_s, self._closely = 0.0, True  # the BMU is read closely until the first decision
-        self._charger, self._battery = charger, battery
         self._journal = BayJournal(bay, journal, language, snapshots=snapshots)
         self._contactor, self._record, self._feed = contactor, record, feed or Feed()
         self._starts, self._snapshot = starts or Starts(0.0, ""), Snapshot()  # no other bay to wait for
@@ -136,7 +135,7 @@ class BayRunner:
         before, clock = self._revision, WallClock(now_s, time())
         due = self._timer.due(clock)  # in any case: the first time reads what was kept
         asked = self._requests.take() or (due if self.decision is not None else ())
-        taken = self._taken = self._timer.take(Taken.of(asked, self._memory, self.name), self.decision)
+        taken = self._taken = self._timer.take(Taken.of(asked, self._memory, self.name), self.decision, clock)
         try:
             self._step(now_s, asleep_s, taken.request)
         except Exception as error:  # noqa: BLE001 - whatever it is: the charger must stop
@@ -189,7 +188,7 @@ class BayRunner:
         self._timer.decided(self._taken, decision.answer, clock)
         self._keep(self._memory, now_s)
         if self._record is not None:
-            self._record.take(clock, snapshot, decision, self.policy.rules.bay, self.identified.identity)
+            self._record.take(clock, snapshot, decision, self.policy.rules, self.identified.identity, self._memory)
 
     def _look(self, now_s: float, asleep_s: float, request: Request | None) -> Snapshot:
         """Everything known about the bay now."""
@@ -236,6 +235,7 @@ class BayRunner:
         """The bay's part of the status document; `closely`: with what costs too much for every bay of every answer."""
         known, clock = (self._snapshot, self._memory, self.policy.rules), WallClock(monotonic(), time())
         decision = told(self.decision or Decision(State.STARTING, Memory().cause, alarm=Alarm.DANGER), *known)
+        decision = self._timer.told(decision)
         return {
             **bay_status(self.name, self._snapshot, decision, clock.now_s, clock.wall_s, self._language),
             **outlook(decision, *known, clock, self._language, closely=closely),

@@ -10,7 +10,7 @@ from orchestrator.columns import folded, width_of
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain, without_then
 from orchestrator.page import Block, all_cut, loud
-from orchestrator.service.lasting import lasting, session_figures
+from orchestrator.record.lasting import lasting, session_figures
 from orchestrator.service.wallclock import WallClock
 from orchestrator.show import (
     Bay,
@@ -141,10 +141,11 @@ def _devices(bay: Bay, language: str) -> Iterator[Line]:
     yield "page_battery", "", ", ".join(shown) or "–"
     shown = list(_figures(charger, CHARGER, tuple(CHARGER) if charger.get("old") else (), language))
     if bay["step"] is not None:
-        shown.append(f"STEP {step_of(bay['step'], bay.get('step_current_a'))}")
+        shown.append(say(Cause.of("page_step", step=step_of(bay["step"], bay.get("step_current_a"))), language))
     yield "page_charger", "", ", ".join([*shown, *([str(bay["port"])] if bay.get("port") else [])]) or "–"
+    coming = cast("Mapping[str, object]", bay.get("next") or {}).get("text")
     notes = below({**bay, "faults": []}, language)  # as below its line in the table
-    yield from (("page_notes", "", text) for text in notes)
+    yield from (("page_notes", "", text) for text in notes if text != coming)
 
 
 def _figures(part: Mapping[str, object], forms: Mapping[str, str], old: Container[str], language: str) -> Iterator[str]:

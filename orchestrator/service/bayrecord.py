@@ -1,21 +1,25 @@
 """One bay's charges, kept for the record: folds the bay's decisions, and has the recorder write what is due."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from time import localtime
 
 from orchestrator import __version__
 from orchestrator.config.amperes import end_v
 from orchestrator.config.station import BayConfig
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
 from orchestrator.model import Decision, Request, Session, Snapshot
 from orchestrator.model.identity import Identity, Source
 from orchestrator.record import charge as charges
 from orchestrator.record import lines
 from orchestrator.record.charge import Charge
 from orchestrator.record.curve import Curve
-from orchestrator.record.look import Look
+from orchestrator.record.look import Foreseen, Look
 from orchestrator.record.stamp import Stamp
+from orchestrator.service.forecast import foresee
 from orchestrator.service.past import Place
 from orchestrator.service.recorder import Recorder
 from orchestrator.service.wallclock import WallClock
@@ -38,11 +42,15 @@ class BayRecord:
         self._early: deque[tuple[Look, BayConfig, Identity]] = deque(maxlen=MOST_EARLY)
 
     def take(
-        self, clock: WallClock, snapshot: Snapshot, decision: Decision, bay: BayConfig, identity: Identity
+        self, clock: WallClock, snapshot: Snapshot, decision: Decision, rules: Rules, identity: Identity, memory: Memory
     ) -> None:
-        """One more decision, under this policy, of this battery. Nothing that fails here may reach the charger."""
+        """One more decision and what it remembers, under this policy, of this battery.
+
+        Nothing that fails here may reach the charger.
+        """
         try:
-            self._early.append((self._look(clock, snapshot, decision), bay, identity))
+            look = self._look(clock, snapshot, decision, partial(foresee, snapshot, memory, rules))
+            self._early.append((look, rules.bay, identity))
             while self._early and self._recorder.loaded:
                 self._take(*self._early.popleft())
         except Exception as error:  # noqa: BLE001 - whatever it is, the bay goes on
@@ -54,9 +62,12 @@ class BayRecord:
             self._recorder.put_curve(self._charge.id, self._curve.rest(), ended=True)
             self._put(self._charge, self._charge.last)
 
-    def _look(self, clock: WallClock, snapshot: Snapshot, decision: Decision) -> Look:
+    def _look(
+        self, clock: WallClock, snapshot: Snapshot, decision: Decision, foresee: Callable[[], Foreseen | None]
+    ) -> Look:
         offset_min = localtime(clock.wall_s).tm_gmtoff // 60
-        return Look(Stamp(clock.wall_s, offset_min, clock.now_s, self._recorder.boot), snapshot, decision, clock.told)
+        stamp = Stamp(clock.wall_s, offset_min, clock.now_s, self._recorder.boot)
+        return Look(stamp, snapshot, decision, clock.told, foresee)
 
     def _take(self, look: Look, bay: BayConfig, identity: Identity) -> None:
         session, asked = look.session, look.snapshot
@@ -65,11 +76,11 @@ class BayRecord:
         if self._pending is None:
             self._pending = self._recorder.opened(self._place.bay, self._place.port)
             self._over = self._recorder.last(self._place.bay)
-        if self._pending and not self._go_on(self._pending, look, session):
+        if self._pending and not self._go_on(self._pending, look, session, bay):
             return
         charge = self._charge
         if charge is not None and session is not None and session.started_s == charge.started_s:
-            self._keep(charges.follow(_of(charge, identity), look), look)
+            self._keep(charges.follow(_under(_of(charge, identity), look, bay), look), look)
             return
         if charge is not None:
             self._put(charges.unseen(charge), charge.last)
@@ -83,7 +94,7 @@ class BayRecord:
         elif once:
             self._charge = replace(self._charge, head={**self._charge.head, "by": by})
 
-    def _go_on(self, pending: Sequence[Charge], look: Look, session: Session | None) -> bool:
+    def _go_on(self, pending: Sequence[Charge], look: Look, session: Session | None, bay: BayConfig) -> bool:
         """Go on with the charge left open that the core goes on with; the others have ended unseen. False: not yet."""
         if session is None and look.snapshot.not_persisted is not None:
             return False  # the core may have had no disk to remember it from: the next start will
@@ -93,7 +104,7 @@ class BayRecord:
                 self._put(charges.lost(one), one.last)
         self._pending = []
         if same and session is not None:
-            self._keep(charges.resumed(same[0], look, session), look)
+            self._keep(charges.resumed(_under(same[0], look, bay), look, session), look)
             return False
         return True
 
@@ -150,6 +161,12 @@ def _of(charge: Charge, identity: Identity) -> Charge:
     if identity.source is Source.ASSUMED or charge.head["battery"] == _fields(identity):
         return charge  # a battery that has just left is not known any more, and its charge ends with that
     return replace(charge, head={**charge.head, "battery": _fields(identity)})
+
+
+def _under(charge: Charge, look: Look, bay: BayConfig) -> Charge:
+    """The charge, under this policy: another one may have been read in a pause, or by the next run."""
+    policy = bay.policy
+    return charges.under(charge, policy.policy, policy.source.digest, __version__, look.stamp)
 
 
 def _fields(identity: Identity) -> Mapping[str, object]:

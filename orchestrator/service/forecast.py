@@ -13,7 +13,10 @@ from orchestrator.config.amperes import highest_step
 from orchestrator.core.facts import Facts
 from orchestrator.core.finish import goes_full, tapers, target
 from orchestrator.core.limits import bounds
-from orchestrator.model import State
+from orchestrator.core.memory import Memory
+from orchestrator.core.rules import Rules
+from orchestrator.model import Snapshot, State
+from orchestrator.record.look import Foreseen
 
 #: A charge has shown the pack's capacity once its SOC, in whole percent, has risen by this much.
 SHOWN_PCT = 10.0
@@ -26,6 +29,12 @@ LEAST_A = 0.2
 #: A longer estimate is none.
 MOST_H = 48.0
 SOC = "current.soc_pct"
+
+
+def foresee(snapshot: Snapshot, memory: Memory, rules: Rules) -> Foreseen | None:
+    """How long the charge still takes, for the record; None while no current is asked for."""
+    f = Facts.of(memory.last_s or 0.0, snapshot, memory, rules)
+    return Foreseen(target(f)[0], bmu_minutes(f), own_minutes(f)) if f.energised else None
 
 
 def bmu_minutes(f: Facts) -> float | None:

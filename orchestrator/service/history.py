@@ -8,9 +8,9 @@ from typing import Any
 
 from orchestrator.model import Cause
 from orchestrator.model.cause import from_plain, said, without_then
+from orchestrator.record.lasting import session_figures
 from orchestrator.record.utc import unix_s
 from orchestrator.service.journal_files import Fields, records_of
-from orchestrator.service.lasting import session_figures
 from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import say
 
@@ -139,6 +139,9 @@ class Story:
         self._ended = _id(record) in ("ended", "ended_well")
         return self._cause(record, "text"), "attention" if _id(record) in FAILURES else ""
 
+    def _timed(self, record: Fields) -> tuple[Cause, str] | None:
+        return self._cause(record, "text"), "attention" if _id(record) == "start_not_made" else ""
+
     def _lost(self, record: Fields) -> tuple[Cause, str] | None:
         return Cause.of("event_lost", lines=record["lines"]), "attention"
 
@@ -171,6 +174,7 @@ TELLERS: Mapping[str, Teller] = {
     "run": Story._run,  # noqa: SLF001
     "request": Story._request,  # noqa: SLF001
     "station": Story._station,  # noqa: SLF001
+    "timed_start": Story._timed,  # noqa: SLF001
     "lost": Story._lost,  # noqa: SLF001
 }
 

@@ -52,7 +52,9 @@ def _add_battery(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -
 def _add_report(verbs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     report = verbs.add_parser("report", help="sum up a month: energy, charges, why they ended, batteries to look at")
     report.add_argument("--month", metavar="YYYY-MM", help="which (default: that of the newest charge)")
-    report.add_argument("--html", type=Path, metavar="FILE", help="write a web page that needs no network")
+    form = report.add_mutually_exclusive_group()
+    form.add_argument("--html", type=Path, metavar="FILE", help="write a web page that needs no network")
+    form.add_argument("--json", action="store_true", help="for programs")
     _add_journal(report)
     report.set_defaults(run=_report)
 

@@ -61,6 +61,9 @@ def _list(arguments: argparse.Namespace) -> int:
         none = Cause("charges_none_such" if not found and charges.bays() else "charges_none")
     shown = found if arguments.limit is not None or since else found[:USUAL]
     print(table(shown, language, own_width()) if found else say(none, language))
+    if len(shown) > 1:
+        ah, wh = (sum(charge["charger"][name] for charge in shown) for name in ("ah", "wh"))
+        print(say(Cause.of("charges_total", charges=len(shown), ah=ah, kwh=wh / 1000), language))
     if len(shown) < len(found):
         print(say(Cause.of("charges_more", shown=USUAL), language))
     return 0

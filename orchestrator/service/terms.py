@@ -7,8 +7,8 @@ from typing import Self
 
 from orchestrator.errors import RequestError
 from orchestrator.model import Cause
+from orchestrator.record.lasting import lasting
 from orchestrator.service.instant import instant
-from orchestrator.service.lasting import lasting
 from orchestrator.service.reception import Answer, Later
 from orchestrator.service.wallclock import WallClock
 from orchestrator.text.catalogue import fields

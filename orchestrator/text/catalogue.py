@@ -3,8 +3,9 @@
 Theory of operation. A template is stored under the id of its cause. It names its parameters, with the rounding of the
 figures. A frame combines it with any advice; `where` precedes the evidence, `because` (a person's own words), `then` and
 `how` follow. Besides the number
-formats there are five of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
-`then` (how the parts of a list are joined), `after` (a cause, if there is one, after what precedes it).
+formats there are six of our own: `word` (a word of a fixed list, translated), `nth` (the first time …), `and` and
+`then` (how the parts of a list are joined), `after` (a cause, if there is one, after what precedes it), `past` (a cause
+in the past tense).
 
 Past conditions use the past tense: a template holds both, `{reports|reported}`, and the cause says which applies
 (`past`). Moments normally arrive as the time of day, in parameters called `…_at`. A cause straight from the core, which
@@ -221,7 +222,9 @@ class _Value:
         if value is None:
             return "" if form in ("", "after") else "–"
         if isinstance(value, Cause):
-            return (texts.frames["then"] if form == "after" else "") + _sentence(value, texts)
+            return (texts.frames["then"] if form == "after" else "") + _sentence(
+                value, replace(texts, texts=texts.past) if form == "past" else texts
+            )
         if isinstance(value, tuple):
             joint = "then" if not form and any(isinstance(one, Cause) for one in value) else JOINS[form]
             return texts.frames[joint].join(_words(value, texts))

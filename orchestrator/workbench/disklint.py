@@ -17,8 +17,8 @@ MOUNTS = Path("/proc/self/mounts")
 VOLATILE = frozenset({"tmpfs", "ramfs", "devtmpfs"})
 #: Directories that the shipped unit has systemd make (RuntimeDirectory, StateDirectory).
 MADE = (Path("/run/orchestrator"), Path("/var/lib/orchestrator"))
-#: Here only root may create a directory, and the service is not root.
-OF_ROOT = (Path("/etc"), Path("/run"), Path("/usr"), Path("/var"))
+#: Here, and in `/` itself, only root may create a directory, and the service is not root.
+OF_ROOT, TOP = (Path("/etc"), Path("/run"), Path("/usr"), Path("/var")), Path("/")
 JOURNAL = "journal.directory"
 #: What to write instead, by key.
 BETTER = {
@@ -70,7 +70,8 @@ def unmakeable(directory: Path) -> Path | None:
     if not os.access(above, os.W_OK | os.X_OK):
         return above
     everybody = above.stat().st_mode & stat.S_IWOTH
-    return above if not everybody and any(_real(above).is_relative_to(root) for root in OF_ROOT) else None
+    is_roots = _real(above) == TOP or any(_real(above).is_relative_to(root) for root in OF_ROOT)
+    return above if is_roots and not everybody else None
 
 
 def _real(path: Path) -> Path:

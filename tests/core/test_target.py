@@ -72,7 +72,7 @@ def test_to_60_stops_at_60_and_stays_there() -> None:
     assert world.is_in(S.CHARGING)
     rises(world, 60.0)
     world.until(S.FULL)
-    assert "SOC 60.0 % reached 60 %: charges once to 60 %, asked by kim at 7 s" in reason_of(world.decision)
+    assert "SOC 60.0 % reached 60 %: charged once to 60 %, asked by kim at 7 s" in reason_of(world.decision)
     rises(world, 58.0)
     world.run(60)
     assert world.is_in(S.FULL)

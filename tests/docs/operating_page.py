@@ -15,6 +15,10 @@ from unittest.mock import patch
 from orchestrator.config.station import JournalConfig
 from orchestrator.core.memory import Memory
 from orchestrator.model import ControlMode, Request
+from orchestrator.model.cause import plain
+from orchestrator.record.lines import Record, encoded
+from orchestrator.record.months import FOLDER
+from orchestrator.record.spread import PARTS as PARTS_OF_VALUES
 from orchestrator.record.table import BOM
 from orchestrator.service import bay as bay_module
 from orchestrator.service import policy_in_force as policy_module
@@ -26,7 +30,12 @@ from orchestrator.sim.faults import FAULTS
 from orchestrator.sim.presets import PACKS
 from tests.proof.virtual_rig import Nature
 from tests.proof.virtual_service import World, station, world
+from tests.record.aged_battery import Life
+from tests.record.health_lives import charges_of
+from tests.record.made import FULL
 from tests.waiting import wait_until
+from tests.whole.recipe import until_all_charge
+from tests.whole.station import whole_station
 from tests.whole.terminal import Terminal
 
 LINES, COLUMNS = 90, 100
@@ -39,12 +48,13 @@ BEFORE_S, AFTER_S, MANY_S = 60.0, 900.0, 60.0
 LEAD_S = 150.0
 #: The bays of the smaller station, and the SOC in the last of them.
 FEW, FULL_PCT = 5, 99.0
+#: The seed of a battery that has aged.
+AGED = 22
 HEAD = """\
 # Operating a station: a question, a command
 
 Each command below was run on an emulated station, and its output is as it came, on a terminal of 100 columns: five
-bays, one overheated, one with a loose plug, one stopped, one full, a quarter of an hour after a power failure. Not
-shown: `report` sums up a month, `battery ID` is the life of a battery, with its health.
+bays, one overheated, one with a loose plug, one stopped, one full, a quarter of an hour after a power failure.
 `python -m tests.docs.operating_page DIRECTORY` makes this page again.
 
 """
@@ -98,7 +108,8 @@ ANSWERS = (
     ),
     Answer(
         "Does it start by itself, and when?",
-        "NEXT says it. BATTERY begins with which one it is. If the start could not be made, NOTES says why, for a day.",
+        "NEXT says it. BATTERY begins with which one it is. "
+        "If it was not made, or a stop or a pause has cancelled it, NOTES says why, for a day.",
         "status bay-4",
     ),
     Answer(
@@ -109,8 +120,9 @@ ANSWERS = (
     ),
     Answer("How far does it charge, and who wants that?", "NOTES says it until the charge is over.", "status bay-5"),
     Answer(
-        "How much energy has each charge taken today?",
-        "KWH. A charge that goes on has what it took so far.",
+        "How much energy today?",
+        "KWH of each charge, and the sum below. A charge that goes on has what it took until it was last recorded. "
+        "`report` sums up a month.",
         f"sessions --since 1d --journal {SHOWN}/journal",
     ),
     Answer(
@@ -135,18 +147,25 @@ MANY = Answer(
     "In a window of 80 × 30; `status --problems` has the whole sentences.",
     "status --group",
 )
-
-
-LAST = """\
-## Pause all bays but one
-`orchestrator pause --all --except bay-1`. Each bay answers in a line (`bay-2: pause accepted; stands by, verified`),
-and the exit status is 0 once all of them stand by. `start` lets them go on; each charge goes on where it was.
-
-## Which battery gets old?
-Each charge measures its battery: what it still holds and its resistance, each with an interval that says how far to
-believe it. A warning says where the BMU's own SOH does not fit. What the figures mean, and when there are none:
-[health.md](health.md).
-"""
+PAUSE = Answer(
+    "Pause all bays but one",
+    "The exit status is 0 once all of them stand by. `start` lets them go on; each charge goes on where it was.",
+    "pause --all --except bay-1",
+)
+BATTERIES = (
+    Answer(
+        "Which battery gets old?",
+        "Those of a month that need a look, last. Each charge measures its battery: what it still holds and its "
+        "resistance, each with an interval that says how far to believe it, and a warning where the BMU's own SOH does "
+        "not fit. What the figures mean, and when there are none: [health.md](health.md).",
+        f"report --month 2025-11 --journal {SHOWN}/journal",
+    ),
+    Answer(
+        "How old is this one?",
+        "Its life, its health, its charges.",
+        f"battery B-0042 --limit 3 --journal {SHOWN}/journal",
+    ),
+)
 
 
 def shown(directory: Path, command: str, lines: int = LINES, columns: int = COLUMNS) -> str:
@@ -201,6 +220,9 @@ def living(
         begin_s = made.time.now_s
         now[0] = lambda: began_s + made.time.now_s - begin_s
         journal = Journal(directory / "journal", 100.0, lambda: made.time.now_s, lambda: now[0](), boot=boot)
+        recorder = made.supervisor._recorder
+        assert recorder is not None
+        recorder.boot = boot
         made.journal.put, made.journal.note = journal.put, journal.note  # type: ignore[method-assign]
         made.journal.problem = lambda _: None  # type: ignore[attr-defined]
 
@@ -281,8 +303,36 @@ def large(directory: Path) -> Iterator[str]:
     yield from found
 
 
+def real(directory: Path) -> Iterator[str]:
+    """The section that waits for chargers: an emulated plant, and the service in real time."""
+    with whole_station(directory, 3) as (plant, service):
+        service.start()
+        until_all_charge(plant, service)
+        (directory / "socket").symlink_to(service.socket)
+        yield section(PAUSE, shown(directory, PAUSE.command))
+
+
+def whole(record: Record) -> Record:
+    """The record of such a charge with the figures of its stretch."""
+    found = record["measured"]["stretch"]
+    ah, soc = found["charger_ah"], (found["from_pct"], found["to_pct"], found["from_pct"], found["to_pct"])
+    values = {**record["values"], "soc_pct": dict(zip(PARTS_OF_VALUES, soc, strict=True))}
+    charger, bmu = {"ah": ah, "wh": 50.0 * ah}, {"ah": found["bmu_ah"], "wh": 50.0 * found["bmu_ah"]}
+    return {**record, "station": "depot-1", "values": values, "charger": charger, "bmu": bmu, "result": plain(FULL)}
+
+
+def old(directory: Path) -> Iterator[str]:
+    """The sections of a battery that has aged, while its BMU has not noticed."""
+    folder = directory / "journal" / FOLDER
+    folder.mkdir(parents=True)
+    life = Life(AGED)
+    life.count, life.hall_c, life.season_k, life.deepest_pct, life.stale_soh = 12, 25.0, 0.0, 10.0, True
+    (folder / "2025-12.jsonl").write_bytes(b"".join(map(encoded, map(whole, charges_of(life)))))
+    yield from (shown_of(directory, one) for one in BATTERIES)
+
+
 #: The parts of the page, by the names of their directories.
-PARTS = {"small": small, "large": large}
+PARTS = {"small": small, "large": large, "real": real, "old": old}
 
 
 def main(directory: Path, only: Sequence[str] = ()) -> None:
@@ -290,7 +340,7 @@ def main(directory: Path, only: Sequence[str] = ()) -> None:
     for name in only or PARTS:
         (directory / name).mkdir(parents=True, exist_ok=True)
     parts = [part for name in only or PARTS for part in PARTS[name](directory / name)]
-    print(("" if only else HEAD) + "\n".join(part.rstrip() + "\n" for part in [*parts, LAST]), end="")  # noqa: T201 - the page
+    print(("" if only else HEAD) + "\n".join(part.rstrip() + "\n" for part in parts), end="")  # noqa: T201 - the page
 
 
 if __name__ == "__main__":

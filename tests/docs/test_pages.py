@@ -40,7 +40,8 @@ def test_the_picture_in_the_readme_is_the_machine() -> None:
 def test_each_command_of_the_operating_page_is_one() -> None:
     written = (DOCS / "operating.md").read_text(encoding="utf-8")
     commands = re.findall(r"^\$ orchestrator (.+)$", written, re.MULTILINE)
-    assert commands == [*(one.command for one in operating_page.ANSWERS), operating_page.MANY.command]
+    answers = [*operating_page.ANSWERS, operating_page.MANY, operating_page.PAUSE, *operating_page.BATTERIES]
+    assert commands == [one.command for one in answers]
     for command in commands:
         assert _parser().parse_args(command.split())
 

@@ -28,8 +28,11 @@ from orchestrator.record.utc import unix_s, utc
 from tests.record.made import FULL, charge
 
 MONTHS, BAYS, BATTERIES, CHECKPOINTS = 60, 16, 97, 24
-#: How often a list is measured; the quickest counts, since the machine does other things, too.
-TIMES = 7
+#: What is measured, and how often; the quickest counts, since the machine does other things, too.
+WHAT = {
+    "sessions": 7, "sessions --bay bay-03 --limit 20": 7, "sessions --battery B-0042 --limit 20": 7, "report": 3,
+    "sessions --csv": 1,
+}  # fmt: skip
 
 
 def full_life() -> list[Record]:
@@ -96,7 +99,7 @@ def measured(*words: str) -> tuple[float, float, float]:
     """Wall and processor seconds of a command, and the peak of all commands so far in MiB."""
     before, begin_s = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
     subprocess.run(
-        [sys.executable, "-m", "orchestrator", "sessions", *words],
+        [sys.executable, "-m", "orchestrator", *words],
         check=True,
         stdout=subprocess.DEVNULL,
         env=os.environ,
@@ -114,15 +117,15 @@ def main(count: int) -> None:
         packed = sum(path.stat().st_size for path in (journal / "sessions").iterdir())
         print(f"{count:,} charges: {size / 1e9:.2f} GB of records, {packed / 1e6:.0f} MB on disk", flush=True)
         there = ("--journal", name)
-        wall_s, cpu_s, peak_mib = measured("rebuild", *there)
+        wall_s, cpu_s, peak_mib = measured("sessions", "rebuild", *there)
         index = (journal / "sessions" / NAME).stat().st_size
         print(
             f"rebuild: {wall_s:.1f} s ({cpu_s:.1f} s processor), {peak_mib:.0f} MiB at most; index {index / 1e6:.0f} MB"
         )
-        for what in ((), ("--bay", "bay-03", "--limit", "20"), ("--battery", "B-0042", "--limit", "20"), ("--csv",)):
-            runs = [measured(*what, *there) for _ in range(TIMES if what != ("--csv",) else 1)]
+        for what, times in WHAT.items():
+            runs = [measured(*what.split(), *there) for _ in range(times)]
             wall_s, cpu_s, peak_mib = (min(values) for values in zip(*runs, strict=True))
-            print(f"sessions {' '.join(what)}: {wall_s:.2f} s ({cpu_s:.2f} s processor)", flush=True)
+            print(f"{what}: {wall_s:.2f} s ({cpu_s:.2f} s processor)", flush=True)
 
 
 if __name__ == "__main__":

@@ -165,9 +165,9 @@ class Life:
     def _follow_index(self) -> None:
         folder = self.kept.directory / FOLDER
         if self.index is not None:
-            self.index = index._current(self.index, folder, self.kept.said.append)
+            self.index = index._current(self.index, folder)
         elif folder.is_dir():
-            self.index = index._built(":memory:", folder, self.kept.said.append)
+            self.index = index._built(":memory:", folder)
 
     # --- what must hold -----------------------------------------------------------------------------------------------
 
@@ -197,7 +197,7 @@ class Life:
             assert not amounts, "there is no index"
             return
         assert dict(self.index.execute("SELECT id, charger_ah FROM charges")) == amounts, "the index has other charges"
-        new = index._built(":memory:", self.kept.directory / FOLDER, self.kept.said.append)
+        new = index._built(":memory:", self.kept.directory / FOLDER)
         assert list(self.index.iterdump()) == list(new.iterdump()), "a new index is another one"
 
 

@@ -37,7 +37,7 @@ def said(capsys: pytest.CaptureFixture[str], journal: Path, *arguments: str, sta
 
 def test_each_battery_is_in_the_list_once(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _, first, second = said(capsys, journal).splitlines()
-    assert first.split() == ["B-1", "assumed,typed", "3", "2026-11-28", "2026-12-01", "80.0", "4.00", "97", "%"]
+    assert first.split() == ["B-1", "assumed,", "typed", "3", "2026-11-28", "2026-12-01", "80.0", "4.00", "97", "%"]
     assert second.split()[:3] == ["B-2", "typed", "1"]
     assert [one["charges"] for one in json.loads(said(capsys, journal, "--json"))] == [3, 1]
 

@@ -2,17 +2,30 @@
 
 import gzip
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from orchestrator import __version__
 from orchestrator.core.persisted import Persisted
-from orchestrator.model import Cause, Request, State
+from orchestrator.model import Cause, Decision, Request, Snapshot, State
 from orchestrator.record.charges import Charges
+from orchestrator.record.forecast import Forecast, follow
+from orchestrator.record.look import Foreseen, Look
+from orchestrator.record.stamp import Stamp
+from orchestrator.record.table import why_ended
 from orchestrator.service.asked import Asked
 from orchestrator.service.asker import Asker
 from orchestrator.service.recorder import Recorder
 from tests.record.kept import WALL_S, Kept
+from tests.service.bench import the_bay
+
+RUNNING = Decision(State.CHARGING, Cause("charging"))
+
+
+def _by_the_bmu() -> Foreseen:
+    return Foreseen(100.0, 37.0, None)
 
 
 @pytest.fixture(name="kept")
@@ -104,6 +117,58 @@ def test_a_pause_is_part_of_the_charge_with_its_reason(kept: Kept) -> None:
     assert records[-1]["result"]["id"] == "operator_stop"
 
 
+def test_what_was_foreseen_and_what_came_of_it_stands_with_it(kept: Kept) -> None:
+    kept.bench.charging()
+    kept.bench.step(int(70 / 0.2))
+    kept.recorder.turn()
+    kept.again(kept.persisted(), 60.0)  # it is not forgotten, and not made once more
+    kept.bench.until(State.HELD)
+    kept.bench.ask(Request.START)
+    kept.bench.charging()
+    kept.bench.battery.values["soc_pct"] = 100.0
+    kept.bench.until(State.FULL)
+    *earlier, end = kept.records()
+    assert earlier[-1]["forecast"]["elapsed_s"] == end["forecast"]["elapsed_s"] == pytest.approx(40.0, abs=10.0)
+    assert (end["forecast"]["target_pct"], end["forecast"]["bmu_min"]) == (100, None)
+    assert end["forecast"]["own_min"] > 10
+    assert end["forecast"]["took_min"] == pytest.approx((end["lasted_s"] - end["forecast"]["elapsed_s"]) / 60, abs=0.1)
+    assert "took_min" not in earlier[-1]["forecast"]
+    assert [one["step"] for one in end["steps"]] == [5]
+    assert sum(one["ah"] for one in end["steps"]) == pytest.approx(end["charger"]["ah"], abs=1e-5)
+    assert sum(one["s"] for one in end["steps"]) == pytest.approx(end["energised_s"], abs=0.01)
+
+
+def test_the_bmus_forecast_alone_waits_for_ours() -> None:
+    forecasts = [Forecast()]
+    for elapsed_s in (0.0, 5.0, 110.0, 121.0):
+        look = Look(Stamp(WALL_S, 0, 1000.0 + elapsed_s, "b"), Snapshot(), RUNNING, lambda cause: cause, _by_the_bmu)
+        forecasts.append(follow(forecasts[-1], look, elapsed_s))
+    assert [one.made is not None for one in forecasts] == [False, False, False, False, True]
+    assert follow(Forecast(), look, 601.0).made is None, "that is no begin any more"
+
+
+def test_another_policy_in_mid_charge_is_noted(kept: Kept) -> None:
+    kept.bench.charging()
+    kept.bench.ask(Request.PAUSE)
+    kept.bench.until(State.SUSPENDED)
+    mine = the_bay()
+    other = replace(mine.policy, policy="other", source=replace(mine.policy.source, digest="f" * 64))
+    kept.bench.bay.policy.offer(replace(mine, policy=other))
+    kept.bench.step(3)
+    assert [one["sha256"] for one in kept.records()[-1]["changes"]] == ["f" * 64], "at once"
+    kept.again(kept.persisted(), 60.0)  # the next run has the first policy again
+    kept.bench.step(10)
+    kept.bench.ask(Request.STOP)
+    kept.bench.step(10)
+    end = kept.records()[-1]
+    assert end["policy"]["sha256"] == mine.policy.source.digest
+    assert [(one["policy"], one["sha256"]) for one in end["changes"]] == [
+        ("other", "f" * 64),
+        (mine.policy.policy, mine.policy.source.digest),
+    ]
+    assert all(one["utc"].endswith("Z") and one["software"] == __version__ for one in end["changes"])
+
+
 def test_a_running_charge_is_recorded_again_and_again(kept: Kept) -> None:
     kept.bench.charging()
     kept.bench.step(int(130 / 0.2))
@@ -113,12 +178,19 @@ def test_a_running_charge_is_recorded_again_and_again(kept: Kept) -> None:
 def test_a_death_of_the_service_is_a_pause_of_the_same_charge(kept: Kept) -> None:
     kept.bench.charging()
     kept.bench.step(400)  # beyond a checkpoint
+    died_s = kept.wall()
     persisted = kept.persisted()
     assert persisted.session is not None
     before_ah = persisted.session.charged_ah
     kept.recorder.turn()
     kept.again(persisted, 60.0)
     kept.bench.until(State.HELD)
+    kept.recorder.turn()
+    (listed,) = Charges(kept.directory / "sessions").listed()
+    why = why_ended(listed, "en")
+    assert why.startswith("not ended; paused since 2026-11-28 ")
+    assert ": the service died; last sign of life: 2026-11-28 " in why
+    assert why == why_ended(next(Charges(kept.directory / "sessions").whole([listed["id"]])), "en")
     kept.bench.ask(Request.START)
     kept.bench.charging()
     kept.bench.ask(Request.STOP)
@@ -131,6 +203,7 @@ def test_a_death_of_the_service_is_a_pause_of_the_same_charge(kept: Kept) -> Non
     (pause,) = end["pauses"]
     assert pause["cause"]["id"] == "service_died"
     assert pause["lasted_s"] > 60
+    assert pause["unix_s"] == pytest.approx(died_s, abs=1.0), "by the core's counters, not at the last record"
     assert end["charger"]["ah"] > before_ah
     assert end["charger"]["ah"] == pytest.approx(end["counted"][0], abs=1e-5)
 

@@ -1,5 +1,6 @@
 """`orchestrator report`: a month of charges, per bay and in all."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -102,3 +103,40 @@ def test_wrong_use_says_what_is_expected(
 
 def test_a_station_without_charges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert said(capsys, "--journal", str(tmp_path)) == "no charge on record\n"
+
+
+def worn(number: int) -> Record:
+    """A charge that shows 15 Ah of rated 20 Ah, of a battery whose BMU reports SOH 97 %."""
+    stretch = {
+        "from_pct": 20.0,
+        "to_pct": 90.0,
+        "charger_ah": 10.5,
+        "bmu_ah": 10.5,
+        "lowest_c": 20.0,
+        "highest_c": 25.0,
+    }
+    record = end(number, 6, 10.5, battery="B-4")
+    policy = {**record["policy"], "capacity_ah": 20.0}
+    return {**record, "policy": policy, "measured": {"stretch": stretch, "steps": [], "hot_s": 0.0, "high_s": 0.0}}
+
+
+def test_a_battery_whose_soh_does_not_fit_needs_a_look(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with (journal / "sessions" / "2026-11.jsonl").open("ab") as file:
+        file.writelines(encoded(worn(number)) for number in (10, 20, 30, 70))
+    assert "B-4  the BMU's SOH of 97 % does not fit its charges, which show " in said(
+        capsys, "--month", "2026-12", "--journal", str(journal)
+    )
+    assert "does not fit" not in said(capsys, "--month", "2026-10", "--journal", str(journal))
+
+
+def test_programs_read_the_same(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = json.loads(said(capsys, "--month", "2026-11", "--json", "--journal", str(journal)))
+    assert (found["month"], found["stations"]) == ("2026-11", ["depot"])
+    assert found["bays"]["bay-2"] == {"charges": 1, "full": 1, "ah": 20.0, "wh": 1000.0, "mean_full_s": 3600.0}
+    assert found["total"]["charges"] == 4
+    assert [(one["id"], one["charges"]) for one in found["ends"]] == [
+        ("full", 2), ("charge_open", 1), ("over_temperature", 1),
+    ]  # fmt: skip
+    assert [(one["battery"], one["causes"][0]["id"]) for one in found["look_at"]] == [("B-1", "look_faults")]
+    empty = json.loads(said(capsys, "--month", "2026-10", "--json", "--journal", str(journal)))
+    assert (empty["total"]["charges"], empty["bays"], empty["look_at"]) == (0, {}, [])

@@ -13,6 +13,7 @@ from orchestrator.columns import width_of
 from orchestrator.model import Request, State
 from orchestrator.record import index
 from orchestrator.record.lines import encoded
+from orchestrator.record.table import as_csv
 from tests.record.kept import Kept
 from tests.record.made import end
 
@@ -47,12 +48,13 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -
 
 
 def test_the_table_has_the_newest_charge_first(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    head, newest, stopped, full = said(capsys, "--journal", str(journal)).splitlines()
+    head, newest, stopped, full, total = said(capsys, "--journal", str(journal)).splitlines()
     assert head.split()[:4] == ["BEGAN", "BAY", "BATTERY", "LASTED"]
-    assert newest.endswith("not ended")
+    assert "  not ended; last recorded at 2026-11-28 " in newest
     assert stopped.endswith("stopped by the operator")
     assert "50→100 %" in full
     assert "full: SOC 100 %" in full
+    assert re.fullmatch(r"3 charges: \d\.\d\d Ah, 0\.\d{3} kWh", total)
 
 
 def test_the_table_fits_a_terminal(
@@ -103,6 +105,12 @@ def test_csv_is_what_a_spreadsheet_reads(journal: Path, capsys: pytest.CaptureFi
     assert full["begin"].endswith("Z")
     assert full["end"].endswith("Z")
     assert float(full["charger_ah"]) > 0
+    assert (full["soC"], full["soH"], full["serialNumber"]) == (full["soc_end_pct"], full["soh_pct"], ""), (
+        "OCPP's names"
+    )
+    told = {**end(1, 1), "battery": {"id": "SN-7", "source": "serial_number"}}
+    (row,) = csv.DictReader(io.StringIO("".join(as_csv([told], "en"))))
+    assert row["serialNumber"] == "SN-7"
 
 
 def test_one_charge_is_shown_by_the_end_of_its_id(journal: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,7 +121,7 @@ def test_one_charge_is_shown_by_the_end_of_its_id(journal: Path, capsys: pytest.
     assert "ended: stopped by the operator" in page
     assert "Pauses:" in page
     assert "paused by the operator" in page
-    assert "soc_pct" in page
+    assert "SOC, %" in page
 
 
 def test_an_empty_record_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -180,10 +188,10 @@ def test_the_usual_table_is_the_newest_fifty(
     def lines(*arguments: str) -> list[str]:
         return said(capsys, "--journal", str(tmp_path), *arguments).splitlines()
 
-    assert len(lines()) == 52
+    assert len(lines()) == 53
     assert lines()[-1] == "the newest 50; there are more: --limit 0 lists all"
-    assert len(lines("--limit", "50")) == 51
-    assert len(lines("--limit", "0")) == len(lines("--since", "2026-11-01")) == len(lines("--csv")) == 61
+    assert len(lines("--limit", "50")) == 52
+    assert len(lines("--limit", "0")) == len(lines("--since", "2026-11-01")) == 1 + len(lines("--csv")) == 62
 
 
 def test_the_index_is_built_anew_when_asked(

@@ -8,7 +8,7 @@ import pytest
 from orchestrator.columns import width_of
 from orchestrator.model import Cause
 from orchestrator.page import page
-from orchestrator.show import HEAD, figure, stands_by, strays, what_to_do
+from orchestrator.show import figure, head, stands_by, strays, what_to_do
 from orchestrator.text.catalogue import fields
 
 
@@ -288,7 +288,7 @@ def test_a_wide_letter_before_a_reason_takes_nothing_out_of_it(old: list[str]) -
     for width in range(130, 221):
         head, *lines = table([bay(reason=reason, battery=battery)], "ko", width).splitlines()
         first, *more = lines[:-1]
-        column = width_of(head[: head.index("WHY")])
+        column = width_of(head[: head.index("이유")])
         start = next(number for number in range(len(first)) if width_of(first[:number]) == column)
         assert " ".join([first[start:], *map(str.strip, more)]) == reason, width
 
@@ -300,8 +300,10 @@ def test_old_values_make_no_line_wider_than_the_screen(width: int, language: str
     told = bay(charger={"current_a": 14.0, "old": True, "age_s": 46.0}, battery=battery)
     lines = table([told, bay(name="bay-2")], language, width).splitlines()
     assert max(map(width_of, lines)) <= width
-    assert " ".join(lines[:2]).split()[: len(HEAD) - 1] == list(HEAD[:-1])
-    steps = [width_of(line[: line.index(step)]) for line in lines for step in ("STEP", "2 (5.0 A)  ") if step in line]
+    *heads, _ = head(language)
+    assert " ".join(lines[:2]).split()[: len(heads)] == heads
+    marks = (heads[-1], "2 (5.0 A)  ")
+    steps = [width_of(line[: line.index(mark)]) for line in lines for mark in marks if mark in line]
     assert len(set(steps)) == 1
 
 

@@ -83,25 +83,64 @@ def test_it_starts_by_itself_at_that_time(tmp_path: Path, wall: Wall) -> None:
     wall.now_s = AT_S
     bench.charging()
     assert told(bench) == ""
-    made = [fields_of(line) for _, _, _, line in bench.journal._waiting[False] if line[0] == "timed_start"]
-    assert [one["text"] for one in made] == ["started at 22:00, as root for kim asked at 18:10"]
-    assert isinstance(cause := made[0]["cause"], dict) and cause["id"] == "started_later_by"
+    assert journal(bench) == ["started at 22:00, as root for kim asked at 18:10"]
     wall.now_s = AT_S - 7200  # the clock is set back: it has been made
     asks(bench, Asked(Request.STOP, LEE))
     wall.now_s = AT_S + 1
     assert bench.step(20) is State.HELD
 
 
-@pytest.mark.parametrize("asked", [Asked(Request.STOP, LEE), Asked(Request.START, LEE)], ids=["stop", "start"])
-def test_a_stop_or_another_start_cancels_it(tmp_path: Path, wall: Wall, asked: Asked) -> None:
+CANCELLED = "the start at 22:00, asked by root for kim at 18:10, is cancelled: "
+
+
+@pytest.mark.parametrize(
+    ("asked", "why"),
+    [
+        (Asked(Request.STOP, LEE), "stopped by root for lee at 18:10"),
+        (Asked(Request.STOP), "stopped by the operator"),
+        (Asked(Request.START, LEE), "started by root for lee at 18:10"),
+        (Asked(Request.START, LEE, start_unix_s=AT_S + 600), "starts at 22:10 (asked by root for lee at 18:10)"),
+    ],
+    ids=["stop", "stop by nobody known", "start", "start for later"],
+)
+def test_a_stop_or_another_start_cancels_it(tmp_path: Path, wall: Wall, asked: Asked, why: str) -> None:
     bench = held(tmp_path)
     asks(bench, asked)
-    assert told(bench) == ""
+    assert journal(bench) == [CANCELLED + why]
     asks(bench, Asked(Request.STOP, KIM))
     bench.step(20)
     wall.now_s = AT_S
     assert bench.step(20) is State.HELD
-    assert bench.store.past(bench.bay.place).timed is None
+    timed = bench.store.past(bench.bay.place).timed
+    assert timed is None or timed.outcome is not None
+
+
+def test_who_has_cancelled_it_is_told_for_a_day_over_a_restart(tmp_path: Path, wall: Wall) -> None:
+    before = held(tmp_path)
+    lee = Asker(behind="lee", uid=0, unix_s=ASKED_S, because="wet floor")
+    asks(before, Asked(Request.STOP, lee))
+    asks(before, Asked(Request.STOP, KIM))  # which changes nothing of it
+    bench = after(before, tmp_path / "2")
+    bench.step()
+    assert told(bench) == CANCELLED + "stopped by root for lee at 18:10: wet floor"
+    wall.now_s = AT_S + 86401
+    bench.step()
+    assert told(bench) == ""
+
+
+def journal(bench: Bench) -> list[str]:
+    """What the journal says of starts for later."""
+    found = [fields_of(line) for _, _, _, line in bench.journal._waiting[False] if line[0] == "timed_start"]
+    return [str(one["text"]) for one in found]
+
+
+def test_nobody_is_told_to_start_what_starts_by_itself(tmp_path: Path, wall: Wall) -> None:
+    bench = held(tmp_path)
+    bench.step()
+    document = bench.bay.status()
+    assert (document["reason"], told(bench)[:15]) == ("stopped by root for kim at 18:10", "starts at 22:00")
+    asks(bench, Asked(Request.STOP, LEE))
+    assert str(bench.bay.status()["reason"]).endswith("; to go on: orchestrator start bay-1")
 
 
 def test_a_pause_since_cancels_it(tmp_path: Path, wall: Wall) -> None:
@@ -111,10 +150,9 @@ def test_a_pause_since_cancels_it(tmp_path: Path, wall: Wall) -> None:
     asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S))
     asks(bench, Asked(Request.PAUSE, LEE))
     bench.until(State.SUSPENDED)
-    assert told(bench) == ""
+    assert told(bench) == CANCELLED + "paused by root for lee at 18:10"
     wall.now_s = AT_S
     assert bench.step(60) is State.SUSPENDED
-    assert bench.store.past(bench.bay.place).timed is None
 
 
 def test_the_newest_time_counts(tmp_path: Path, wall: Wall) -> None:
@@ -151,7 +189,9 @@ def test_what_refuses_it_is_told(tmp_path: Path, wall: Wall) -> None:
     asks(bench, Asked(Request.START, KIM, start_unix_s=AT_S))
     wall.now_s = AT_S + 5
     assert bench.step(20) is State.TRIPPED
-    assert told(bench).startswith("starts at 22:00"), "for a minute it is tried again"
+    tried = told(bench)
+    assert tried.startswith("was to start at 22:00 (asked by root for kim at 18:10) and is tried again until ")
+    assert "hot_trip: start is refused before a reset" in tried
     bench.now_s += 60
     bench.step(20)
     assert told(bench).startswith(
@@ -208,8 +248,9 @@ def test_a_request_before_the_first_decision(tmp_path: Path, wall: Wall, request
     bench = after(held(tmp_path), tmp_path / "2")
     asks(bench, Asked(request_, LEE))
     bench.step()
-    assert bool(told(bench)) is is_kept
-    assert (bench.store.past(bench.bay.place).timed is not None) is is_kept
+    assert told(bench).startswith("starts at" if is_kept else CANCELLED)
+    timed = bench.store.past(bench.bay.place).timed
+    assert timed is not None and (timed.outcome is None) is is_kept
 
 
 def test_the_command_to_type_is_not_mixed_with_a_persons_words(tmp_path: Path, wall: Wall) -> None:

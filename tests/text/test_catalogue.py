@@ -27,7 +27,7 @@ def params(template: str) -> Iterator[tuple[str, str]]:
     """A template's parameters and their formats; for a word or a list only its kind."""
     for _, name, form, _ in Formatter().parse(template):
         if name is not None:
-            yield name, "" if form in ("word", "and", "then", "nth") else form or ""
+            yield name, "" if form in ("word", "and", "then", "nth", "past") else form or ""
 
 
 @pytest.mark.parametrize("part", ["texts", "advice", "words", "frames"])

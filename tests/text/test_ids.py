@@ -14,7 +14,7 @@ TEXTS = LANGUAGES["en"].texts
 #: What makes a cause of an id and parameters.
 MAKERS = frozenset({"Cause", "of", "by_policy", "by_station"})
 #: Ids that are put together: of a stage, of a quantity.
-TOGETHER = ("precharging_", "value_", "figure_", "goes_on_", "clears_")
+TOGETHER = ("precharging_", "value_", "row_", "figure_", "goes_on_", "clears_")
 #: … and of a request.
 REQUESTS = frozenset({"start_now", "reset_now"})
 #: What a template has from the cause itself, or from what an id with several causes is made with.

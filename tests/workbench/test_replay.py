@@ -15,7 +15,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.config.load import load_policy
 from orchestrator.core import next_transition
-from orchestrator.model import Cause, Request, State
+from orchestrator.model import Cause, Decision, Request, State
 from orchestrator.service.records import MAX_ROWS, WHOLE_S
 from orchestrator.workbench.replay.again import again
 from orchestrator.workbench.replay.otherwise import Difference, compare, told
@@ -392,3 +392,18 @@ def _with_sentences(line: dict[str, Any], version: int) -> dict[str, Any]:
             del line["memory"]["cause"]
             line["memory"]["reason"] = "no battery"
     return line
+
+
+def test_the_moments_in_a_difference_are_times_of_day() -> None:
+    held = Cause.of("stopped_by", who="kim", asked_unix_s=1_795_905_808.0)
+    decision = Decision(State.HELD, held)
+    for wall, asked, raised in (
+        ("2026-11-28T22:49:42.404Z", "22:43:28Z", "22:49:22Z"),
+        ("2026-11-29T00:00:02.000Z", "2026-11-28T22:43Z", "2026-11-28T23:59Z"),
+        ("never", "2026-11-28T22:43Z", "80 s"),
+    ):
+        _, was, *_ = told(Difference(wall, 100.0, 100.0, decision, decision))
+        assert was == f"    was  HELD: stopped by kim at {asked}", wall
+        hot = Cause.of("operator_stop", raised_t_s=80.0)
+        _, was, *_ = told(Difference(wall, 100.0, 100.0, Decision(State.HELD, hot), decision))
+        assert was == f"    was  HELD: at {raised}, stopped by the operator", wall

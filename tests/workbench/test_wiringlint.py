@@ -91,6 +91,7 @@ def test_what_the_unit_makes_or_somebody_can_make_is_no_trouble(tmp_path: Path) 
     (tmp_path / "file").touch()
     assert unmakeable(tmp_path / "file" / "x") is None, "an error says it"
     assert unmakeable(Path("/run/of-nobody/a")) == Path("/run")
+    assert unmakeable(Path("/of-nobody/a")) == Path("/")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")

@@ -30,7 +30,9 @@ TEXTS: Mapping[str, str] = {
     "page_faults": "FAULTS",
     "page_notes": "NOTES",
     "page_events": "EVENTS",
+    "bays_head": "BAY|STATE|SOC|PACK|CURRENT|TEMP|STEP|WHY",
     # its lines
+    "page_step": "STEP {step}",
     "page_since": "{state} since {begun_at} ({lasted})",
     "limit_binds": "this one binds: {rule}",
     "session_so_far": "{ah:.2f} Ah, {wh:.0f} Wh in {lasted}{soc:after}",

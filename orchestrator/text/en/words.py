@@ -34,6 +34,10 @@ WORDS: Mapping[str, str] = {
     "time_to_empty_min": "time to empty",
     "remaining_ah": "remaining charge",
     "available_wh": "available energy",
+    # how a battery's id is known
+    "assumed": "assumed",
+    "typed": "typed",
+    "serial_number": "serial number",
     # times within an hour
     "nth_1": "1st",
     "nth_2": "2nd",

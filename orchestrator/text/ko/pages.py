@@ -30,7 +30,9 @@ TEXTS: Mapping[str, str] = {
     "page_faults": "장애",
     "page_notes": "참고",
     "page_events": "기록",
+    "bays_head": "베이|상태|SOC|팩|전류|온도|단계|이유",
     # its lines
+    "page_step": "단계 {step}",
     "page_since": "{begun_at}부터 {state}({lasted})",
     "limit_binds": "현재 적용: {rule}",
     "session_so_far": "{ah:.2f} Ah, {wh:.0f} Wh, 경과 {lasted}{soc:after}",

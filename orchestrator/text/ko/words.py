@@ -34,6 +34,10 @@ WORDS: Mapping[str, str] = {
     "time_to_empty_min": "방전 예상 시간",
     "remaining_ah": "잔여 용량",
     "available_wh": "가용 에너지",
+    # how a battery's id is known
+    "assumed": "추정",
+    "typed": "작업자 입력",
+    "serial_number": "일련번호",
     # times within an hour
     "nth_1": "1",
     "nth_2": "2",

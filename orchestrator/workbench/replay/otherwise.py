@@ -14,7 +14,9 @@ from orchestrator.core.memory import Memory, by_policy, value_of, with_values
 from orchestrator.core.rules import Rules
 from orchestrator.core.states import RESTING
 from orchestrator.model import CurrentStep, Decision, Snapshot, State
+from orchestrator.record.utc import unix_s, utc
 from orchestrator.text.catalogue import say
+from orchestrator.text.moments import UNIX, with_moments
 from orchestrator.workbench.replay.again import Again
 
 
@@ -122,14 +124,23 @@ def told(difference: Difference) -> Iterator[str]:
     """A difference for a person: when, what was, what would have been, what that changes."""
     lasted_s = difference.ended_s - difference.began_s
     yield f"{difference.wall}  for {lasted_s:.1f} s"
-    yield f"    was  {_why(difference.was)}"
-    yield f"    now  {_why(difference.now)}"
+    yield f"    was  {_why(difference.was, difference)}"
+    yield f"    now  {_why(difference.now, difference)}"
     yield f"    {_change(difference, lasted_s)}"
 
 
-def _why(decision: Decision) -> str:
+def _why(decision: Decision, difference: Difference) -> str:
+    """With the moments in it as times of day, in UTC as the journal has them."""
+
+    def tell(name: str, seconds: float) -> str:
+        try:
+            then = utc(seconds if name.endswith(UNIX) else unix_s(difference.wall) - (difference.began_s - seconds))
+        except ValueError:  # the journal's own time is none
+            return f"{seconds:.0f} s"
+        return f"{then[11:19] if then[:10] == difference.wall[:10] else then[:16]}Z"
+
     step = decision.step
-    why = f"{step.label}: {say(step.rule)}" if step is not None else say(decision.cause)
+    why = f"{step.label}: {say(step.rule)}" if step is not None else say(with_moments(decision.cause, tell))
     return f"{decision.state}: {why}"
 
 

@@ -83,11 +83,11 @@ DISK: tuple[Seed, ...] = (
         "disk",
         "the writer of the persisted state first waits for the reader of standard error",
         ("standard error is not read",),
+        (f"{SERVICE}store.py", "import threading\n", "import os\nimport threading\n"),
         (
             f"{SERVICE}store.py",
             "        stamp = self._stamp()\n        with self._lock:\n",
-            '        stamp = self._stamp()\n        import os; os.write(2, b"keeping\\n" * 1000)\n'
-            "        with self._lock:\n",
+            '        stamp = self._stamp()\n        os.write(2, b"keeping\\n" * 1000)\n        with self._lock:\n',
         ),
     ),
     scene(
