@@ -6,15 +6,13 @@ Each verb imports its dependencies when it runs, so that none waits for another'
 """
 
 import argparse
-import errno
 import os
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from orchestrator import __version__
+from orchestrator import __version__, output
 from orchestrator.errors import (
     CauseError,
     ConfigError,
@@ -39,8 +37,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if argv is None else argv
     arguments = argparse.Namespace()
     try:
-        with _delivered():
-            arguments = _parser().parse_args(words)
+        with output.delivered():
+            with output.gathered():
+                arguments = _parser().parse_args(words)
             return int(arguments.run(arguments))
     except ConfigError as error:
         print(error, file=sys.stderr)
@@ -54,28 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        print(f"orchestrator: {_of_system(error)}", file=sys.stderr)
+        print(f"orchestrator: {output.problem(error)}", file=sys.stderr)
         return 1
-
-
-@contextmanager
-def _delivered() -> Iterator[None]:
-    """Have our output taken before this ends: that the disk is full is noticed while there is somebody to tell."""
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-
-
-def _of_system(error: OSError) -> str:
-    """What the system says of a file; one without a name is our output."""
-    from orchestrator.model import Cause
-    from orchestrator.show import own_language
-    from orchestrator.text.catalogue import say
-
-    if error.filename:
-        return f"{error.filename}: {error.strerror or error}"
-    return say(Cause.of("output_failed", error=errno.errorcode.get(error.errno or 0, str(error))), own_language())
 
 
 def _said(error: OrchestratorError, arguments: argparse.Namespace, words: Sequence[str]) -> str:

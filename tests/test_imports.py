@@ -51,6 +51,7 @@ EDGES: dict[str, tuple[str, ...]] = {
     "show": ("model", "text"),
     "gist": ("model", "show"),
     "page": ("columns", "gist", "model", "show", "text"),
+    "output": ("model", "show", "text"),
     "demo": ("config", "errors", "keys", "lastresort.asking", "model", "service", "show", "sim", "text"),
     # A process of its own, which knows the controller by its sockets and the record by its files.
     "northbound": (
@@ -58,7 +59,8 @@ EDGES: dict[str, tuple[str, ...]] = {
     ),
     "cli": (
         "columns", "commissioning", "config", "core", "demo", "devices", "errors", "interlock", "keys", "lastresort",
-        "link", "model", "northbound", "protocol", "record", "service", "shell", "show", "sim", "text", "workbench",
+        "link", "model", "northbound", "output", "protocol", "record", "service", "shell", "show", "sim", "text",
+        "workbench",
     ),
     "shell": ("lastresort.asking", "service.where", "workbench.verbs"),
     "__main__": ("cli", "lastresort.estop", "lastresort.guardian"),
