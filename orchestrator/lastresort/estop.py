@@ -161,7 +161,7 @@ class EmergencyStop:
             self._doubts.append(f"{UNTOLD} ({error.strerror})")
             return self._stopping.finish(VERIFY_S, on_round=self._isolate)
         every_bay = bool(self._options.stations) or not self._options.ports
-        services = Services(self._bays, self._socket, every_bay=every_bay)
+        services = Services(self._bays, self._socket, every_bay=every_bay, because=self._options.because)
         self._stopping.witness = services.sees
         services.start()
         whys = self._stopping.finish(VERIFY_S, on_round=self._isolate) if self._bays else {}

@@ -3,7 +3,7 @@
 import os
 
 USAGE = """\
-usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held]
+usage: orchestrator estop [STATION] [--port PATH ...] [--socket PATH] [--leave-held] [--because TEXT]
 
 Stop the charger on every port of the station file, and on the given ports, and verify the stops. Without arguments the
 file is station.yaml in this directory, else the installed service's, else that of a running service. Ports whose
@@ -15,12 +15,15 @@ itself if a charger does not obey.
   --port PATH ...  these ports: without a station file, or in addition to those of the named one
   --socket PATH    the service's control socket (default: $ORCHESTRATOR_SOCKET, or the station file's)
   --leave-held     leave alone ports that a running service holds, and tell it nothing
+  --because TEXT   why, for whoever asks the service later
 
 examples:
   orchestrator estop
       stop every charger of the station that is found, now
   orchestrator estop /etc/orchestrator/station.yaml
       of this station
+  orchestrator estop --because 'smoke in hall 2'
+      whoever asks why a bay is held reads this
   orchestrator estop --port /dev/charger/bay-1
       without any file
 
@@ -39,12 +42,15 @@ class Options:
         self.stations: list[str] = []
         self.socket = os.environ.get("ORCHESTRATOR_SOCKET", "")
         self.leave_held = False
+        self.because = ""  #: nothing is refused for the lack of it
         self.wrong = ""
         taking = ""
         for word in words:
-            if word == "--leave-held":
+            if taking == "--because":
+                self.because, taking = word, ""
+            elif word == "--leave-held":
                 self.leave_held, taking = True, ""
-            elif word in ("--port", "--socket"):
+            elif word in ("--port", "--socket", "--because"):
                 taking = word
             elif word.startswith("-"):
                 self.wrong = f"unknown option {word}"

@@ -9,6 +9,7 @@ import os
 import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +33,12 @@ Bay = Mapping[str, Any]  #: a bay in the status document
 class Services:
     """Every service that holds one of these ports, else the one behind `socket`, if given.
 
-    `every_bay`: they must hold all their bays, not only those of these ports.
+    `every_bay`: they must hold all their bays, not only those of these ports. `because`: what they tell of it.
     """
 
-    def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool) -> None:
-        self._names, self._named, self._every_bay = list(names), socket, every_bay
+    def __init__(self, names: Iterable[str], socket: str, *, every_bay: bool, because: str = "") -> None:
+        self._names, self._named = list(names), socket
+        self._made = partial(Service, self._names, every_bay=every_bay, because=because)
         self._found: list[Service] = []
         self._looked = threading.Event()
 
@@ -68,9 +70,9 @@ class Services:
 
     def _look(self) -> None:
         paths, mute = services(self._names)
-        found = [Service(self._names, path, every_bay=self._every_bay, holds=True) for path in paths]
+        found = [self._made(path, holds=True) for path in paths]
         if not paths or mute:  # the given socket may belong to one of the invisible services
-            found.append(Service(self._names, self._named, every_bay=self._every_bay, mute=mute))
+            found.append(self._made(self._named, mute=mute))
         self._found = found
         self._looked.set()
         for service in self._found:
@@ -84,14 +86,15 @@ class Service:
     """
 
     def __init__(
-        self, names: Iterable[str], socket: str, *, every_bay: bool, holds: bool = False, mute: Sequence[int] = ()
-    ) -> None:
+        self, names: Iterable[str], socket: str, *, every_bay: bool, because: str = "", holds: bool = False,
+        mute: Sequence[int] = (),
+    ) -> None:  # fmt: skip
         self.said = UNTOLD  #: the result, for people
         self.told = threading.Event()  #: it has answered, or there is none
         self.took = False  #: it holds its bays, or nobody could start them
         self.path, self.holds, self._mute = Path(socket), holds or bool(mute), mute
         self._ports = {os.path.realpath(name) for name in names}
-        self._named, self._every_bay = socket, every_bay
+        self._named, self._every_bay, self._because = socket, every_bay, because
         self._seen: tuple[float, Mapping[str, Bay]] = (0.0, {})
         self._thread = threading.Thread(target=self._run, name="service", daemon=True)
 
@@ -129,7 +132,8 @@ class Service:
             self.told.set()  # a service that starts now stops its chargers first anyway
             return False
         bays = None if self._every_bay else [bay["name"] for port, bay in self._bays() if port in self._ports]
-        results = ask(self.path, signed({"verb": "stop", "bays": bays, "means": "estop"}), ANSWER_S)["results"]
+        stop = signed({"verb": "stop", "bays": bays, "means": "estop"}, self._because)
+        results = ask(self.path, stop, ANSWER_S)["results"]
         answers = dict(results) if isinstance(results, Mapping) else {}
         refused = [f"{name}: {answer}" for name, answer in answers.items() if answer]
         held = ", ".join(name for name, answer in answers.items() if not answer)

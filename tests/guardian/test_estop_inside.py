@@ -13,6 +13,7 @@ import pytest
 
 from orchestrator.lastresort import inhand, lastopen
 from orchestrator.lastresort.estop import UNTOLD, main
+from orchestrator.lastresort.estop_options import Options
 from tests.guardian.chargers import Bench, running_chargers
 
 DONE = "every charger stands by, verified"
@@ -103,3 +104,15 @@ def test_where_the_services_cannot_be_told_the_chargers_are_stopped(
         f"{bench.name}: standby verified",
         f"{UNTOLD} (Too many open files)",
     ]
+
+
+@pytest.mark.parametrize(
+    ("words", "because"),
+    [
+        (["a.yaml"], ""), (["--because", "smoke", "a.yaml"], "smoke"), (["a.yaml", "--because", "--port"], "--port"),
+        (["a.yaml", "--because"], ""),
+    ],
+)  # fmt: skip
+def test_nothing_that_is_said_beside_it_refuses_an_emergency_stop(words: list[str], because: str) -> None:
+    options = Options(words)
+    assert (options.wrong, options.because, options.stations, options.ports) == ("", because, ["a.yaml"], [])

@@ -81,7 +81,8 @@ def test_a_reload_answers_for_each_bay(service: Service, tmp_path: Path) -> None
 def test_an_estop_is_named_as_such(service: Service) -> None:
     service.ask("start")
     service.wait("CHARGING", ["bay-1", "bay-2"])
-    assert "every charger stands by" in run(service, "estop", str(service.file))
+    assert "every charger stands by" in run(service, "estop", str(service.file), "--because", "smoke in hall 2")
     reasons = [bay["reason"] for bay in service.wait("HELD", ["bay-1", "bay-2"]).values()]
-    assert all(re.match(rf"stopped by estop \({ME}\) at \d\d:\d\d; to go on: ", reason) for reason in reasons)
+    said = re.compile(rf"stopped by estop \({ME}\) at \d\d:\d\d: smoke in hall 2; to go on: ")
+    assert all(said.match(reason) for reason in reasons)
     assert written(service, "bay-2", "stop")["means"] == "estop"
