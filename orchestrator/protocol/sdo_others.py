@@ -97,5 +97,5 @@ def parse_part(data: bytes) -> SdoPart | None:
 
 
 def segment_number(data: bytes) -> int:
-    """The sequence number of a block segment, 1 … 127."""
-    return data[0] & 0x7F
+    """The sequence number of a block segment, 1 … 127; 0 for what can be none, such as a frame that is too short."""
+    return data[0] & 0x7F if len(data) == FRAME_BYTES else 0

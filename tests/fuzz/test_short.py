@@ -73,6 +73,7 @@ def test_nothing_is_found(name: str) -> None:
 
 #: Target and input: each once found a bug.
 ONCE = (
+    ("bmu", bytes.fromhex("0080a10280a10281a10280a10280a16903a30000000000000000")),
     ("config", b'%YAML 1.' + b"1" * 5000 + b"\n---\npolicy: p\n"),
     ("config", b'policy: "\\UFFFFFFFF"\n'),
     ("config", STATION.replace(b"/dev/x", b"/dev/my port")),

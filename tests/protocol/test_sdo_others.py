@@ -60,4 +60,9 @@ def test_a_reply(data: str, part: SdoPart | None) -> None:
 
 
 def test_the_number_of_a_segment_is_without_its_last_mark() -> None:
-    assert [segment_number(bytes((first,))) for first in (0x01, 0x7F, 0x85)] == [1, 127, 5]
+    assert [segment_number(bytes((first, *range(7)))) for first in (0x01, 0x7F, 0x85)] == [1, 127, 5]
+
+
+@pytest.mark.parametrize("data", ["", "01", "01 00 00 00 00 00 00", "01 00 00 00 00 00 00 00 00"])
+def test_what_has_not_the_length_of_a_frame_is_no_segment(data: str) -> None:
+    assert segment_number(bytes.fromhex(data)) == 0
