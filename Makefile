@@ -17,9 +17,9 @@ demo: .venv/demo.stamp $(if $(findstring --page,$(ARGS)),.venv/web.stamp)  ## ch
 # Modules are compiled once and beforehand, not by each worker and each of some thousand processes (which the variable
 # would make them do): the first services would start so slowly beside it that they miss their own deadlines.
 test: export PYTHONDONTWRITEBYTECODE :=
-test: .venv/dev.stamp  ## all tests, three files at a time; ARGS='tests/core -k taper' chooses some
+test: .venv/dev.stamp  ## all tests, five files at a time; ARGS='tests/core -k taper' chooses some
 	$(BIN)/python -m compileall -q -j 0 orchestrator benchmarks tests
-	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(BIN)/python -m pytest -n 5 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 # Measuring makes tests that compute three times as slow, so it is done with the tests of these parts alone, and with as
 # few as reach everything: two of the core's only try much more of the same, and two files start whole stations and
