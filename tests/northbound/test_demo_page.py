@@ -35,5 +35,5 @@ def test_it_says_where_and_leaves_nothing_when_it_is_ended(tmp_path: Path, end: 
         _, errors = process.communicate(timeout=30)
     assert (process.returncode, errors) == (0, "")
     assert not list(short.iterdir())
-    with pytest.raises(OSError, match="refused|reset"):
+    with pytest.raises(OSError, match=r"refused|reset"):
         urlopen(address, timeout=5)
