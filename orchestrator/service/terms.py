@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Self
 
 from orchestrator.errors import RequestError
-from orchestrator.model import Cause
+from orchestrator.model import Cause, Request
 from orchestrator.record.lasting import lasting
 from orchestrator.service.instant import instant
 from orchestrator.service.reception import Answer, Later
@@ -15,6 +15,9 @@ from orchestrator.text.catalogue import fields
 
 #: A start with a target or a time: a verb of its own, because a service that knows neither must not start at once.
 START_WITH = "start-with"
+#: What a start may say beside its verb, and what one with terms may say besides.
+KNOWN = frozenset({"verb", "bays", "port", "spares", "because", "by", "sudo_user", "uid"})
+TERMS = frozenset({"to", "at"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +30,12 @@ class Terms:
 
     @classmethod
     def of(cls, request: Mapping[str, object], now_s: float) -> Self:
-        """Of a `START_WITH`; RequestError for what cannot be done."""
-        if request.get("verb") != START_WITH:
+        """Of any request; RequestError for what cannot be done, and for a start that says more than is understood."""
+        verb = request.get("verb")
+        unknown = request.keys() - KNOWN - (TERMS if verb == START_WITH else set())
+        if unknown and verb in (Request.START, START_WITH):
+            raise RequestError(Cause.of("start_keys_unknown", keys=tuple(f"{key:.40}" for key in sorted(unknown)[:5])))
+        if verb != START_WITH:
             return cls()
         target, at = request.get("to"), request.get("at")
         if target is not None and not is_target(target):

@@ -323,6 +323,17 @@ def test_only_a_start_has_terms() -> None:
     assert Terms.of({"verb": "stop", "to": 60, "at": "22:00"}, ASKED_S) == Terms()
 
 
+@pytest.mark.parametrize(
+    "request_", [{"verb": "start", "to": 60}, {"verb": "start", "at": "22:00"}, {"verb": START_WITH, "target": 60}]
+)
+def test_a_start_that_says_more_than_is_understood_is_refused(request_: dict[str, object]) -> None:
+    """Else it would charge at once and to the policy's target, which nobody asked for. No stop is refused for that."""
+    with pytest.raises(RequestError) as caught:
+        Terms.of(request_, ASKED_S)
+    assert caught.value.cause.id == "start_keys_unknown"
+    assert Terms.of({"verb": "stop", "bays": None, "why": "smoke"}, ASKED_S) == Terms()
+
+
 def test_an_answer_says_when_it_starts() -> None:
     terms = Terms.of({"verb": START_WITH, "to": 60, "at": "22:00"}, ASKED_S)
     assert terms.fields == {"target_soc_pct": 60.0, "start_at": AT_S}

@@ -112,6 +112,8 @@ TEXTS: Mapping[str, str] = {
     "at_past": "--at {text}: that time has passed",
     "at_too_far": "--at {text}: that is more than {days} days ahead",
     "clock_never_set": "the clock of this machine has never been set: no time can be waited for",
+    "start_keys_unknown": "nothing was started: a start does not understand {keys}; a target (to) and a time (at) "
+    "belong to the verb start-with",
     "target_wrong": "--to {target}: it is a SOC in percent, above 0 and at most 100",
     "target_reached": "its SOC is already {soc_pct:.1f} %, the target is {target_pct:g} %",
     "target_unseen": "a charge to a target needs the battery's SOC, which is not known now: see that a battery is there and "

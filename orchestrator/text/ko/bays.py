@@ -113,6 +113,8 @@ TEXTS: Mapping[str, str] = {
     "at_past": "--at {text}: 이미 지난 시각입니다",
     "at_too_far": "--at {text}: {days}일보다 더 뒤의 시각입니다",
     "clock_never_set": "이 장치의 시계가 설정된 적이 없어 시각을 기다릴 수 없습니다",
+    "start_keys_unknown": "아무것도 시작하지 않았습니다: 시작 요청에 알 수 없는 항목이 있습니다: {keys}; 목표(to)와 시각(at)은 동사 "
+    "start-with에 속합니다",
     "target_wrong": "--to {target}: 0보다 크고 100 이하인 SOC(퍼센트)여야 합니다",
     "target_reached": "SOC가 이미 {soc_pct:.1f} %이며 목표는 {target_pct:g} %입니다",
     "target_unseen": "목표까지 충전하려면 배터리의 SOC를 알아야 하는데 지금은 알 수 없습니다. 배터리가 있고 BMU가 응답하는지 "
