@@ -110,7 +110,9 @@ class App:
     async def request(self, request: Request, me: Me) -> Response:
         """Start, pause, stop or reset a bay."""
         address = request.client.host if request.client else ""
-        return json_response(await self.asking.request(await json_object(request), me, address, language(request)))
+        asked = await json_object(request)
+        answer = await self.asking.request(asked, me, address, language(request), request.is_disconnected)
+        return json_response(answer)
 
     async def me(self, request: Request) -> Response:
         """Who is logged in, and whether one has to be."""

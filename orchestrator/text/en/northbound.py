@@ -35,6 +35,9 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "too much is asked at once: try again in a few seconds",
     "page_late": "the answer takes too long: try again, or ask for less",
     "page_failed": "the page's server has made an error, which its log has; the station is not affected",
+    "asker_gone": "whoever asked this has left: it is not passed on",
+    "bay_changed": "{bay} has changed since this was pressed, so it is not passed on: look again",
+    "page_stood_still": "the page's server stood still, so this is not passed on: look again, then press again",
     "controller_silent": "the controller does not answer ({why}): do not rely on this having been done; `orchestrator estop` "
     "on the gateway stops every charger",
 }
