@@ -17,6 +17,8 @@ from orchestrator.text.catalogue import say
 from orchestrator.text.document import refusals, said
 
 ACTIONS = ("start", "pause", "stop", "reset")
+#: What an operator may do whatever is in doubt.
+HALTS = ("pause", "stop")
 #: These set something going: carried out late, they would charge a battery that somebody has stopped meanwhile.
 PROMPT = frozenset({"start", "reset"})
 #: How long such a request may wait here, and how long the controller may take to tell how the bay is.

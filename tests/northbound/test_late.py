@@ -1,7 +1,6 @@
 """A start or a reset from the page is never carried out late; a stop always is."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 

@@ -7,7 +7,12 @@ TEXTS: Mapping[str, str] = {
     "listen_failed": "cannot listen at {address}: {error}",
     "certificate_wrong": "{cert_file} and {key_file} cannot be used as a certificate with its key: {error}",
     "certificate_kept": "the certificate in use stays: {why}",
-    "users_kept": "the users stay as they were: {why}",
+    "users_doubted": "the file of users is of no use: {why}; until it is, nobody can log in, and operators can only stop "
+    "and pause",
+    "users_trusted": "the file of users is in order again: what it says holds",
+    "users_none": "{file} names nobody: all are logged out, and nobody can log in",
+    "users_unsure": "the file of users is of no use, as the log of the page's server says: until it is in order, nobody "
+    "can log in, and only stop and pause are passed on",
     "page_error": "an error of the page's own at {path}: {error}",
     "user_saved": "{name} may log in as {role} ({file})",
     "users_not_written": "{file} cannot be written, nothing is changed: {error}",

@@ -7,7 +7,12 @@ TEXTS: Mapping[str, str] = {
     "listen_failed": "{address}에서 연결을 받을 수 없습니다: {error}",
     "certificate_wrong": "{cert_file}과(와) {key_file}을(를) 인증서와 키로 사용할 수 없습니다: {error}",
     "certificate_kept": "사용 중인 인증서를 그대로 사용합니다: {why}",
-    "users_kept": "사용자 목록을 그대로 유지합니다: {why}",
+    "users_doubted": "사용자 파일을 사용할 수 없습니다: {why}. 바로잡을 때까지 아무도 로그인할 수 없으며 운전자는 정지와 일시 "
+    "정지만 할 수 있습니다",
+    "users_trusted": "사용자 파일이 다시 정상입니다. 파일의 내용을 적용합니다",
+    "users_none": "{file}에 사용자가 없습니다. 모두 로그아웃되었으며 아무도 로그인할 수 없습니다",
+    "users_unsure": "사용자 파일을 사용할 수 없습니다(원인은 페이지 서버의 로그 참조). 바로잡을 때까지 로그인할 수 없으며 정지와 "
+    "일시 정지만 전달합니다",
     "page_error": "페이지 서버의 자체 오류({path}): {error}",
     "user_saved": "{name} 사용자가 {role} 역할로 로그인할 수 있습니다({file})",
     "users_not_written": "{file}을(를) 쓸 수 없어 아무것도 바꾸지 않았습니다: {error}",
