@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, cast
 
 from orchestrator.errors import NoServiceError, ServiceError
 from orchestrator.lastresort.asking import ask
@@ -12,6 +12,7 @@ from orchestrator.northbound.fields import shown_field, text_field
 from orchestrator.northbound.pulse import Pulse
 from orchestrator.northbound.refusal import RefusalError
 from orchestrator.northbound.sessions import Me
+from orchestrator.northbound.told import encoded
 from orchestrator.northbound.work import Workers
 from orchestrator.text.catalogue import say
 from orchestrator.text.document import refusals, said
@@ -25,6 +26,8 @@ PROMPT = frozenset({"start", "reset"})
 LATE_S, LOOK_S = 2.0, 1.5
 #: The moment of a change is computed anew each second from two clocks, so the same one may differ by this.
 SAME_S = 0.05
+#: What an answer that is none ends in here, whatever the controller has sent.
+NONSENSE = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 #: The service answers within 10 s, or says that the bays do not.
 ANSWER_S = 11.0
 #: The longest name and reason.
@@ -61,21 +64,37 @@ class Asking:
             **({"because": because} if because else {}),
         }
         try:
-            answer = await self._workers.do(self._passed_on, request, bay, since_s, come_s)
+            return await self._answer(request, bay, since_s, come_s, language)
         except OSError as error:  # the station file cannot be read
-            raise RefusalError(503, Cause.of("controller_silent", why=error.strerror or str(error))) from None
-        except NoServiceError as error:
-            told = error.told.get("params") if isinstance(error.told, Mapping) else None
-            why = told.get("reason") if isinstance(told, Mapping) else None
-            raise RefusalError(503, Cause.of("controller_silent", why=why or str(error))) from None
+            why: object = error.strerror or str(error)
         except ServiceError as error:
-            text = said(error.told, str(error), language)
-            return {"ok": False, "action": action, "bay": bay, "text": text, "cause": error.told}
-        refused = refusals(answer, language).get(bay, "")
-        text = refused or say(Cause.of("accepted", bay=bay, verb=action), language)
-        causes = answer.get("causes")
-        cause = causes.get(bay) if isinstance(causes, Mapping) else None
-        return {"ok": not refused, "action": action, "bay": bay, "text": text, "cause": cause}
+            told = error.told.get("params") if isinstance(error.told, Mapping) else None
+            why = (told.get("reason") if isinstance(told, Mapping) else None) or str(error)
+        except NONSENSE:
+            why = Cause("answer_odd")
+        raise RefusalError(503, Cause.of("controller_silent", why=why))
+
+    async def _answer(
+        self, request: Mapping[str, object], bay: str, since_s: float | None, come_s: float, language: str
+    ) -> dict[str, Any]:
+        """What the controller says, as the page is told it; one of NONSENSE if that is no answer."""
+        action = str(request["verb"])
+        told: dict[str, Any] = {"ok": False, "action": action, "bay": bay}
+        try:
+            answer = await self._workers.do(self._passed_on, request, bay, since_s, come_s)
+        except ServiceError as error:
+            if isinstance(error, NoServiceError) or not isinstance(error.told, Mapping):
+                raise
+            told |= {"text": said(error.told, str(error), language), "cause": error.told}
+        else:
+            refused = refusals(answer, language)[bay]
+            if not isinstance(refused, str):
+                raise TypeError(refused)
+            text = refused or say(Cause.of("accepted", bay=bay, verb=action), language)
+            cause = cast("Mapping[str, object]", answer.get("causes") or {}).get(bay)
+            told |= {"ok": not refused, "text": text, "cause": cause}
+        encoded(told)  # which may be what no browser can read
+        return told
 
     def _passed_on(
         self, request: Mapping[str, object], bay: str, since_s: float | None, come_s: float

@@ -13,13 +13,16 @@ from pathlib import Path
 from time import time
 from typing import Any
 
-from orchestrator.lastresort.asking import MAX_ANSWER, ask
+from orchestrator.lastresort.asking import ask
 from orchestrator.northbound.picture import Picture
+from orchestrator.northbound.told import encoded
 
 #: How often a service without `watch` is asked, and how long it may take.
 POLL_S, ANSWER_S = 1.0, 5.0
 #: The service says something at least every 5 s.
 SILENT_S = 12.0
+#: The longest line of `watch`, and more than 128 bays need; whoever sends more is no service of ours.
+MOST_LINE = 8 * 1024 * 1024
 #: The pause before the next attempt, doubled after each.
 RETRY_S, LONGEST_S = 0.5, 5.0
 
@@ -106,7 +109,7 @@ def may_open(path: Path) -> bool:
 async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
     """The lines of `watch`. OSError, ValueError or EOFError when that is over; NoStreamError if there is none."""
     async with asyncio.timeout(ANSWER_S):
-        reader, writer = await asyncio.open_unix_connection(path, limit=MAX_ANSWER)
+        reader, writer = await asyncio.open_unix_connection(path, limit=MOST_LINE)
     try:
         writer.write(b'{"verb": "watch", "version": 1}\n')
         while True:
@@ -114,7 +117,7 @@ async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
                 text = await reader.readline()
             if not text.endswith(b"\n"):
                 raise EOFError
-            line = json.loads(text)
+            line = json.loads(text, parse_constant=_no_number)
             if line.get("ok") is False:
                 raise NoStreamError
             yield line
@@ -125,5 +128,12 @@ async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
 async def polled(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
     """The status once a second, as lines of `watch`."""
     while True:
-        yield {"document": await asyncio.to_thread(ask, path, {"verb": "status"}, ANSWER_S)}
+        document = await asyncio.to_thread(ask, path, {"verb": "status"}, ANSWER_S)
+        encoded(document)  # a ValueError if no browser could read it
+        yield {"document": document}
         await asyncio.sleep(POLL_S)
+
+
+def _no_number(text: str) -> float:
+    """NaN and Infinity are no JSON: no browser could read the document."""
+    raise ValueError(text)

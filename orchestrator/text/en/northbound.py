@@ -40,6 +40,8 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "too much is asked at once: try again in a few seconds",
     "page_late": "the answer takes too long: try again, or ask for less",
     "page_failed": "the page's server has made an error, which its log has; the station is not affected",
+    "answer_odd": "its answer is nothing that this server understands",
+    "bay_odd": "what the controller tells of {bay} is nothing that this server understands",
     "asker_gone": "whoever asked this has left: it is not passed on",
     "bay_changed": "{bay} has changed since this was pressed, so it is not passed on: look again",
     "page_stood_still": "the page's server stood still, so this is not passed on: look again, then press again",
