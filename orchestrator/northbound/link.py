@@ -39,7 +39,9 @@ class Link:
     def __init__(self, sockets: Sources) -> None:
         self.picture = Picture(revision=int(time() * 1000))
         self.connected = False
-        self.since_s = time()  #: Unix time of the last change of `connected`
+        self.since_s = time()  #: Unix time of the connection, or of what was heard last before it was lost
+        self._heard_s = self.since_s
+        self._begun = False  # whether this connection has delivered a document
         self._sockets = sockets
         self._news = asyncio.Event()
         self._polls = False
@@ -56,6 +58,7 @@ class Link:
         """Until cancelled."""
         pause_s = RETRY_S
         while True:
+            self._begun = False
             try:
                 async with aclosing(self._lines()) as lines:
                     async for line in lines:
@@ -78,6 +81,8 @@ class Link:
     def _take(self, line: Mapping[str, Any]) -> None:
         """One line of the stream: the whole document, what changed, or nothing new."""
         document = line.get("document")
+        if document is None and not self._begun:
+            raise ValueError("a change, and of what is not known")
         time_s = (line if document is None else document).get("time")
         if isinstance(time_s, int | float):
             self.picture.time = time_s
@@ -85,6 +90,7 @@ class Link:
             new = self.picture.replace(document)
         else:
             new = self.picture.merge(line.get("bays") or {}, line.get("station") or {}, list(line.get("gone") or ()))
+        self._begun, self._heard_s = True, time()
         if not self._connected(connected=True) and new:
             self._wake()
 
@@ -92,7 +98,7 @@ class Link:
         """Note it; returns whether that is news."""
         if connected == self.connected:
             return False
-        self.connected, self.since_s = connected, time()
+        self.connected, self.since_s = connected, self._heard_s
         self._wake()
         return True
 

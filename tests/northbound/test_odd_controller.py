@@ -1,13 +1,17 @@
 """A controller that answers with something unexpected, line for line over a real socket."""
 
+import asyncio
+import json
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Thread
 
 import pytest
 
 from orchestrator.northbound import closely, link
+from orchestrator.northbound.link import Link
 from tests.northbound.bench import Browser, page
 
 DEEP = b"[" * 100_000 + b"]" * 100_000
@@ -81,3 +85,42 @@ def test_a_line_without_an_end_is_not_kept(tmp_path: Path, monkeypatch: pytest.M
     odd.line = b'{"document": {"bays": [], "x": "' + b"x" * (1 << 17) + b'"}}'
     with page(tmp_path, controller=False) as (browser, _):
         assert browser.get("/api/status").json["document"] is None
+
+
+def test_when_the_controller_was_last_heard_stays_over_connections_that_tell_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now_s, seen = [100.0], list[tuple[bool, float]]()
+    monkeypatch.setattr(link, "time", lambda: now_s[0])
+    monkeypatch.setattr(link, "RETRY_S", 0.05)
+    monkeypatch.setattr(link, "LONGEST_S", 0.05)
+    nothing = (b"", b"{}\n", b'{"bays": {}}\n', b'{"bays": {"bay-1": {}}}\n', b'{"document": {}}\n', b"null\n")
+    document = json.dumps({"document": {"bays": [{"name": "bay-1"}]}}).encode() + b"\n"
+    scripts = [(b"{}\n",), (document, b"{}\n"), *((one,) for one in nothing)]
+
+    async def go_on(directory: str) -> None:
+        path, left, done = Path(directory) / "s", list(scripts), asyncio.Event()
+
+        async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            await reader.readline()
+            for line in left.pop(0) if left else ():
+                now_s[0] += 1.0
+                writer.write(line)
+                await asyncio.sleep(0.01)
+                seen.append((upstream.connected, upstream.since_s))
+            now_s[0] += 5.0
+            writer.close()
+            if not left:
+                done.set()
+
+        upstream = Link(lambda: [path])
+        server = await asyncio.start_unix_server(answer, path)
+        task = asyncio.create_task(upstream.run())
+        await asyncio.wait_for(done.wait(), 5.0)
+        task.cancel()
+        server.close()
+
+    with TemporaryDirectory() as directory:
+        asyncio.run(go_on(directory))
+    connected_s, heard_s = 107.0, 108.0
+    assert seen == [(False, 100.0), (True, connected_s), (True, connected_s), *[(False, heard_s)] * len(nothing)]
