@@ -8,14 +8,12 @@ from collections.abc import Mapping
 from getpass import getpass
 from pathlib import Path
 
-import yaml
-
 from orchestrator.config.names import name_problem
 from orchestrator.config.northbound import Role, User
+from orchestrator.config.users_file import quoted, users_in
 from orchestrator.errors import CauseError, ConfigError, UsageError
 from orchestrator.model import Cause
 from orchestrator.northbound.password import LONGEST, SHORTEST, hashed
-from orchestrator.northbound.users import users_in
 from orchestrator.show import own_language
 from orchestrator.text.catalogue import say
 
@@ -60,7 +58,7 @@ def _password(name: str) -> str:
 def _write(path: Path, users: Mapping[str, User]) -> None:
     """All of it or nothing, readable by its owner alone; who owned it before still does. It is read back first."""
     lines = [
-        f"  {_key(name)}: {{role: {user.role}, password: {_key(user.password)}}}\n" for name, user in users.items()
+        f"  {quoted(name)}: {{role: {user.role}, password: {quoted(user.password)}}}\n" for name, user in users.items()
     ]
     new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     fd = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
@@ -73,13 +71,8 @@ def _write(path: Path, users: Mapping[str, User]) -> None:
                 os.fchown(fd, before.st_uid, before.st_gid)
             os.fsync(fd)
         if users_in(new) != users:
-            raise OSError(errno.EIO, "what was written reads otherwise")
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
         new.replace(path)
     except (OSError, ConfigError):
         new.unlink(missing_ok=True)
         raise
-
-
-def _key(text: str) -> str:
-    """In quotes, so that YAML takes it for nothing else: `0`, `null` and `yes` are names, too."""
-    return str(yaml.safe_dump(text, default_style='"', allow_unicode=True, width=10_000)).strip()

@@ -1,28 +1,18 @@
 """Who may log in: the users file, read again when it changes."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
-from orchestrator.config.load import load_users
 from orchestrator.config.northbound import User
 from orchestrator.config.northbound_rules import file_problem
-from orchestrator.config.plainfile import read_plain
-from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Node, Scalar, parse
+from orchestrator.config.users_file import users_in
 from orchestrator.errors import ConfigError
 from orchestrator.model import Cause
 
 Stamp = tuple[int, ...]
 
 GONE: Stamp = ()
-#: What a key without a value may have instead of one.
-NOTHING = ("", "~", "null")
-
-
-def users_in(path: Path) -> Mapping[str, User]:
-    """The users in a file; nobody if its key `users` has nothing. Raises `ConfigError`, and `OSError`."""
-    node, wrong = parse(str(path), read_plain(path, MAX_BYTES, "a file of users"))
-    return {} if not wrong and _names_nobody(node) else load_users(path).users
 
 
 class Users:
@@ -72,13 +62,6 @@ class Users:
         self._why = why
         if not why and not self._users:
             self._say(Cause.of("users_none", file=str(self._path)))
-
-
-def _names_nobody(node: Node | None) -> bool:
-    if not isinstance(node, Entries) or [name.text for name, _ in node.entries] != ["users"]:
-        return False
-    value = node.entries[0][1]
-    return value.plain and value.text in NOTHING if isinstance(value, Scalar) else value == Entries(value.mark, ())
 
 
 def _stamp(path: Path) -> Stamp:

@@ -173,7 +173,7 @@ def test_what_would_not_read_back_is_not_written(
     path = tmp_path / "users.yaml"
     write(path, kim="operator")
     before = path.read_text(encoding="utf-8")
-    monkeypatch.setattr(user_verb, "_key", str)
+    monkeypatch.setattr(user_verb, "quoted", str)
     _type(monkeypatch, "long enough")
     assert add("null", "viewer", path) == 1
     assert "nothing is changed" in capsys.readouterr().err
