@@ -1,5 +1,6 @@
 """A person's request at the page, handed to the controller with who asks. The controller decides; nothing here does."""
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from time import monotonic
@@ -24,6 +25,8 @@ HALTS = ("pause", "stop")
 PROMPT = frozenset({"start", "reset"})
 #: How long such a request may wait here, and how long the controller may take to tell how the bay is.
 LATE_S, LOOK_S = 2.0, 1.5
+#: A request and the end of its connection may lie here side by side: so long until both are read.
+GONE_S = 0.05
 #: The moment of a change is computed anew each second from two clocks, so the same one may differ by this.
 SAME_S = 0.05
 #: What an answer that is none ends in here, whatever the controller has sent.
@@ -55,8 +58,10 @@ class Asking:
         if action not in ACTIONS:
             raise RefusalError(400, Cause.of("field_wrong", name="action", wanted="|".join(ACTIONS)))
         because, since_s = text_field(asked, "because", REASON, default=""), shown_field(asked, "since")
-        if action in PROMPT and await gone():
-            raise RefusalError(503, Cause("asker_gone"))
+        if action in PROMPT:
+            await asyncio.sleep(GONE_S)
+            if await gone():
+                raise RefusalError(503, Cause("asker_gone"))
         request: dict[str, object] = {
             "verb": action,
             "bays": [bay],

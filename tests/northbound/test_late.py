@@ -1,5 +1,7 @@
 """A start or a reset from the page is never carried out late; a stop always is."""
 
+import json
+import time
 from collections.abc import Iterator
 
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from orchestrator.northbound import asking
 from orchestrator.northbound.pulse import AFTER_S, GAP_S, Pulse
 from tests.northbound.bench import Browser, Controller, bay, page
+from tests.waiting import wait_until
 
 Pair = tuple[Browser, Controller]
 SINCE_S = 1_764_000_000.123
@@ -60,17 +63,21 @@ def test_what_has_waited_here_is_not_set_going(pair: Pair, monkeypatch: pytest.M
     assert [asked["verb"] for asked in pair[1].asked] == ["stop"]
 
 
-def test_who_has_left_sets_nothing_going(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = list[str]()
+@pytest.mark.parametrize("action", ["start", "reset"])
+def test_who_has_left_sets_nothing_going_but_may_stop(pair: Pair, action: str) -> None:
+    leave(pair, action)
+    leave(pair, "stop")
+    wait_until(lambda: pair[1].asked)
+    time.sleep(2 * asking.GONE_S)  # for what must not come
+    assert [one["verb"] for one in pair[1].asked] == ["stop"]
 
-    async def gone(_request: object) -> bool:
-        asked.append("gone")
-        return True
 
-    monkeypatch.setattr("orchestrator.northbound.app.Request.is_disconnected", gone)
-    assert press(pair, "start") == (503, "asker_gone")
-    assert press(pair, "stop") == (200, "")
-    assert (asked, [one["verb"] for one in pair[1].asked]) == (["gone"], ["stop"])
+def leave(pair: Pair, action: str) -> None:
+    """Send a request, and be gone."""
+    body = json.dumps({"action": action, "bay": "bay-1"}).encode()
+    with pair[0].connected() as connection:
+        head = f"POST /api/request HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(body)}\r\n"
+        connection.sendall(f"{head}Content-Type: application/json\r\n\r\n".encode() + body)
 
 
 def test_a_gap_in_the_pulse_counts_before_the_next_beat_and_for_a_while_after_it() -> None:
