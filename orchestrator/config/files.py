@@ -15,6 +15,7 @@ from orchestrator.config.station import Station
 from orchestrator.config.station_rules import station_problems
 from orchestrator.config.yaml.numbers import shown
 from orchestrator.config.yaml.scalars import UnfitError, did_you_mean, nearest
+from orchestrator.config.yaml.tree import Entries, Node
 from orchestrator.protocol.objects import ObjectMap
 
 
@@ -122,3 +123,14 @@ def nearest_file(path: Path) -> str:
         return f": there is no directory {path.parent}"
     near = nearest(path.name, sorted(other.name for other in path.parent.glob("*.y*ml")))
     return f"; did you mean {near}?" if near else ""
+
+
+def kinds_of(node: Node | None) -> list[Kind]:
+    """The kinds of file that this may be, by its keys."""
+    keys = {name.text for name, _ in node.entries} if isinstance(node, Entries) else set()
+    return [kind for kind in KINDS if kind.mark in keys]
+
+
+def kind_near(key: str) -> str:
+    """The mark of a kind that is spelled nearly so; "" if there is none."""
+    return nearest(key, [kind.mark for kind in KINDS])

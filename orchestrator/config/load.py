@@ -21,6 +21,8 @@ from orchestrator.config.files import (
     Kind,
     Place,
     find,
+    kind_near,
+    kinds_of,
     nearest_file,
     place,
 )
@@ -30,7 +32,7 @@ from orchestrator.config.rules import Problems
 from orchestrator.config.station import Station
 from orchestrator.config.stationsteps import Steps, bay_count, named_steps
 from orchestrator.config.yaml.reader import Reader
-from orchestrator.config.yaml.scalars import UnfitError, nearest
+from orchestrator.config.yaml.scalars import UnfitError
 from orchestrator.config.yaml.schema import INVALID
 from orchestrator.config.yaml.tree import MAX_BYTES, Entries, Node, Refused, parse
 from orchestrator.config.yesterday import Yesterday
@@ -162,14 +164,24 @@ class _Loader:
         node = self._tree(where)
         if node is None or isinstance(node, Refused):
             return
-        if kinds := _kinds(node):
-            self.load(kinds[0], where)
+        if kinds := kinds_of(node):
+            self._check_shown(where, self.load(kinds[0], where))
             return
         keys = [name.text for name, _ in node.entries] if isinstance(node, Entries) else []
-        near = next((f" ({key!r}: did you mean {found}?)" for key in keys if (found := _kind_near(key))), "")
+        near = next((f" ({key!r}: did you mean {found}?)" for key in keys if (found := kind_near(key))), "")
         marks = ", ".join(kind.mark for kind in KINDS)
         text = f"this is no file of ours: it has none of the keys {marks}{near}"
         self.findings.append(Finding(self._name(where), node.mark.line, node.mark.column, text))
+
+    def _check_shown(self, where: Place, value: object) -> None:
+        """The station that a northbound file shows: serving it does not need all of it, whoever checks it does."""
+        station, source = getattr(value, "station", None), getattr(value, "source", None)
+        if not isinstance(station, Path) or not isinstance(source, Source):
+            return
+        try:
+            self.load(STATION, place(station))
+        except UnfitError as error:
+            self.findings.append(Finding(self._name(where), source.lines.get("station", 1), 1, f"station: {error}"))
 
     def load(self, kind: Kind, where: Place) -> object:
         """The record in a file, or `INVALID` if anything in it, or in a file that it names, is wrong.
@@ -179,7 +191,7 @@ class _Loader:
         real = (os.path.realpath(where.path), kind.key)
         if real not in self._loaded:
             node = self._tree(where)
-            others = _kinds(node)
+            others = kinds_of(node)
             if others and kind not in others:
                 text = (
                     f"{self._name(where)} has the key {others[0].mark!r}; needed is a file with the key {kind.mark!r}"
@@ -236,13 +248,3 @@ class _Loader:
 
     def _name(self, where: Place) -> str:
         return self._shown.setdefault(os.path.realpath(where.path), where.shown)
-
-
-def _kinds(node: Node | None) -> list[Kind]:
-    """The kinds of file that this may be, by its keys."""
-    keys = {name.text for name, _ in node.entries} if isinstance(node, Entries) else set()
-    return [kind for kind in KINDS if kind.mark in keys]
-
-
-def _kind_near(key: str) -> str:
-    return nearest(key, [kind.mark for kind in KINDS])

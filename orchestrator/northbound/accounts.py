@@ -48,7 +48,7 @@ class Accounts:
         """Who makes this request; None if nobody knows."""
         if self._sessions is None or self._users is None:
             return LOCAL
-        self._users.look()
+        self._look()
         id_ = request.cookies.get(self._cookie)
         return self._sessions.me(id_, self._clock()) if id_ else None
 
@@ -61,12 +61,18 @@ class Accounts:
             raise RefusalError(403, Cause.of("role_too_low", name=me.name))
         return me
 
+    def check_trust(self) -> None:
+        """RefusalError while nobody can tell who may do what: then nobody logs in, and nothing is set going."""
+        if self._users is not None and self._users.doubtful:
+            raise RefusalError(503, Cause("users_unsure"))
+
     async def login(self, asked: Mapping[str, object], request: Request) -> tuple[Me, str]:
         """The user, and the cookie of a new session; RefusalError for anybody else."""
         if self._sessions is None or self._users is None:
             raise RefusalError(409, Cause("login_none"))
         name, password = text_field(asked, "name", NAME), text_field(asked, "password", LONGEST)
-        self._users.look()
+        self._look()
+        self.check_trust()
         address = request.client.host if request.client else ""
         counts = ((self._names, name), (self._addresses, address))
         self._check_wait(counts)
@@ -77,6 +83,7 @@ class Accounts:
             async with self._turn:
                 self._check_wait(counts)
                 user = await self._known(name, password, counts)
+                self.check_trust()  # the file may have changed meanwhile
         finally:
             self._waiting -= 1
         self._say(Cause.of("login_done", name=name, role=user.role.value, address=address))
@@ -89,6 +96,11 @@ class Accounts:
         if self._sessions is not None and (id_ := request.cookies.get(self._cookie)):
             self._sessions.end(id_)
         return self._set("", 0)
+
+    def _look(self) -> None:
+        """Whoever is gone from the file, or has a new password, is logged out, even if he comes back."""
+        if self._users is not None and self._sessions is not None and self._users.look():
+            self._sessions.drop_strangers()
 
     async def _known(self, name: str, password: str, counts: Counts) -> User:
         """The user who has this password; RefusalError otherwise."""

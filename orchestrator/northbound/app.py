@@ -12,7 +12,7 @@ from orchestrator.config.northbound import Role
 from orchestrator.errors import CauseError
 from orchestrator.model import Cause
 from orchestrator.northbound.accounts import Accounts, with_cookie
-from orchestrator.northbound.asking import Asking
+from orchestrator.northbound.asking import HALTS, Asking
 from orchestrator.northbound.fields import number_field
 from orchestrator.northbound.refusal import JSON, RefusalError, language_of_request
 from orchestrator.northbound.sessions import Me
@@ -110,7 +110,11 @@ class App:
     async def request(self, request: Request, me: Me) -> Response:
         """Start, pause, stop or reset a bay."""
         address = request.client.host if request.client else ""
-        return json_response(await self.asking.request(await json_object(request), me, address, language(request)))
+        asked = await json_object(request)
+        if asked.get("action") not in HALTS:
+            self.accounts.check_trust()
+        answer = await self.asking.request(asked, me, address, language(request), request.is_disconnected)
+        return json_response(answer)
 
     async def me(self, request: Request) -> Response:
         """Who is logged in, and whether one has to be."""

@@ -13,7 +13,7 @@ from orchestrator.errors import NoServiceError, ServiceError
 from orchestrator.lastresort.asking import ask
 from orchestrator.model import Cause
 from orchestrator.northbound.app import Answer, json_response, language
-from orchestrator.northbound.asking import NAME
+from orchestrator.northbound.asking import NAME, NONSENSE
 from orchestrator.northbound.fields import text_field
 from orchestrator.northbound.link import may_open
 from orchestrator.northbound.refusal import RefusalError
@@ -42,8 +42,15 @@ class Closely:
         return "/api/bay", Role.VIEWER, self._answer
 
     async def _answer(self, request: Request, _me: Me) -> Response:
-        document = await self._workers.do(self._document, text_field(request.query_params, "bay", NAME))
-        return json_response(in_language(document, language(request))["bays"][0])
+        bay = text_field(request.query_params, "bay", NAME)
+        try:
+            document = await self._workers.do(self._document, bay)
+            (entry,) = in_language(document, language(request))["bays"]
+            if entry["name"] != bay:
+                raise ValueError(bay)
+            return json_response(entry)
+        except NONSENSE:
+            raise RefusalError(503, Cause.of("bay_odd", bay=bay)) from None
 
     def _document(self, bay: str) -> Document:
         asked_s, document = self._kept.get(bay, (float("-inf"), {}))
@@ -55,7 +62,9 @@ class Closely:
             document = ask(path, {"verb": "status", "bay": bay}, ANSWER_S)
         except (NoServiceError, OSError) as error:
             raise RefusalError(503, Cause.of("no_journal", why=str(error))) from None
-        except ServiceError:
+        except ServiceError as error:
+            if not isinstance(error.told, Mapping):  # no refusal, but nonsense
+                raise ValueError(bay) from None
             raise RefusalError(404, Cause("nothing_here")) from None
         if len(self._kept) >= MOST_KEPT:
             self._kept.clear()

@@ -5,6 +5,9 @@ from collections.abc import Mapping
 from orchestrator.model import Cause
 from orchestrator.northbound.refusal import RefusalError
 
+#: Larger than any moment in Unix seconds.
+LARGEST = 1e12
+
 
 def text_field(asked: Mapping[str, object], name: str, longest: int, default: str | None = None) -> str:
     """A text of one line; RefusalError otherwise."""
@@ -24,6 +27,16 @@ def number_field(asked: Mapping[str, str], name: str, most: int, default: int) -
     if not value.isascii() or not value.isdigit() or len(value) > 15 or int(value) > most:
         raise RefusalError(400, Cause.of("field_wrong", name=name, wanted=f"0…{most}"))
     return int(value)
+
+
+def shown_field(asked: Mapping[str, object], name: str) -> float | None:
+    """A number as it stands in a document that was shown, None if none is given; RefusalError otherwise."""
+    value = asked.get(name)
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+        raise RefusalError(400, Cause.of("field_wrong", name=name, wanted="Unix s"))
+    return float(value)
 
 
 def moment_field(asked: Mapping[str, str], name: str) -> float | None:

@@ -13,13 +13,16 @@ from pathlib import Path
 from time import time
 from typing import Any
 
-from orchestrator.lastresort.asking import MAX_ANSWER, ask
+from orchestrator.lastresort.asking import ask
 from orchestrator.northbound.picture import Picture
+from orchestrator.northbound.told import encoded
 
 #: How often a service without `watch` is asked, and how long it may take.
 POLL_S, ANSWER_S = 1.0, 5.0
 #: The service says something at least every 5 s.
 SILENT_S = 12.0
+#: The longest line of `watch`, and more than 128 bays need; whoever sends more is no service of ours.
+MOST_LINE = 8 * 1024 * 1024
 #: The pause before the next attempt, doubled after each.
 RETRY_S, LONGEST_S = 0.5, 5.0
 
@@ -36,7 +39,9 @@ class Link:
     def __init__(self, sockets: Sources) -> None:
         self.picture = Picture(revision=int(time() * 1000))
         self.connected = False
-        self.since_s = time()  #: Unix time of the last change of `connected`
+        self.since_s = time()  #: Unix time of the connection, or of what was heard last before it was lost
+        self._heard_s = self.since_s
+        self._begun = False  # whether this connection has delivered a document
         self._sockets = sockets
         self._news = asyncio.Event()
         self._polls = False
@@ -53,6 +58,7 @@ class Link:
         """Until cancelled."""
         pause_s = RETRY_S
         while True:
+            self._begun = False
             try:
                 async with aclosing(self._lines()) as lines:
                     async for line in lines:
@@ -75,6 +81,8 @@ class Link:
     def _take(self, line: Mapping[str, Any]) -> None:
         """One line of the stream: the whole document, what changed, or nothing new."""
         document = line.get("document")
+        if document is None and not self._begun:
+            raise ValueError("a change, and of what is not known")
         time_s = (line if document is None else document).get("time")
         if isinstance(time_s, int | float):
             self.picture.time = time_s
@@ -82,6 +90,7 @@ class Link:
             new = self.picture.replace(document)
         else:
             new = self.picture.merge(line.get("bays") or {}, line.get("station") or {}, list(line.get("gone") or ()))
+        self._begun, self._heard_s = True, time()
         if not self._connected(connected=True) and new:
             self._wake()
 
@@ -89,7 +98,7 @@ class Link:
         """Note it; returns whether that is news."""
         if connected == self.connected:
             return False
-        self.connected, self.since_s = connected, time()
+        self.connected, self.since_s = connected, self._heard_s
         self._wake()
         return True
 
@@ -106,7 +115,7 @@ def may_open(path: Path) -> bool:
 async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
     """The lines of `watch`. OSError, ValueError or EOFError when that is over; NoStreamError if there is none."""
     async with asyncio.timeout(ANSWER_S):
-        reader, writer = await asyncio.open_unix_connection(path, limit=MAX_ANSWER)
+        reader, writer = await asyncio.open_unix_connection(path, limit=MOST_LINE)
     try:
         writer.write(b'{"verb": "watch", "version": 1}\n')
         while True:
@@ -114,7 +123,7 @@ async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
                 text = await reader.readline()
             if not text.endswith(b"\n"):
                 raise EOFError
-            line = json.loads(text)
+            line = json.loads(text, parse_constant=_no_number)
             if line.get("ok") is False:
                 raise NoStreamError
             yield line
@@ -125,5 +134,12 @@ async def watched(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
 async def polled(path: Path) -> AsyncGenerator[Mapping[str, Any], None]:
     """The status once a second, as lines of `watch`."""
     while True:
-        yield {"document": await asyncio.to_thread(ask, path, {"verb": "status"}, ANSWER_S)}
+        document = await asyncio.to_thread(ask, path, {"verb": "status"}, ANSWER_S)
+        encoded(document)  # a ValueError if no browser could read it
+        yield {"document": document}
         await asyncio.sleep(POLL_S)
+
+
+def _no_number(text: str) -> float:
+    """NaN and Infinity are no JSON: no browser could read the document."""
+    raise ValueError(text)

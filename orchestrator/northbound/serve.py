@@ -22,6 +22,7 @@ from orchestrator.northbound.closely import Closely
 from orchestrator.northbound.door import Door
 from orchestrator.northbound.guard import Guard
 from orchestrator.northbound.link import Link
+from orchestrator.northbound.pulse import Pulse
 from orchestrator.northbound.record_doors import RecordDoors
 from orchestrator.northbound.server import BACKLOG, PageServer, run
 from orchestrator.northbound.static import Static
@@ -61,7 +62,10 @@ def assembled(
     accounts = Accounts(users, time.monotonic, tell, secure=context is not None)
     records = RecordDoors(lambda: journal(station), tell, own_directory()).doors()
     closely = Closely(lambda: sockets(station)).door()
-    app = App(accounts, Streams(link), Asking(lambda: sockets(station)[-1]), Static(), (*records, closely))
+    pulse = Pulse()
+    pulse.begin()
+    asking = Asking(lambda: sockets(station)[-1], pulse)
+    app = App(accounts, Streams(link), asking, Static(), (*records, closely))
     door = Door.of(Listen.of(northbound.page.listen).host, northbound.page.hosts)
     return PageServer(Guard(app.router(), door, tell), listener, context), link
 

@@ -60,14 +60,23 @@ class Sessions:
     def me(self, id_: str, now_s: float) -> Me | None:
         """Who has this session; None if there is none, or if it has ended."""
         session = self._sessions.get(_key(id_))
-        user = self._users.get(session.name) if session is not None else None
-        if session is None or user is None or now_s >= session.end_s or user.password != session.password:
+        user = self._user(session) if session is not None else None
+        if session is None or user is None or now_s >= session.end_s:
             return None
         return Me(session.name, user.role)
 
     def end(self, id_: str) -> None:
         """Log out."""
         self._sessions.pop(_key(id_), None)
+
+    def drop_strangers(self) -> None:
+        """End the sessions of those who are no users any more."""
+        self._sessions = {key: one for key, one in self._sessions.items() if self._user(one) is not None}
+
+    def _user(self, session: Session) -> User | None:
+        """Whose session it is, as long as he has the password that he logged in with."""
+        user = self._users.get(session.name)
+        return user if user is not None and user.password == session.password else None
 
     def _drop(self, now_s: float) -> None:
         self._sessions = {key: one for key, one in self._sessions.items() if now_s < one.end_s}

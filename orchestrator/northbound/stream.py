@@ -101,7 +101,7 @@ class Streams:
         return f"{{{told.members},{beside}{_beside(told, me())}}}"
 
     def link_fields(self) -> dict[str, object]:
-        """Whether the controller answers, and since when that is so, in Unix seconds."""
+        """Whether the controller answers, and since when; if not, when it was last heard. In Unix seconds."""
         return {"connected": self._link.connected, "since": round(self._link.since_s, 3)}
 
 

@@ -18,8 +18,9 @@ PAGE = {"version": __version__}
 
 
 def encoded(value: object) -> str:
-    """JSON in one line. What no browser can read, such as NaN, is a ValueError here."""
-    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    """JSON in one line, which UTF-8 can hold. What no browser can read, such as NaN, is a ValueError here."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.encode(errors="backslashreplace").decode()  # half a surrogate pair, as the service writes it
 
 
 def asked_language(value: str | None) -> str:

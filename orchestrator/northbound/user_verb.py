@@ -1,5 +1,6 @@
 """`orchestrator user add`: who may log in, with which password. Only the password's hash is kept."""
 
+import errno
 import os
 import secrets
 import sys
@@ -7,10 +8,10 @@ from collections.abc import Mapping
 from getpass import getpass
 from pathlib import Path
 
-from orchestrator.config.load import load_users
 from orchestrator.config.names import name_problem
 from orchestrator.config.northbound import Role, User
-from orchestrator.errors import CauseError, UsageError
+from orchestrator.config.users_file import quoted, users_in
+from orchestrator.errors import CauseError, ConfigError, UsageError
 from orchestrator.model import Cause
 from orchestrator.northbound.password import LONGEST, SHORTEST, hashed
 from orchestrator.show import own_language
@@ -28,12 +29,14 @@ def add_user(name: str, role: str, file: str) -> int:
     if problem := name_problem(name):
         raise UsageError(f"user: {problem}")
     path = Path(file)
-    users = dict(load_users(path).users) if path.exists() else {}
-    users[name] = User(role=Role(role), password=hashed(_password(name)))
     try:
+        users = dict(users_in(path)) if path.exists() else {}
+        users[name] = User(role=Role(role), password=hashed(_password(name)))
         _write(path, users)
     except OSError as error:
         raise CauseError(Cause.of("users_not_written", file=file, error=error.strerror or str(error))) from None
+    except ConfigError as error:
+        raise CauseError(Cause.of("users_not_written", file=file, error=error)) from None
     print(say(Cause.of("user_saved", name=name, role=role, file=file), own_language()))
     return 0
 
@@ -53,8 +56,10 @@ def _password(name: str) -> str:
 
 
 def _write(path: Path, users: Mapping[str, User]) -> None:
-    """All of it or nothing, readable by its owner alone; who owned it before still does."""
-    lines = [f'  {name}: {{role: {user.role}, password: "{user.password}"}}\n' for name, user in users.items()]
+    """All of it or nothing, readable by its owner alone; who owned it before still does. It is read back first."""
+    lines = [
+        f"  {quoted(name)}: {{role: {user.role}, password: {quoted(user.password)}}}\n" for name, user in users.items()
+    ]
     new = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     fd = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
     try:
@@ -65,7 +70,9 @@ def _write(path: Path, users: Mapping[str, User]) -> None:
                 before = path.stat()
                 os.fchown(fd, before.st_uid, before.st_gid)
             os.fsync(fd)
+        if users_in(new) != users:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
         new.replace(path)
-    except OSError:
+    except (OSError, ConfigError):
         new.unlink(missing_ok=True)
         raise

@@ -49,3 +49,22 @@ def test_what_is_to_be_written_for_an_old_finish_is_accepted_literally(tmp_path:
     policy = tmp_path / "policy.yaml"
     policy.write_text("\n".join(lines).replace("finish:", f"finish:\n  {full}"), encoding="utf-8")
     assert not [finding.text for finding in check([str(policy)]) if "finish" in finding.text]
+
+
+@pytest.mark.parametrize(
+    ("station", "told"),
+    [
+        ("policy: p\n", "page.yaml:1:1: error: station: {station} has the key 'policy'; needed is a file with the key"),
+        ("- 7\n", "{station}:1:1: error: "),
+        ("bays: {\n", "{station}:2:1: error: "),
+        ("station: hall\nbays: []\n", "{station}:1:1: error: "),
+    ],
+)
+def test_a_northbound_file_whose_station_cannot_be_loaded_is_in_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, station: str, told: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("hall.yaml").write_text(station, encoding="utf-8")
+    Path("page.yaml").write_text("station: hall.yaml\npage: {listen: 127.0.0.1:8080}\n", encoding="utf-8")
+    findings = [str(finding) for finding in check(["page.yaml"])]
+    assert any(finding.startswith(told.format(station="hall.yaml")) for finding in findings), findings

@@ -8,7 +8,7 @@ from orchestrator.cli import main
 from orchestrator.config.load import load_users
 from orchestrator.config.northbound import Role, User
 from orchestrator.model import Cause
-from orchestrator.northbound import password
+from orchestrator.northbound import password, user_verb
 from orchestrator.northbound.backoff import Backoff
 from orchestrator.northbound.sessions import LASTS_S, MOST, MOST_OF_ONE, Me, Sessions
 from orchestrator.northbound.users import Users
@@ -112,21 +112,73 @@ def test_whoever_is_taken_out_or_gets_a_new_password_or_role_has_it_at_once(user
     assert sessions.me(lee, 1.0) is None, "taken out"
 
 
-def test_a_file_that_is_broken_or_open_to_others_changes_nothing_and_is_told(tmp_path: Path) -> None:
+def test_a_file_that_is_broken_or_open_to_others_is_doubted_until_it_is_well_and_is_told(tmp_path: Path) -> None:
+    path, said = tmp_path / "users.yaml", list[Cause]()
+    write(path, kim="operator")
+    kept = path.read_text(encoding="utf-8")
+    users = Users(path, said.append)
+    for text in ("users: {", "", kept.replace("operator", "chef"), "users: {}\nmore: {}\n", "users: []\n"):
+        path.write_text(text, encoding="utf-8")
+        assert not users.look()
+        assert not users.look()
+        assert users.doubtful, text
+    path.write_text(kept, encoding="utf-8")
+    assert users.look()
+    assert not users.doubtful
+    path.chmod(0o640)
+    users.look()
+    assert users.doubtful
+    assert "mode 0640" in said[-1].param("why")
+    assert users.get("kim") is not None
+    path.chmod(0o600)
+    users.look()
+    assert [cause.id for cause in said] == [*["users_doubted"] * 5, "users_trusted", "users_doubted", "users_trusted"]
+
+
+@pytest.mark.parametrize("text", ["users:\n", "# nobody\nusers: {}\n", "users: ~\n", None])
+def test_a_file_that_names_nobody_or_is_gone_ends_all_sessions(tmp_path: Path, text: str | None) -> None:
     path, said = tmp_path / "users.yaml", list[Cause]()
     write(path, kim="operator")
     users = Users(path, said.append)
-    path.write_text("users: {", encoding="utf-8")
-    users.look()
-    users.look()
-    path.chmod(0o640)
-    path.write_text("users: {}", encoding="utf-8")
-    users.look()
-    path.unlink()
-    users.look()
-    assert [cause.id for cause in said] == ["users_kept"] * 3
-    assert "mode 0640" in said[1].param("why")
-    assert users.get("kim") is not None
+    kept, sessions = path.read_text(encoding="utf-8"), Sessions(users)
+    kim = sessions.begin("kim", user(users, "kim"), 0.0)
+    path.unlink() if text is None else path.write_text(text, encoding="utf-8")
+    assert users.look()
+    assert (users.doubtful, sessions.me(kim, 1.0), [one.id for one in said]) == (False, None, ["users_none"])
+    sessions.drop_strangers()
+    path.touch(0o600)
+    path.write_text(kept, encoding="utf-8")
+    assert users.look()
+    assert sessions.me(kim, 1.0) is None, "a new login is needed"
+    assert user(users, "kim")
+
+
+@pytest.mark.parametrize("name", ["0", "007", "null", "true", "yes", "1e5", "0x10", "1_000", "김", "_"])
+def test_a_name_that_yaml_would_take_for_something_else_is_that_name(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "users.yaml"
+    path.touch(0o600)
+    path.write_text("users:\n", encoding="utf-8")
+    for one in (name, "kim"):
+        _type(monkeypatch, "long enough")
+        assert add(one, "viewer", path) == 0
+    assert list(load_users(path).users) == [name, "kim"]
+    assert Users(path, lambda _: None).get(name) is not None
+
+
+def test_what_would_not_read_back_is_not_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "users.yaml"
+    write(path, kim="operator")
+    before = path.read_text(encoding="utf-8")
+    monkeypatch.setattr(user_verb, "quoted", str)
+    _type(monkeypatch, "long enough")
+    assert add("null", "viewer", path) == 1
+    assert "nothing is changed" in capsys.readouterr().err
+    assert path.read_text(encoding="utf-8") == before
+    assert [file.name for file in tmp_path.iterdir()] == ["users.yaml"]
 
 
 def add(name: str, role: str, path: Path) -> int:
@@ -159,6 +211,8 @@ def test_a_short_password_or_a_name_that_nobody_can_type_is_refused(
     _type(monkeypatch, "long enough")
     assert add("kim", "operator", tmp_path / "nowhere" / "users.yaml") == 1
     assert "cannot be written" in capsys.readouterr().err
+    assert add("kim", "operator", tmp_path) == 1, "a directory"
+    assert "Traceback" not in capsys.readouterr().err
 
 
 def _type(monkeypatch: pytest.MonkeyPatch, line: str) -> None:

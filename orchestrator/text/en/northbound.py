@@ -7,7 +7,12 @@ TEXTS: Mapping[str, str] = {
     "listen_failed": "cannot listen at {address}: {error}",
     "certificate_wrong": "{cert_file} and {key_file} cannot be used as a certificate with its key: {error}",
     "certificate_kept": "the certificate in use stays: {why}",
-    "users_kept": "the users stay as they were: {why}",
+    "users_doubted": "the file of users is of no use: {why}; until it is, nobody can log in, and operators can only stop "
+    "and pause",
+    "users_trusted": "the file of users is in order again: what it says holds",
+    "users_none": "{file} names nobody: all are logged out, and nobody can log in",
+    "users_unsure": "the file of users is of no use, as the log of the page's server says: until it is in order, nobody "
+    "can log in, and only stop and pause are passed on",
     "page_error": "an error of the page's own at {path}: {error}",
     "user_saved": "{name} may log in as {role} ({file})",
     "users_not_written": "{file} cannot be written, nothing is changed: {error}",
@@ -35,6 +40,11 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "too much is asked at once: try again in a few seconds",
     "page_late": "the answer takes too long: try again, or ask for less",
     "page_failed": "the page's server has made an error, which its log has; the station is not affected",
+    "answer_odd": "its answer is nothing that this server understands",
+    "bay_odd": "what the controller tells of {bay} is nothing that this server understands",
+    "asker_gone": "whoever asked this has left: it is not passed on",
+    "bay_changed": "{bay} has changed since this was pressed, so it is not passed on: look again",
+    "page_stood_still": "the page's server stood still, so this is not passed on: look again, then press again",
     "controller_silent": "the controller does not answer ({why}): do not rely on this having been done; `orchestrator estop` "
     "on the gateway stops every charger",
 }

@@ -7,7 +7,12 @@ TEXTS: Mapping[str, str] = {
     "listen_failed": "{address}에서 연결을 받을 수 없습니다: {error}",
     "certificate_wrong": "{cert_file}과(와) {key_file}을(를) 인증서와 키로 사용할 수 없습니다: {error}",
     "certificate_kept": "사용 중인 인증서를 그대로 사용합니다: {why}",
-    "users_kept": "사용자 목록을 그대로 유지합니다: {why}",
+    "users_doubted": "사용자 파일을 사용할 수 없습니다: {why}. 바로잡을 때까지 아무도 로그인할 수 없으며 운전자는 정지와 일시 "
+    "정지만 할 수 있습니다",
+    "users_trusted": "사용자 파일이 다시 정상입니다. 파일의 내용을 적용합니다",
+    "users_none": "{file}에 사용자가 없습니다. 모두 로그아웃되었으며 아무도 로그인할 수 없습니다",
+    "users_unsure": "사용자 파일을 사용할 수 없습니다(원인은 페이지 서버의 로그 참조). 바로잡을 때까지 로그인할 수 없으며 정지와 "
+    "일시 정지만 전달합니다",
     "page_error": "페이지 서버의 자체 오류({path}): {error}",
     "user_saved": "{name} 사용자가 {role} 역할로 로그인할 수 있습니다({file})",
     "users_not_written": "{file}을(를) 쓸 수 없어 아무것도 바꾸지 않았습니다: {error}",
@@ -33,6 +38,11 @@ TEXTS: Mapping[str, str] = {
     "page_busy": "요청이 너무 많습니다. 몇 초 후에 다시 시도하십시오",
     "page_late": "응답이 너무 오래 걸립니다. 다시 시도하거나 범위를 줄이십시오",
     "page_failed": "페이지 서버에 오류가 발생했으며 로그에 기록되었습니다. 스테이션에는 영향이 없습니다",
+    "answer_odd": "응답을 이해할 수 없습니다",
+    "bay_odd": "컨트롤러가 보낸 {bay}의 정보를 이해할 수 없습니다",
+    "asker_gone": "요청한 쪽의 연결이 끊어져 요청을 전달하지 않았습니다",
+    "bay_changed": "버튼을 누른 뒤 {bay}의 상태가 바뀌어 요청을 전달하지 않았습니다. 다시 확인하십시오",
+    "page_stood_still": "페이지 서버가 잠시 멈춰 있었으므로 요청을 전달하지 않았습니다. 상태를 확인하고 다시 누르십시오",
     "controller_silent": "컨트롤러가 응답하지 않습니다({why}). 요청이 처리되지 않았을 수 있습니다. 게이트웨이에서 `orchestrator estop`을 "
     "실행하면 모든 충전기가 정지합니다",
 }
