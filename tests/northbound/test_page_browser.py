@@ -13,6 +13,8 @@ pytestmark = pytest.mark.skipif(PROGRAM is None, reason="no chromium here: apt-g
 
 TILES = "document.querySelectorAll('.tile').length"
 FIRST = f"{TILES} > 0"
+#: Time goes so much faster for what the page waits for.
+FASTER = "globalThis.setTimeout = (what, ms) => slow(what, ms / 25);"
 HANGUL = re.compile("[가-힣]")
 
 
@@ -127,6 +129,20 @@ def test_128_bays_fit_a_phone_and_a_wall(chromium: Browser, station: Shown, *, d
     tab.ask("Input.insertText", text="bay-77")
     assert tab.value("[...document.querySelectorAll('.tile')].filter((one) => !one.hidden).length") == 1
     tab.close()
+
+
+def test_what_nobody_answers_says_so_and_stays(tab: Tab, station: Shown) -> None:
+    tab.open(f"{station.address}bay/bay-2", "document.querySelector('button.hold')")
+    tab.value(f"{{ const slow = setTimeout; {FASTER} }}")
+    asked = "document.querySelector('.foot .asked').textContent"
+    with station.frozen():
+        tab.click("button.stop")
+        tab.wait(f"{asked} === 'Stop: Not delivered (no answer within 8 s). Use the charger\\'s own switch.'")
+        tab.mouse("button.hold", "mousePressed")
+        tab.wait(f"{asked} === 'Reset: Not delivered, not done (no answer within 5 s). Press again.'")
+        tab.mouse("button.hold", "mouseReleased")
+        tab.value("new Promise((done) => setTimeout(done, 5000))")
+        assert "Press again" in str(tab.value(asked))
 
 
 def test_what_is_old_says_so_at_once(tab: Tab, station: Shown) -> None:

@@ -100,6 +100,11 @@ export const WORDS = {
     "Not delivered ({why}). Use the charger's own switch.",
     "전달되지 않았습니다({why}). 충전기의 스위치를 사용하십시오.",
   ],
+  undone: [
+    "Not delivered, not done ({why}). Press again.",
+    "전달되지 않아 실행되지 않았습니다({why}). 다시 누르십시오.",
+  ],
+  no_answer: ["no answer within {s} s", "{s}초 안에 응답 없음"],
   because: ["Why (optional)", "이유(선택)"],
   // one bay
   now: ["Now", "현재"],
@@ -639,23 +644,34 @@ const SEEN = {
   reset: (bay) => bay.state !== "TRIPPED" && !isUrgent(bay),
 };
 
+/** How long each may take: what is to be done at once or not at all has less. */
+const ANSWER_S = { stop: 8, pause: 8, start: 5, reset: 5 };
+
 /** Sends a request; its progress shows wherever the bay does. */
 export async function ask(action, bay, because = "") {
   const asked = { action, stage: "asked", text: "" };
   requests.set(bay, asked);
   shell.update([bay]);
+  const given = new AbortController(),
+    s = ANSWER_S[action],
+    timer = setTimeout(() => given.abort(), s * 1000),
+    undelivered = action === "stop" ? "undelivered" : "undone";
   try {
     const body = JSON.stringify({ action, bay, because });
     const answer = await fetch(`/api/request?language=${language}`, {
       method: "POST",
       headers: { "Content-Type": "application/json" },
       body,
+      signal: given.signal,
     });
     const said = await answer.json();
-    const stage = said.ok ? "accepted" : answer.status >= 500 ? "undelivered" : "refused";
+    const stage = said.ok ? "accepted" : answer.status >= 500 ? undelivered : "refused";
     Object.assign(asked, { stage, text: said.text ?? `${answer.status}` });
   } catch (error) {
-    Object.assign(asked, { stage: "undelivered", text: error.message });
+    const text = given.signal.aborted ? word("no_answer", { s }) : error.message;
+    Object.assign(asked, { stage: undelivered, text });
+  } finally {
+    clearTimeout(timer);
   }
   shell.update([bay]);
   if (asked.stage === "accepted") setTimeout(() => forget(bay, asked), 60_000);
@@ -682,7 +698,7 @@ export function showRequest(element, bay) {
 }
 
 function progress({ action, stage, text }) {
-  const bad = stage === "refused" || stage === "undelivered";
+  const bad = ["refused", "undelivered", "undone"].includes(stage);
   if (bad) return [h("span", { class: "bad" }, shape("triangle"), `${word(action)}: `, word(stage, { why: text }))];
   const stages = ["asked", "accepted", "seen"],
     reached = stages.indexOf(stage);
