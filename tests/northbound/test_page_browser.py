@@ -86,6 +86,17 @@ def test_a_reset_is_held_for_a_second_by_mouse_or_key(tab: Tab, station: Shown) 
     assert [one["verb"] for one in station.asked] == ["reset"]  # nothing by the short press
 
 
+def test_a_reset_says_since_when_the_bay_is_as_it_was_pressed_at(tab: Tab, station: Shown) -> None:
+    tab.open(f"{station.address}bay/bay-2", "document.querySelector('button.hold')")
+    bay = station.before["bays"][1]
+    tab.value("document.querySelector('button.hold').click()")  # as a screen reader does
+    station.document = {**station.before, "bays": [{**bay, "since": bay["since"] + 60.0, "reason": "It was new."}]}
+    tab.wait("document.querySelector('.why').textContent.includes('It was new.')")
+    tab.value("document.querySelector('button.hold').click()")
+    tab.wait("document.querySelector('.foot .asked').textContent.includes('● accepted')")
+    assert [(one["action"], one["since"]) for one in tab.posted()] == [("reset", bay["since"])]
+
+
 def test_every_limit_is_a_line_with_its_place(tab: Tab, station: Shown) -> None:
     texts = json.dumps([one["text"] for one in station.before["bays"][1]["limits"]])
     shown_texts = "[...document.querySelectorAll('.limits .text')].map((one) => one.textContent)"

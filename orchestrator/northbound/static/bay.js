@@ -307,32 +307,35 @@ class Acts {
     this.list.replaceChildren(
       ...acts.map((act) => {
         const id = `does-${act}`,
-          send = () => ask(act, this.name, this.because.value.trim());
+          since = () => store.bays.get(this.name)?.since ?? undefined,
+          send = (seen) => ask(act, this.name, this.because.value.trim(), seen);
         const does = h(
           "p",
           { id, class: "hint" },
           word(`${act}_does`, { bay: this.name, policy: bay.policy?.name ?? "" }),
         );
-        const plain = h("button", { type: "button", class: "act", "aria-describedby": id, onclick: send }, word(act));
-        return h("div", {}, does, act === "pause" ? plain : holdButton(act, id, send));
+        const plain = h("button", { type: "button", class: "act", "aria-describedby": id, onclick: () => send() }, word(act));
+        return h("div", {}, does, act === "pause" ? plain : holdButton(act, id, since, send));
       }),
     );
   }
 }
 
-/** A button that acts when it has been held for a second, by finger, mouse or key. */
-function holdButton(act, describedBy, done) {
+/** A button that acts when it has been held for a second, by finger, mouse or key, on what `look` saw as it was pressed. */
+function holdButton(act, describedBy, look, done) {
   const what = word(act),
     text = h("span", {}, word("hold", { what }));
   const made = h("button", { type: "button", class: "act hold", "aria-describedby": describedBy }, text);
   let timer = null,
-    armed = null;
+    armed = null,
+    seen;
   const begin = () => {
     if (timer !== null) return;
     made.classList.add("held");
+    seen = look();
     timer = setTimeout(() => {
       end();
-      done();
+      done(seen);
     }, HOLD_MS);
   };
   const end = () => {
@@ -363,9 +366,10 @@ function holdButton(act, describedBy, done) {
       clearTimeout(armed);
       armed = null;
       put(text, word("hold", { what }));
-      done();
+      done(seen);
       return;
     }
+    seen = look();
     put(text, word("hold_again", { what }));
     armed = setTimeout(() => {
       armed = null;

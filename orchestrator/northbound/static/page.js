@@ -647,8 +647,8 @@ const SEEN = {
 /** How long each may take: what is to be done at once or not at all has less. */
 const ANSWER_S = { stop: 8, pause: 8, start: 5, reset: 5 };
 
-/** Sends a request; its progress shows wherever the bay does. */
-export async function ask(action, bay, because = "") {
+/** Sends a request; its progress shows wherever the bay does. If the bay has changed since this moment, it is refused. */
+export async function ask(action, bay, because = "", since = undefined) {
   const asked = { action, stage: "asked", text: "" };
   requests.set(bay, asked);
   shell.update([bay]);
@@ -657,7 +657,7 @@ export async function ask(action, bay, because = "") {
     timer = setTimeout(() => given.abort(), s * 1000),
     undelivered = action === "stop" ? "undelivered" : "undone";
   try {
-    const body = JSON.stringify({ action, bay, because });
+    const body = JSON.stringify({ action, bay, because, since });
     const answer = await fetch(`/api/request?language=${language}`, {
       method: "POST",
       headers: { "Content-Type": "application/json" },
