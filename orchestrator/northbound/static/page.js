@@ -777,6 +777,7 @@ class Shell {
     if (this.opening !== opening) return; // another view was opened meanwhile
     this.view?.close?.();
     this.view = null;
+    this.showPerson(); // before the view is made: it is not made anew, then, under a finger
     this.tab = tab;
     this.tabs.forEach((one) =>
       putAttribute(
