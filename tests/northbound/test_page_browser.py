@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -95,6 +96,27 @@ def test_a_reset_says_since_when_the_bay_is_as_it_was_pressed_at(tab: Tab, stati
     tab.value("document.querySelector('button.hold').click()")
     tab.wait("document.querySelector('.foot .asked').textContent.includes('● accepted')")
     assert [(one["action"], one["since"]) for one in tab.posted()] == [("reset", bay["since"])]
+
+
+def _with(station: Shown, number: int, part: str, **fields: object) -> dict[str, Any]:
+    """The document with these fields in one part of a bay."""
+    bays = list(station.before["bays"])
+    bays[number] = {**bays[number], part: {**bays[number][part], **fields}}
+    return {**station.before, "bays": bays}
+
+
+def test_an_old_state_of_charge_is_not_shown_as_if_it_were_new(tab: Tab, station: Shown) -> None:
+    station.document = _with(station, 0, "battery", old=["soc_pct"])
+    tab.open(station.address, FIRST)
+    assert tab.text(".tile:first-child .soc").endswith("% (old)")
+    assert tab.value("getComputedStyle(document.querySelector('.tile .bar span')).backgroundColor") == tab.value(
+        "getComputedStyle(document.querySelector('.tile .soc')).color"
+    )
+    tab.open(f"{station.address}bay/bay-1", "document.querySelector('.soc')")
+    assert tab.text(".soc.old").endswith("% (old)")
+    station.document = _with(station, 0, "battery", online=False, old=[])
+    tab.wait("[...document.querySelectorAll('.card dd')].some((one) => /V \\(old\\)/.test(one.textContent))")
+    assert tab.text(".soc.old").endswith("% (old)")
 
 
 def test_every_limit_is_a_line_with_its_place(tab: Tab, station: Shown) -> None:

@@ -7,6 +7,7 @@ import {
   figure,
   go,
   h,
+  isOld,
   isUrgent,
   lasting,
   link,
@@ -15,6 +16,7 @@ import {
   put,
   readyAt,
   showRequest,
+  showSoc,
   shown,
   stateMark,
   stopButton,
@@ -175,15 +177,14 @@ function head(bay) {
 const timed = (bay) => (bay.timed_start?.text ? h("p", { class: "next" }, bay.timed_start.text) : null);
 
 function nowLines(bay) {
-  const { battery, charger, forecast } = bay,
-    old = battery.old ?? [];
-  const of = (name, digits, unit) => shown(battery[name], digits, unit, old.includes(name));
+  const { battery, charger, forecast } = bay;
+  const of = (name, digits, unit) => shown(battery[name], digits, unit, isOld(battery, name));
   const chargers = `${shown(charger.voltage_v, 1, "V", charger.old)} · ${shown(charger.current_a, 2, "A", charger.old)}`;
   return [
     h(
       "p",
       { class: "charge" },
-      h("span", { class: "soc" }, figure(battery.soc_pct, 0, "%")),
+      showSoc(h("span", { class: "soc" }), battery),
       h("span", { class: "ready" }, readyAt(bay)),
     ),
     pairs([
@@ -408,7 +409,7 @@ class Curves {
       atS = Date.now() / 1000,
       last = this.points.at(-1);
     if (last && atS - last[0] < 1) return;
-    const fresh = (name) => (battery.old?.includes(name) ? null : battery[name]);
+    const fresh = (name) => (isOld(battery, name) ? null : battery[name]);
     this.points.push([
       atS,
       fresh("soc_pct"),

@@ -223,6 +223,17 @@ export function shown(value, digits, unit, old) {
   return old && text !== NONE ? `${text} (${word("old")})` : text;
 }
 
+/** Whether a battery's value is old, or its BMU missing. */
+export const isOld = ({ online, old = [] }, name) => online === false || old.includes(name);
+
+/** Fills the large SOC; it is grey, and smaller with its mark, if it is old. */
+export function showSoc(element, battery) {
+  const old = isOld(battery, "soc_pct");
+  element.classList.toggle("old", old);
+  put(element, shown(battery.soc_pct, 0, "%", old));
+  return element;
+}
+
 /** A moment in Unix seconds: its time of day, with the date if that is not today. */
 export function moment(unixS, { seconds = false, date = false } = {}) {
   if (typeof unixS !== "number") return NONE;
@@ -1105,8 +1116,7 @@ class Tile {
   }
 
   show(bay) {
-    const { battery, charger } = bay,
-      old = battery.old ?? [];
+    const { battery, charger } = bay;
     putAttribute(this.element, "data-state", bay.state);
     putAttribute(this.element, "data-alarm", bay.alarm);
     if (this.state.dataset.of !== bay.state) {
@@ -1114,9 +1124,10 @@ class Tile {
       this.state.replaceChildren(stateMark(bay.state));
     }
     const known = typeof battery.soc_pct === "number" && battery.online !== false;
-    put(this.soc, figure(known ? battery.soc_pct : null, 0, "%"));
+    showSoc(this.soc, known ? battery : {});
+    this.bar.classList.toggle("old", isOld(battery, "soc_pct"));
     this.level.style.width = `${known ? battery.soc_pct : 0}%`;
-    const of = (name, digits, unit) => shown(known ? battery[name] : null, digits, unit, old.includes(name));
+    const of = (name, digits, unit) => shown(known ? battery[name] : null, digits, unit, isOld(battery, name));
     put(
       this.values,
       [of("voltage_v", 2, "V"), shown(charger.current_a, 2, "A", charger.old), of("temperature_c", 1, "°C")].join(
