@@ -107,16 +107,26 @@ def _with(station: Shown, number: int, part: str, **fields: object) -> dict[str,
 
 def test_an_old_state_of_charge_is_not_shown_as_if_it_were_new(tab: Tab, station: Shown) -> None:
     station.document = _with(station, 0, "battery", old=["soc_pct"])
-    tab.open(station.address, FIRST)
-    assert tab.text(".tile:first-child .soc").endswith("% (old)")
+    tab.open(station.address, "document.querySelector('.tile .soc').textContent.endsWith('% (old)')")
     assert tab.value("getComputedStyle(document.querySelector('.tile .bar span')).backgroundColor") == tab.value(
         "getComputedStyle(document.querySelector('.tile .soc')).color"
     )
-    tab.open(f"{station.address}bay/bay-1", "document.querySelector('.soc')")
-    assert tab.text(".soc.old").endswith("% (old)")
+    tab.open(f"{station.address}bay/bay-1", "document.querySelector('.soc.old').textContent.endsWith('% (old)')")
     station.document = _with(station, 0, "battery", online=False, old=[])
     tab.wait("[...document.querySelectorAll('.card dd')].some((one) => /V \\(old\\)/.test(one.textContent))")
     assert tab.text(".soc.old").endswith("% (old)")
+
+
+def test_the_sum_is_of_readings_that_are_not_old(tab: Tab, station: Shown) -> None:
+    charger = {"current_a": 10.0, "voltage_v": 50.0, "old": False}
+    bays = [
+        {**one, "charger": {**one["charger"], **charger, "old": number > 1}}
+        for number, one in enumerate(station.before["bays"])
+    ]
+    station.document = {**station.before, "bays": bays}
+    tab.open(station.address, r"document.querySelector('.summary').textContent === '5 bays · 20\u202fA · 1.0\u202fkW'")
+    station.document = {**station.before, "bays": [{**bays[2], "name": "bay-1"}]}
+    tab.wait("document.querySelector('.summary').textContent === '1 bay'")
 
 
 def test_every_limit_is_a_line_with_its_place(tab: Tab, station: Shown) -> None:

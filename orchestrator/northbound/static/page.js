@@ -1020,13 +1020,17 @@ function baysView(main) {
   };
 }
 
-/** Bays, amperes and kilowatts together. */
+/** Bays, amperes and kilowatts together; of readings that are present and not old, as `orchestrator status` does. */
 function summarise(element, bays) {
-  const amps = bays.map((bay) => bay.charger.current_a ?? 0),
-    watts = bays.map((bay, at) => amps[at] * (bay.charger.voltage_v ?? 0));
+  const flows = bays
+    .map(({ charger }) => charger)
+    .filter((one) => !one.old && typeof one.current_a === "number" && typeof one.voltage_v === "number");
+  const amps = flows.map((one) => one.current_a),
+    watts = flows.map((one) => one.current_a * one.voltage_v);
   const sum = (list) => list.reduce((one, other) => one + other, 0);
   const count = word(bays.length === 1 ? "count_one" : "count", { count: figure(bays.length, 0) });
-  put(element, [count, figure(sum(amps), 0, "A"), figure(sum(watts) / 1000, 1, "kW")].join(" · "));
+  const flow = flows.length ? [figure(sum(amps), 0, "A"), figure(sum(watts) / 1000, 1, "kW")] : [];
+  put(element, [count, ...flow].join(" · "));
 }
 
 /** On top: each bay that needs a person with its reason, which begins with what to do; then the station's own problems. */
