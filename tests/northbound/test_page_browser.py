@@ -174,6 +174,16 @@ def test_128_bays_fit_a_phone_and_a_wall(chromium: Browser, station: Shown, *, d
     tab.close()
 
 
+def test_how_long_nothing_was_heard_does_not_depend_on_a_clock_that_people_set(tab: Tab, station: Shown) -> None:
+    tab.open(station.address, FIRST)
+    with station.frozen():
+        tab.value("{ const was = Date.now; Date.now = () => was() - 3600000 }")
+        tab.value("{ const was = performance.now.bind(performance); performance.now = () => was() + 40000 }")
+        lost = "document.querySelector('.lost').textContent"
+        tab.wait(f"/^Not connected for 4\\d s/.test({lost})")
+    tab.wait(f"{lost} === ''")
+
+
 def test_what_nobody_answers_says_so_and_stays(tab: Tab, station: Shown) -> None:
     tab.open(f"{station.address}bay/bay-2", "document.querySelector('button.hold')")
     tab.value(f"{{ const slow = setTimeout; {FASTER} }}")

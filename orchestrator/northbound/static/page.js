@@ -397,7 +397,8 @@ const QUIET_S = 12,
   REFUSED_S = 30,
   LOCK = "station stream",
   TAKEN = "503";
-const nowS = () => Date.now() / 1000;
+/** Of a clock that nobody sets, and that counts in each tab from another moment: tabs tell each other ages. */
+const nowS = () => performance.now() / 1000;
 const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
 
 /** What the page knows. */
@@ -421,7 +422,6 @@ class Link {
     this.onEvent = onEvent;
     this.heardS = nowS(); // any sign of life
     this.connected = false;
-    this.lostS = nowS(); // since when there is no connection
     this.polls = false; // something between here and the station holds streams back
     this.opened = false; // the stream has begun
     this.full = false; // all its places are taken
@@ -442,7 +442,7 @@ class Link {
   /** In every tab: how long nothing has been heard; 0 while all is well. */
   get silentS() {
     const quietS = nowS() - this.heardS;
-    if (!this.connected) return Math.max(1, nowS() - this.lostS);
+    if (!this.connected) return Math.max(1, quietS);
     return quietS > QUIET_S ? quietS : 0;
   }
 
@@ -476,7 +476,7 @@ class Link {
       if (message.kind === "hello" && store.station) this.tellAll();
       return;
     }
-    if (message.kind === "lost") this.lose(message.sinceS);
+    if (message.kind === "lost") this.lose(message.quietS);
     else if (message.kind !== "hello") this.live();
     if (message.kind === "event") this.onEvent(message.event, message.data, message.revision);
   }
@@ -489,7 +489,7 @@ class Link {
   tellAll() {
     this.tell({ kind: "event", event: "link", data: store.controller, revision: null });
     this.tell({ kind: "event", event: "whole", data: wholeOf(store), revision: store.revision });
-    if (!this.connected) this.tell({ kind: "lost", sinceS: this.lostS });
+    if (!this.connected) this.tell({ kind: "lost", quietS: nowS() - this.heardS });
   }
 
   live() {
@@ -497,8 +497,8 @@ class Link {
     this.connected = true;
   }
 
-  lose(sinceS = nowS()) {
-    if (this.connected || this.lostS > sinceS) this.lostS = sinceS;
+  lose(quietS = 0) {
+    this.heardS = Math.min(this.heardS, nowS() - quietS);
     this.connected = false;
   }
 
@@ -536,7 +536,7 @@ class Link {
       if (end === "more" || end === "again") continue;
       this.polls = !this.polls && (this.full || (this.opened && !heard)); // or a stream that begins, and brings nothing
       this.lose();
-      this.tell({ kind: "lost", sinceS: this.lostS });
+      this.tell({ kind: "lost", quietS: nowS() - this.heardS });
       const pauseS = store.refused ? REFUSED_S : Math.min(8, 0.5 * 2 ** failures) * (0.5 + Math.random());
       await Promise.race([
         pause(pauseS),
@@ -855,7 +855,7 @@ class Shell {
     const text = silentS
       ? word("lost", { age: lasting(silentS) })
       : connected === false
-        ? word("lost_controller", { age: lasting(typeof since === "number" ? nowS() - since : 0) })
+        ? word("lost_controller", { age: lasting(typeof since === "number" ? Date.now() / 1000 - since : 0) })
         : "";
     const lost = Boolean(text) && Boolean(store.station);
     document.body.classList.toggle("stale", lost);
