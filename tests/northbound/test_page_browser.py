@@ -129,6 +129,13 @@ def test_the_sum_is_of_readings_that_are_not_old(tab: Tab, station: Shown) -> No
     tab.wait("document.querySelector('.summary').textContent === '1 bay'")
 
 
+def test_a_bay_that_is_not_there_says_so_whatever_its_name(tab: Tab, station: Shown) -> None:
+    for name in ("nosuch", "%", "%ff", "%E0%A4"):
+        said = f"document.querySelector('h1')?.textContent === 'This station has no bay {name}'"
+        tab.open(f"{station.address}bay/{name}", said)
+        assert tab.value("document.querySelector('.way a').pathname") == "/"
+
+
 def test_every_limit_is_a_line_with_its_place(tab: Tab, station: Shown) -> None:
     texts = json.dumps([one["text"] for one in station.before["bays"][1]["limits"]])
     shown_texts = "[...document.querySelectorAll('.limits .text')].map((one) => one.textContent)"

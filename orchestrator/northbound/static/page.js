@@ -749,6 +749,15 @@ const VIEWS = [
   [/^\/login$/, async () => (await import("./station.js")).loginView, "login"],
 ];
 
+/** The name in a path; as it stands if it is not encoded as one. */
+function decoded(name) {
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name;
+  }
+}
+
 class Shell {
   build() {
     document.documentElement.lang = language;
@@ -783,7 +792,7 @@ class Shell {
     const path = location.pathname,
       opening = (this.opening = Symbol(path));
     const [pattern, load, tab] = VIEWS.find(([one]) => one.test(path)) ?? VIEWS[0];
-    const name = decodeURIComponent(pattern.exec(path)?.[1] ?? "");
+    const name = decoded(pattern.exec(path)?.[1] ?? "");
     const make = await load();
     if (this.opening !== opening) return; // another view was opened meanwhile
     this.view?.close?.();
