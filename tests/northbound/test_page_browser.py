@@ -129,6 +129,15 @@ def test_the_sum_is_of_readings_that_are_not_old(tab: Tab, station: Shown) -> No
     tab.wait("document.querySelector('.summary').textContent === '1 bay'")
 
 
+def test_a_figure_that_cannot_be_is_a_dash(tab: Tab, station: Shown) -> None:
+    absurd = dict.fromkeys(("soc_pct", "voltage_v", "current_a", "temperature_c", "time_to_full_min"), 1e308)
+    station.document = _with(station, 0, "battery", **absurd)
+    tab.open(station.address, "document.querySelector('.tile .soc').textContent === '–'")
+    assert re.fullmatch(r"– · [\d.]+\u202fA · –", tab.text(".tile .values"))
+    tab.open(f"{station.address}bay/bay-1", "document.querySelector('.charge .soc').textContent === '–'")
+    assert "– · – · –" in tab.text("dd")
+
+
 def test_a_bay_that_is_not_there_says_so_whatever_its_name(tab: Tab, station: Shown) -> None:
     for name in ("nosuch", "%", "%ff", "%E0%A4"):
         said = f"document.querySelector('h1')?.textContent === 'This station has no bay {name}'"

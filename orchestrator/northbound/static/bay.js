@@ -315,7 +315,11 @@ class Acts {
           { id, class: "hint" },
           word(`${act}_does`, { bay: this.name, policy: bay.policy?.name ?? "" }),
         );
-        const plain = h("button", { type: "button", class: "act", "aria-describedby": id, onclick: () => send() }, word(act));
+        const plain = h(
+          "button",
+          { type: "button", class: "act", "aria-describedby": id, onclick: () => send() },
+          word(act),
+        );
         return h("div", {}, does, act === "pause" ? plain : holdButton(act, id, since, send));
       }),
     );

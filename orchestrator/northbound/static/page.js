@@ -208,9 +208,18 @@ function format(kind, options) {
   return formats.get(key);
 }
 
-/** A number with this many decimals and its unit; a dash for none. */
+/** The least and the most that a quantity can be, by its unit. */
+const POSSIBLE = { "%": [0, 150], V: [-2000, 2000], A: [-5000, 5000], "°C": [-274, 1000], s: [-1e11, 1e11] },
+  FAR = [-1e9, 1e9];
+
+function isPossible(value, unit = "") {
+  const [least, most] = POSSIBLE[unit] ?? FAR;
+  return typeof value === "number" && value >= least && value <= most;
+}
+
+/** A number with this many decimals and its unit; a dash for none, or for one that cannot be. */
 export function figure(value, digits, unit = "") {
-  if (typeof value !== "number" || !Number.isFinite(value)) return NONE;
+  if (!isPossible(value, unit)) return NONE;
   const text = format(Intl.NumberFormat, { minimumFractionDigits: digits, maximumFractionDigits: digits }).format(
     value,
   );
@@ -236,7 +245,7 @@ export function showSoc(element, battery) {
 
 /** A moment in Unix seconds: its time of day, with the date if that is not today. */
 export function moment(unixS, { seconds = false, date = false } = {}) {
-  if (typeof unixS !== "number") return NONE;
+  if (!isPossible(unixS, "s")) return NONE;
   const then = new Date(unixS * 1000);
   const time = { hour: "2-digit", minute: "2-digit", hourCycle: "h23", ...(seconds && { second: "2-digit" }) };
   const today = then.toDateString() === new Date().toDateString();
@@ -246,7 +255,7 @@ export function moment(unixS, { seconds = false, date = false } = {}) {
 
 /** How long, in words. */
 export function lasting(seconds) {
-  if (typeof seconds !== "number") return NONE;
+  if (!isPossible(seconds, "s")) return NONE;
   const s = Math.max(0, Math.round(seconds)),
     m = Math.floor(s / 60);
   if (s < 60) return word("seconds", { s });
@@ -378,7 +387,7 @@ function readyTimes(bay) {
   const bmuS = typeof minutes === "number" && bay.state === "CHARGING" ? Date.now() / 1000 + 60 * minutes : null; // without a forecast, as the BMU says
   const known = forecast ? [forecast.bmu_at, forecast.own_at] : [bmuS];
   const at = known
-    .filter((one) => typeof one === "number")
+    .filter((one) => isPossible(one, "s"))
     .sort((one, other) => one - other)
     .map((one) => moment(one));
   return at[0] === at.at(-1) ? at.slice(0, 1) : at;
@@ -1033,12 +1042,12 @@ function baysView(main) {
 function summarise(element, bays) {
   const flows = bays
     .map(({ charger }) => charger)
-    .filter((one) => !one.old && typeof one.current_a === "number" && typeof one.voltage_v === "number");
+    .filter((one) => !one.old && isPossible(one.current_a, "A") && isPossible(one.voltage_v, "V"));
   const amps = flows.map((one) => one.current_a),
     watts = flows.map((one) => one.current_a * one.voltage_v);
   const sum = (list) => list.reduce((one, other) => one + other, 0);
   const count = word(bays.length === 1 ? "count_one" : "count", { count: figure(bays.length, 0) });
-  const flow = flows.length ? [figure(sum(amps), 0, "A"), figure(sum(watts) / 1000, 1, "kW")] : [];
+  const flow = flows.length ? [`${figure(sum(amps), 0)}${NARROW}A`, figure(sum(watts) / 1000, 1, "kW")] : [];
   put(element, [count, ...flow].join(" · "));
 }
 
@@ -1136,7 +1145,7 @@ class Tile {
       this.state.dataset.of = bay.state;
       this.state.replaceChildren(stateMark(bay.state));
     }
-    const known = typeof battery.soc_pct === "number" && battery.online !== false;
+    const known = isPossible(battery.soc_pct, "%") && battery.online !== false;
     showSoc(this.soc, known ? battery : {});
     this.bar.classList.toggle("old", isOld(battery, "soc_pct"));
     this.level.style.width = `${known ? battery.soc_pct : 0}%`;
