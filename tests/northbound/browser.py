@@ -157,6 +157,15 @@ class Tab:
             if one.get("sessionId") == self._session and one["method"] == "Network.requestWillBeSent"
         ]
 
+    def posted(self) -> list[Mapping[str, Any]]:
+        """The bodies sent by this page."""
+        sent = [
+            one["params"]["request"]
+            for one in self._browser.events
+            if one.get("sessionId") == self._session and one["method"] == "Network.requestWillBeSent"
+        ]
+        return [json.loads(one["postData"]) for one in sent if "postData" in one]
+
     def complaints(self) -> list[str]:
         """What the console says: errors, and violations of the content security policy."""
         found = [one for one in self._browser.events if one.get("sessionId") == self._session]

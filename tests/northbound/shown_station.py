@@ -1,6 +1,7 @@
 """What the page's tests look at: real status documents of an emulated station, behind the real control socket."""
 
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -117,6 +118,16 @@ class Shown:
         assert self._process is not None
         self._process.kill()
         self._process.wait()
+
+    @contextmanager
+    def frozen(self) -> Iterator[None]:
+        """The page's server keeps its connections, and does nothing."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self._process.send_signal(signal.SIGCONT)
 
     def serve(self, directory: Path) -> None:
         """Start the page's server, where it was before."""

@@ -7,6 +7,7 @@ import {
   figure,
   go,
   h,
+  isOld,
   isUrgent,
   lasting,
   link,
@@ -15,6 +16,7 @@ import {
   put,
   readyAt,
   showRequest,
+  showSoc,
   shown,
   stateMark,
   stopButton,
@@ -175,15 +177,14 @@ function head(bay) {
 const timed = (bay) => (bay.timed_start?.text ? h("p", { class: "next" }, bay.timed_start.text) : null);
 
 function nowLines(bay) {
-  const { battery, charger, forecast } = bay,
-    old = battery.old ?? [];
-  const of = (name, digits, unit) => shown(battery[name], digits, unit, old.includes(name));
+  const { battery, charger, forecast } = bay;
+  const of = (name, digits, unit) => shown(battery[name], digits, unit, isOld(battery, name));
   const chargers = `${shown(charger.voltage_v, 1, "V", charger.old)} · ${shown(charger.current_a, 2, "A", charger.old)}`;
   return [
     h(
       "p",
       { class: "charge" },
-      h("span", { class: "soc" }, figure(battery.soc_pct, 0, "%")),
+      showSoc(h("span", { class: "soc" }), battery),
       h("span", { class: "ready" }, readyAt(bay)),
     ),
     pairs([
@@ -307,32 +308,39 @@ class Acts {
     this.list.replaceChildren(
       ...acts.map((act) => {
         const id = `does-${act}`,
-          send = () => ask(act, this.name, this.because.value.trim());
+          since = () => store.bays.get(this.name)?.since ?? undefined,
+          send = (seen) => ask(act, this.name, this.because.value.trim(), seen);
         const does = h(
           "p",
           { id, class: "hint" },
           word(`${act}_does`, { bay: this.name, policy: bay.policy?.name ?? "" }),
         );
-        const plain = h("button", { type: "button", class: "act", "aria-describedby": id, onclick: send }, word(act));
-        return h("div", {}, does, act === "pause" ? plain : holdButton(act, id, send));
+        const plain = h(
+          "button",
+          { type: "button", class: "act", "aria-describedby": id, onclick: () => send() },
+          word(act),
+        );
+        return h("div", {}, does, act === "pause" ? plain : holdButton(act, id, since, send));
       }),
     );
   }
 }
 
-/** A button that acts when it has been held for a second, by finger, mouse or key. */
-function holdButton(act, describedBy, done) {
+/** A button that acts when it has been held for a second, by finger, mouse or key, on what `look` saw as it was pressed. */
+function holdButton(act, describedBy, look, done) {
   const what = word(act),
     text = h("span", {}, word("hold", { what }));
   const made = h("button", { type: "button", class: "act hold", "aria-describedby": describedBy }, text);
   let timer = null,
-    armed = null;
+    armed = null,
+    seen;
   const begin = () => {
     if (timer !== null) return;
     made.classList.add("held");
+    seen = look();
     timer = setTimeout(() => {
       end();
-      done();
+      done(seen);
     }, HOLD_MS);
   };
   const end = () => {
@@ -363,9 +371,10 @@ function holdButton(act, describedBy, done) {
       clearTimeout(armed);
       armed = null;
       put(text, word("hold", { what }));
-      done();
+      done(seen);
       return;
     }
+    seen = look();
     put(text, word("hold_again", { what }));
     armed = setTimeout(() => {
       armed = null;
@@ -404,7 +413,7 @@ class Curves {
       atS = Date.now() / 1000,
       last = this.points.at(-1);
     if (last && atS - last[0] < 1) return;
-    const fresh = (name) => (battery.old?.includes(name) ? null : battery[name]);
+    const fresh = (name) => (isOld(battery, name) ? null : battery[name]);
     this.points.push([
       atS,
       fresh("soc_pct"),

@@ -208,9 +208,18 @@ function format(kind, options) {
   return formats.get(key);
 }
 
-/** A number with this many decimals and its unit; a dash for none. */
+/** The least and the most that a quantity can be, by its unit. */
+const POSSIBLE = { "%": [0, 150], V: [-2000, 2000], A: [-5000, 5000], "°C": [-274, 1000], s: [-1e11, 1e11] },
+  FAR = [-1e9, 1e9];
+
+function isPossible(value, unit = "") {
+  const [least, most] = POSSIBLE[unit] ?? FAR;
+  return typeof value === "number" && value >= least && value <= most;
+}
+
+/** A number with this many decimals and its unit; a dash for none, or for one that cannot be. */
 export function figure(value, digits, unit = "") {
-  if (typeof value !== "number" || !Number.isFinite(value)) return NONE;
+  if (!isPossible(value, unit)) return NONE;
   const text = format(Intl.NumberFormat, { minimumFractionDigits: digits, maximumFractionDigits: digits }).format(
     value,
   );
@@ -223,9 +232,20 @@ export function shown(value, digits, unit, old) {
   return old && text !== NONE ? `${text} (${word("old")})` : text;
 }
 
+/** Whether a battery's value is old, or its BMU missing. */
+export const isOld = ({ online, old = [] }, name) => online === false || old.includes(name);
+
+/** Fills the large SOC; it is grey, and smaller with its mark, if it is old. */
+export function showSoc(element, battery) {
+  const old = isOld(battery, "soc_pct");
+  element.classList.toggle("old", old);
+  put(element, shown(battery.soc_pct, 0, "%", old));
+  return element;
+}
+
 /** A moment in Unix seconds: its time of day, with the date if that is not today. */
 export function moment(unixS, { seconds = false, date = false } = {}) {
-  if (typeof unixS !== "number") return NONE;
+  if (!isPossible(unixS, "s")) return NONE;
   const then = new Date(unixS * 1000);
   const time = { hour: "2-digit", minute: "2-digit", hourCycle: "h23", ...(seconds && { second: "2-digit" }) };
   const today = then.toDateString() === new Date().toDateString();
@@ -235,7 +255,7 @@ export function moment(unixS, { seconds = false, date = false } = {}) {
 
 /** How long, in words. */
 export function lasting(seconds) {
-  if (typeof seconds !== "number") return NONE;
+  if (!isPossible(seconds, "s")) return NONE;
   const s = Math.max(0, Math.round(seconds)),
     m = Math.floor(s / 60);
   if (s < 60) return word("seconds", { s });
@@ -367,7 +387,7 @@ function readyTimes(bay) {
   const bmuS = typeof minutes === "number" && bay.state === "CHARGING" ? Date.now() / 1000 + 60 * minutes : null; // without a forecast, as the BMU says
   const known = forecast ? [forecast.bmu_at, forecast.own_at] : [bmuS];
   const at = known
-    .filter((one) => typeof one === "number")
+    .filter((one) => isPossible(one, "s"))
     .sort((one, other) => one - other)
     .map((one) => moment(one));
   return at[0] === at.at(-1) ? at.slice(0, 1) : at;
@@ -386,7 +406,8 @@ const QUIET_S = 12,
   REFUSED_S = 30,
   LOCK = "station stream",
   TAKEN = "503";
-const nowS = () => Date.now() / 1000;
+/** Of a clock that nobody sets, and that counts in each tab from another moment: tabs tell each other ages. */
+const nowS = () => performance.now() / 1000;
 const pause = (seconds) => new Promise((resolve) => setTimeout(resolve, seconds * 1000));
 
 /** What the page knows. */
@@ -410,7 +431,6 @@ class Link {
     this.onEvent = onEvent;
     this.heardS = nowS(); // any sign of life
     this.connected = false;
-    this.lostS = nowS(); // since when there is no connection
     this.polls = false; // something between here and the station holds streams back
     this.opened = false; // the stream has begun
     this.full = false; // all its places are taken
@@ -431,7 +451,7 @@ class Link {
   /** In every tab: how long nothing has been heard; 0 while all is well. */
   get silentS() {
     const quietS = nowS() - this.heardS;
-    if (!this.connected) return Math.max(1, nowS() - this.lostS);
+    if (!this.connected) return Math.max(1, quietS);
     return quietS > QUIET_S ? quietS : 0;
   }
 
@@ -465,7 +485,7 @@ class Link {
       if (message.kind === "hello" && store.station) this.tellAll();
       return;
     }
-    if (message.kind === "lost") this.lose(message.sinceS);
+    if (message.kind === "lost") this.lose(message.quietS);
     else if (message.kind !== "hello") this.live();
     if (message.kind === "event") this.onEvent(message.event, message.data, message.revision);
   }
@@ -478,7 +498,7 @@ class Link {
   tellAll() {
     this.tell({ kind: "event", event: "link", data: store.controller, revision: null });
     this.tell({ kind: "event", event: "whole", data: wholeOf(store), revision: store.revision });
-    if (!this.connected) this.tell({ kind: "lost", sinceS: this.lostS });
+    if (!this.connected) this.tell({ kind: "lost", quietS: nowS() - this.heardS });
   }
 
   live() {
@@ -486,8 +506,8 @@ class Link {
     this.connected = true;
   }
 
-  lose(sinceS = nowS()) {
-    if (this.connected || this.lostS > sinceS) this.lostS = sinceS;
+  lose(quietS = 0) {
+    this.heardS = Math.min(this.heardS, nowS() - quietS);
     this.connected = false;
   }
 
@@ -525,7 +545,7 @@ class Link {
       if (end === "more" || end === "again") continue;
       this.polls = !this.polls && (this.full || (this.opened && !heard)); // or a stream that begins, and brings nothing
       this.lose();
-      this.tell({ kind: "lost", sinceS: this.lostS });
+      this.tell({ kind: "lost", quietS: nowS() - this.heardS });
       const pauseS = store.refused ? REFUSED_S : Math.min(8, 0.5 * 2 ** failures) * (0.5 + Math.random());
       await Promise.race([
         pause(pauseS),
@@ -647,8 +667,8 @@ const SEEN = {
 /** How long each may take: what is to be done at once or not at all has less. */
 const ANSWER_S = { stop: 8, pause: 8, start: 5, reset: 5 };
 
-/** Sends a request; its progress shows wherever the bay does. */
-export async function ask(action, bay, because = "") {
+/** Sends a request; its progress shows wherever the bay does. If the bay has changed since this moment, it is refused. */
+export async function ask(action, bay, because = "", since = undefined) {
   const asked = { action, stage: "asked", text: "" };
   requests.set(bay, asked);
   shell.update([bay]);
@@ -657,7 +677,7 @@ export async function ask(action, bay, because = "") {
     timer = setTimeout(() => given.abort(), s * 1000),
     undelivered = action === "stop" ? "undelivered" : "undone";
   try {
-    const body = JSON.stringify({ action, bay, because });
+    const body = JSON.stringify({ action, bay, because, since });
     const answer = await fetch(`/api/request?language=${language}`, {
       method: "POST",
       headers: { "Content-Type": "application/json" },
@@ -738,6 +758,15 @@ const VIEWS = [
   [/^\/login$/, async () => (await import("./station.js")).loginView, "login"],
 ];
 
+/** The name in a path; as it stands if it is not encoded as one. */
+function decoded(name) {
+  try {
+    return decodeURIComponent(name);
+  } catch {
+    return name;
+  }
+}
+
 class Shell {
   build() {
     document.documentElement.lang = language;
@@ -772,11 +801,12 @@ class Shell {
     const path = location.pathname,
       opening = (this.opening = Symbol(path));
     const [pattern, load, tab] = VIEWS.find(([one]) => one.test(path)) ?? VIEWS[0];
-    const name = decodeURIComponent(pattern.exec(path)?.[1] ?? "");
+    const name = decoded(pattern.exec(path)?.[1] ?? "");
     const make = await load();
     if (this.opening !== opening) return; // another view was opened meanwhile
     this.view?.close?.();
     this.view = null;
+    this.showPerson(); // before the view is made: it is not made anew, then, under a finger
     this.tab = tab;
     this.tabs.forEach((one) =>
       putAttribute(
@@ -843,7 +873,7 @@ class Shell {
     const text = silentS
       ? word("lost", { age: lasting(silentS) })
       : connected === false
-        ? word("lost_controller", { age: lasting(typeof since === "number" ? nowS() - since : 0) })
+        ? word("lost_controller", { age: lasting(typeof since === "number" ? Date.now() / 1000 - since : 0) })
         : "";
     const lost = Boolean(text) && Boolean(store.station);
     document.body.classList.toggle("stale", lost);
@@ -1008,13 +1038,17 @@ function baysView(main) {
   };
 }
 
-/** Bays, amperes and kilowatts together. */
+/** Bays, amperes and kilowatts together; of readings that are present and not old, as `orchestrator status` does. */
 function summarise(element, bays) {
-  const amps = bays.map((bay) => bay.charger.current_a ?? 0),
-    watts = bays.map((bay, at) => amps[at] * (bay.charger.voltage_v ?? 0));
+  const flows = bays
+    .map(({ charger }) => charger)
+    .filter((one) => !one.old && isPossible(one.current_a, "A") && isPossible(one.voltage_v, "V"));
+  const amps = flows.map((one) => one.current_a),
+    watts = flows.map((one) => one.current_a * one.voltage_v);
   const sum = (list) => list.reduce((one, other) => one + other, 0);
   const count = word(bays.length === 1 ? "count_one" : "count", { count: figure(bays.length, 0) });
-  put(element, [count, figure(sum(amps), 0, "A"), figure(sum(watts) / 1000, 1, "kW")].join(" · "));
+  const flow = flows.length ? [`${figure(sum(amps), 0)}${NARROW}A`, figure(sum(watts) / 1000, 1, "kW")] : [];
+  put(element, [count, ...flow].join(" · "));
 }
 
 /** On top: each bay that needs a person with its reason, which begins with what to do; then the station's own problems. */
@@ -1104,18 +1138,18 @@ class Tile {
   }
 
   show(bay) {
-    const { battery, charger } = bay,
-      old = battery.old ?? [];
+    const { battery, charger } = bay;
     putAttribute(this.element, "data-state", bay.state);
     putAttribute(this.element, "data-alarm", bay.alarm);
     if (this.state.dataset.of !== bay.state) {
       this.state.dataset.of = bay.state;
       this.state.replaceChildren(stateMark(bay.state));
     }
-    const known = typeof battery.soc_pct === "number" && battery.online !== false;
-    put(this.soc, figure(known ? battery.soc_pct : null, 0, "%"));
+    const known = isPossible(battery.soc_pct, "%") && battery.online !== false;
+    showSoc(this.soc, known ? battery : {});
+    this.bar.classList.toggle("old", isOld(battery, "soc_pct"));
     this.level.style.width = `${known ? battery.soc_pct : 0}%`;
-    const of = (name, digits, unit) => shown(known ? battery[name] : null, digits, unit, old.includes(name));
+    const of = (name, digits, unit) => shown(known ? battery[name] : null, digits, unit, isOld(battery, name));
     put(
       this.values,
       [of("voltage_v", 2, "V"), shown(charger.current_a, 2, "A", charger.old), of("temperature_c", 1, "°C")].join(
