@@ -1,6 +1,7 @@
 """Runs one demo from beginning to end."""
 
 import shutil
+import signal
 import sys
 import time
 from contextlib import suppress
@@ -37,19 +38,20 @@ def demo(fault: str | None, *, plain: bool, page: bool = False) -> int:
         "An emulated charger on a pseudo-terminal, an emulated BMU on a CAN bus, and the service between them.",
         flush=True,
     )
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # it ends as by Ctrl-C: nothing of it is left running
     with Stage() as stage:
         if page:
             print(f"{stage.serve()} (Ctrl-C ends the demo)", flush=True)
             _watch_on(stage, story, screen)
-            return 0
-        with screen.live():
-            _watch(stage, story, screen)
-        _sum_up(stage, story)
-    if story.well:
+        else:
+            with screen.live():
+                _watch(stage, story, screen)
+            _sum_up(stage, story)
+    if story.well or page:
         shutil.rmtree(stage.directory, ignore_errors=True)
     else:
         print(f"journal and log: {stage.directory}", file=sys.stderr)
-    return 0 if story.well else 1
+    return 0 if story.well or page else 1
 
 
 def _screen(*, plain: bool) -> Screen:
