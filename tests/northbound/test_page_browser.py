@@ -87,15 +87,16 @@ def test_a_reset_is_held_for_a_second_by_mouse_or_key(tab: Tab, station: Shown) 
     assert [one["verb"] for one in station.asked] == ["reset"]  # nothing by the short press
 
 
-def test_a_reset_says_since_when_the_bay_is_as_it_was_pressed_at(tab: Tab, station: Shown) -> None:
+def test_a_reset_is_refused_once_the_bay_has_changed_since_it_was_pressed(tab: Tab, station: Shown) -> None:
     tab.open(f"{station.address}bay/bay-2", "document.querySelector('button.hold')")
     bay = station.before["bays"][1]
     tab.value("document.querySelector('button.hold').click()")  # as a screen reader does
     station.document = {**station.before, "bays": [{**bay, "since": bay["since"] + 60.0, "reason": "It was new."}]}
     tab.wait("document.querySelector('.why').textContent.includes('It was new.')")
     tab.value("document.querySelector('button.hold').click()")
-    tab.wait("document.querySelector('.foot .asked').textContent.includes('● accepted')")
+    tab.wait("document.querySelector('.foot .asked').textContent.includes('has changed since')")
     assert [(one["action"], one["since"]) for one in tab.posted()] == [("reset", bay["since"])]
+    assert "accepted" not in tab.text(".foot .asked").lower()
 
 
 def _with(station: Shown, number: int, part: str, **fields: object) -> dict[str, Any]:
